@@ -1,0 +1,2 @@
+//! gramian
+pub mod numerics;

@@ -1,0 +1,58 @@
+//! The one error type of the numerical layer.
+
+/// What the numerics refuses, named by its cause, with the index of the offending point where there is one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NumericsError {
+    #[error("the cloud has no points")]
+    EmptyCloud,
+    #[error("points have no coordinates")]
+    ZeroDimension,
+    #[error("points[{point}] has {found} coordinates, the points before it have {expected}")]
+    RaggedPoints { point: usize, expected: usize, found: usize },
+    #[error("points[{point}][{coordinate}] is not finite")]
+    NonFiniteCoordinate { point: usize, coordinate: usize },
+    #[error("the geometry of a hypersurface needs dimension 2 or more, the cloud has dimension {found}")]
+    DimensionTooSmall { found: usize },
+    #[error("expected dimension {expected}, found {found}")]
+    DimensionMismatch { expected: usize, found: usize },
+    #[error("expected {expected} entries, one per point, found {found}")]
+    LengthMismatch { expected: usize, found: usize },
+    #[error("kernel parameter {parameter} {requirement}")]
+    InvalidKernelParameter { parameter: &'static str, requirement: &'static str },
+    #[error("{parameter} {requirement}")]
+    InvalidRegularization { parameter: &'static str, requirement: &'static str, point: Option<usize> },
+    #[error(
+        "the Wendland kernel is positive definite up to dimension {max_dimension}, the cloud has {dimension}"
+    )]
+    KernelNotPositiveDefinite { dimension: usize, max_dimension: usize },
+    #[error(
+        "the kernel has a kink at 0 and no gradient at query {query}, which is point {point} of the cloud"
+    )]
+    KernelNotSmooth { query: usize, point: usize },
+    #[error("{} points coincide with another one and alpha is 0", points.len())]
+    DuplicatePoints {
+        /// Every point that has a twin, ascending.
+        points: Vec<usize>,
+    },
+    #[error("K + alpha I is not positive definite in float64: {reason}")]
+    NotPositiveDefinite { reason: NotDefinite, minimum_alpha: f64 },
+    #[error("the answer at query {query} is outside the range of float64")]
+    Overflow { query: usize },
+    #[error("the weights are outside the range of float64")]
+    WeightsOverflow,
+    #[error("the computation was cancelled")]
+    Cancelled,
+}
+
+/// Why no honest answer exists without more regularization.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotDefinite {
+    #[error("the fallback leaves a relative residual of {relative_residual:.1e}")]
+    Residual { relative_residual: f64 },
+    #[error("the fallback leaves a backward error of {backward_error:.1e}")]
+    BackwardError { backward_error: f64 },
+    #[error("Cholesky fails at point {point}, and what was asked for needs its factor")]
+    NeedsCholesky { point: usize },
+    #[error("the variance at query {query} is {variance:.1e}, beyond rounding")]
+    NegativeVariance { query: usize, variance: f64 },
+}

@@ -1,0 +1,126 @@
+//! Gram and cross-Gram matrices, assembled in parallel, column by column.
+
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::cloud::Cloud;
+use super::error::NumericsError;
+use super::kernel::Kernel;
+use super::nodes::Nodes;
+use super::observer::Observer;
+use super::regularization::Regularization;
+use super::simd::BLOCK;
+
+/// Columns per task: enough work to outweigh scheduling, few enough to balance a triangle over many threads.
+const COLUMNS_PER_TASK: usize = 16;
+
+/// Writes the lower triangle of `K + αI` into a column-major buffer of n columns, `stride` apart.
+///
+/// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j; what lies above the diagonal is left untouched, so pages of
+/// a fresh buffer that hold nothing else are never mapped.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`].
+pub(crate) fn fill_lower_gram(
+    cloud: &Cloud,
+    kernel: &Kernel,
+    regularization: &Regularization,
+    gram: &mut [f64],
+    stride: usize,
+    observer: &dyn Observer,
+) -> Result<(), NumericsError> {
+    let nodes = Nodes::of(cloud);
+    let arch = pulp::Arch::new();
+    gram.par_chunks_mut(stride * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, columns)| {
+        observer.checkpoint()?;
+        for (k, column) in columns.chunks_mut(stride).enumerate() {
+            let point = task * COLUMNS_PER_TASK + k;
+            let column = &mut column[..cloud.n_points()];
+            arch.dispatch(KernelColumn { nodes: &nodes, kernel, x: cloud.point(point), from: point, column });
+            column[point] += regularization.at(point);
+        }
+        Ok(())
+    })
+}
+
+/// Writes `cross[j·n + i] = k(x_i, q_j)`, the cross-Gram matrix `[m, n]` row by row, i.e. one query after the other.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`].
+pub(crate) fn fill_cross_gram(
+    nodes: &Nodes,
+    kernel: &Kernel,
+    queries: &Cloud,
+    cross: &mut [f64],
+    observer: &dyn Observer,
+) -> Result<(), NumericsError> {
+    let arch = pulp::Arch::new();
+    let n = nodes.n_points();
+    cross.par_chunks_mut(n * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, rows)| {
+        observer.checkpoint()?;
+        for (k, column) in rows.chunks_mut(n).enumerate() {
+            let x = queries.point(task * COLUMNS_PER_TASK + k);
+            arch.dispatch(KernelColumn { nodes, kernel, x, from: 0, column });
+        }
+        Ok(())
+    })
+}
+
+/// `column[i] = k(x_i, x)` for i ≥ `from`.
+struct KernelColumn<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    x: &'a [f64],
+    from: usize,
+    column: &'a mut [f64],
+}
+
+impl WithSimd for KernelColumn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let variance = self.kernel.variance();
+        let (mut q, mut phi) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
+        for block in self.from / BLOCK..self.nodes.n_blocks() {
+            self.nodes.scaled_distances::<S>(block, self.x, self.kernel, &mut q);
+            self.kernel.profile_block::<S, 0>(&q, &mut phi);
+            for value in &mut phi[0] {
+                *value *= variance;
+            }
+            let start = block * BLOCK;
+            let (first, end) = (self.from.max(start), (start + BLOCK).min(self.column.len()));
+            self.column[first..end].copy_from_slice(&phi[0][first - start..end - start]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::kernel::tests::all_families;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::testing::fibonacci_sphere;
+
+    #[test]
+    fn the_gram_matrix_is_the_cross_gram_of_the_cloud_with_itself_plus_alpha() {
+        let cloud = fibonacci_sphere(150);
+        let (n, stride) = (150, 152);
+        for family in all_families() {
+            let kernel = Kernel::new(family, 0.7, 2.0).unwrap();
+            let alpha = Regularization::per_point((0..n).map(|i| i as f64).collect()).unwrap();
+            let mut gram = vec![f64::NAN; n * stride];
+            fill_lower_gram(&cloud, &kernel, &alpha, &mut gram, stride, &Unobserved).unwrap();
+            let mut cross = vec![f64::NAN; n * n];
+            fill_cross_gram(&Nodes::of(&cloud), &kernel, &cloud, &mut cross, &Unobserved).unwrap();
+            for j in 0..n {
+                for i in j..n {
+                    let expected = cross[j * n + i] + if i == j { i as f64 } else { 0.0 };
+                    assert_eq!(gram[j * stride + i], expected);
+                    assert_eq!(cross[j * n + i], cross[i * n + j], "symmetric");
+                }
+                assert!((cross[j * n + j] - kernel.at_zero()).abs() <= 4.0 * f64::EPSILON * kernel.at_zero());
+            }
+        }
+    }
+}

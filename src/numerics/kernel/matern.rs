@@ -1,0 +1,34 @@
+//! Half-integer Matérn, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q), with θ_p the reverse Bessel polynomials.
+//!
+//! Since s^ν K_ν(s) = √(π/2) e^{−s} θ_p(s) and (s^ν K_ν)′ = −s · s^{ν−1}K_{ν−1}, a derivative in q only lowers the index:
+//! d/dq [e^{−s} θ_p] = −ν e^{−s} θ_{p−1} (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and Williams 2006, eq. 4.16).
+
+use pulp::Simd;
+
+use super::TINY;
+use crate::numerics::simd::{exp_nonpositive, fma};
+
+/// φ, φ′, φ″ with θ_{−1} = 1/s and θ_{−2} = (1 + s)/s³, which only the orders 0 and 1 meet.
+#[inline(always)]
+pub(super) fn profile<S: Simd, const P: usize>(q: f64) -> [f64; 3] {
+    let nu = P as f64 + 0.5;
+    let s_squared = 2.0 * nu * q;
+    let s = s_squared.sqrt();
+    let s = if s < TINY { TINY } else { s };
+    let inverse = 1.0 / s;
+    // theta[p + 2] is θ_p, from θ_p = (2p − 1) θ_{p−1} + s² θ_{p−2}.
+    let mut theta = [0.0; 11];
+    theta[0] = (1.0 + s) * inverse * inverse * inverse;
+    theta[1] = inverse;
+    theta[2] = 1.0;
+    theta[3] = 1.0 + s;
+    let mut at_zero = 1.0;
+    for p in 2..=P {
+        theta[p + 2] = fma::<S>((2 * p - 1) as f64, theta[p + 1], s_squared * theta[p]);
+    }
+    for p in 1..=P {
+        at_zero *= (2 * p - 1) as f64;
+    }
+    let e = exp_nonpositive::<S>(-s) * (1.0 / at_zero);
+    [e * theta[P + 2], -nu * e * theta[P + 1], nu * nu * e * theta[P]]
+}

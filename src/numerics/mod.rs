@@ -1,0 +1,18 @@
+//! The numerical heart: f64 in, f64 out.
+//!
+//! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the calling
+//! thread; stages and cancellation pass through an [`observer::Observer`].
+
+pub mod cloud;
+pub mod error;
+pub mod jets;
+pub mod kernel;
+pub mod neighbours;
+pub mod observer;
+pub mod regularization;
+
+mod gram;
+mod nodes;
+mod simd;
+#[cfg(test)]
+mod testing;
