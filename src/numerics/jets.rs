@@ -4,6 +4,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
+use super::duplicates::Positions;
 use super::error::NumericsError;
 use super::kernel::Kernel;
 use super::nodes::{Nodes, blocked};
@@ -183,10 +184,8 @@ pub fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Resul
     if !kernel.has_kink() {
         return Ok(());
     }
-    let bits = |x: &[f64]| x.iter().map(|c| c.to_bits()).collect::<Vec<_>>();
-    let points: std::collections::HashMap<_, _> =
-        cloud.points().enumerate().map(|(point, x)| (bits(x), point)).collect();
-    match queries.points().enumerate().find_map(|(query, x)| Some((query, *points.get(&bits(x))?))) {
+    let positions = Positions::of(cloud);
+    match queries.points().enumerate().find_map(|(query, x)| Some((query, positions.find(x)?))) {
         Some((query, point)) => Err(NumericsError::KernelNotSmooth { query, point }),
         None => Ok(()),
     }

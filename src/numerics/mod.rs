@@ -4,13 +4,21 @@
 //! thread; stages and cancellation pass through an [`observer::Observer`].
 
 pub mod cloud;
+pub mod defaults;
+pub mod duplicates;
 pub mod error;
+pub mod geometry;
+pub mod interpolant;
 pub mod jets;
 pub mod kernel;
 pub mod neighbours;
 pub mod observer;
+pub mod operators;
+pub mod posterior;
 pub mod regularization;
+pub mod solver;
 
+mod eigen;
 mod gram;
 mod nodes;
 mod simd;

@@ -1,0 +1,139 @@
+//! Points that coincide exactly, and the cloud without them.
+
+use std::collections::HashMap;
+
+use super::cloud::Cloud;
+
+/// Finds points by position, to the bit.
+pub(crate) struct Positions(HashMap<Box<[u64]>, usize>);
+
+impl Positions {
+    /// Of points that coincide, the first one is kept.
+    pub(crate) fn of(cloud: &Cloud) -> Self {
+        let mut positions = HashMap::with_capacity(cloud.n_points());
+        for (point, x) in cloud.points().enumerate() {
+            positions.entry(bits(x)).or_insert(point);
+        }
+        Self(positions)
+    }
+
+    pub(crate) fn find(&self, x: &[f64]) -> Option<usize> {
+        self.0.get(&bits(x)).copied()
+    }
+
+    pub(crate) fn n_distinct(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// `Cloud` stores no −0.0 and no NaN, so equal coordinates have equal bits.
+fn bits(x: &[f64]) -> Box<[u64]> {
+    x.iter().map(|c| c.to_bits()).collect()
+}
+
+/// Number of points that coincide with an earlier one.
+pub fn count_duplicates(cloud: &Cloud) -> usize {
+    cloud.n_points() - Positions::of(cloud).n_distinct()
+}
+
+/// All points that share their position with another one, ascending, among those for which `counts` holds.
+pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -> Vec<usize> {
+    let mut members: HashMap<Box<[u64]>, Vec<usize>> = HashMap::with_capacity(cloud.n_points());
+    for (point, x) in cloud.points().enumerate().filter(|(point, _)| counts(*point)) {
+        members.entry(bits(x)).or_default().push(point);
+    }
+    let mut points: Vec<usize> = members.into_values().filter(|m| m.len() > 1).flatten().collect();
+    points.sort_unstable();
+    points
+}
+
+/// Which merged point each point of a cloud became.
+///
+/// Merging replaces values by the mean over each group. As a linear map that is `mean`, shape `[n′, n]`; [`Merge::spread`]
+/// is its transpose, so matrices keep one column per point of the original cloud with the weight split equally.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Merge {
+    group_of: Vec<usize>,
+    group_sizes: Vec<usize>,
+}
+
+impl Merge {
+    /// Returns the cloud of distinct positions, in the order of their first occurrence; `None` if there is nothing to merge.
+    pub fn duplicates_of(cloud: &Cloud) -> Option<(Cloud, Merge)> {
+        let positions = Positions::of(cloud);
+        if positions.n_distinct() == cloud.n_points() {
+            return None;
+        }
+        let mut coordinates = Vec::with_capacity(positions.n_distinct() * cloud.dimension());
+        let mut group_of = vec![0; cloud.n_points()];
+        let mut group_sizes = Vec::with_capacity(positions.n_distinct());
+        for (point, x) in cloud.points().enumerate() {
+            // The first occurrence of every position is found by construction.
+            let first = positions.find(x).unwrap_or(point);
+            if first == point {
+                group_of[point] = group_sizes.len();
+                group_sizes.push(1);
+                coordinates.extend_from_slice(x);
+            } else {
+                group_of[point] = group_of[first];
+                group_sizes[group_of[first]] += 1;
+            }
+        }
+        let merged = Cloud::new(coordinates, cloud.dimension()).ok()?;
+        Some((merged, Merge { group_of, group_sizes }))
+    }
+
+    /// Points before merging, n.
+    pub fn n_points(&self) -> usize {
+        self.group_of.len()
+    }
+
+    /// How many points disappeared.
+    pub fn n_merged(&self) -> usize {
+        self.group_of.len() - self.group_sizes.len()
+    }
+
+    /// Means over the groups, `[n] → [n′]`.
+    pub fn mean(&self, values: &[f64]) -> Vec<f64> {
+        let mut means = vec![0.0; self.group_sizes.len()];
+        for (&group, &value) in self.group_of.iter().zip(values) {
+            means[group] += value / self.group_sizes[group] as f64;
+        }
+        means
+    }
+
+    /// Each entry split equally over its group, row by row, `[rows, n′] → [rows, n]`.
+    pub fn spread(&self, matrix: &[f64]) -> Vec<f64> {
+        let spread_row = |row: &[f64]| {
+            let split = |&group: &usize| row[group] / self.group_sizes[group] as f64;
+            self.group_of.iter().map(split).collect::<Vec<f64>>()
+        };
+        matrix.chunks_exact(self.group_sizes.len()).flat_map(spread_row).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud() -> Cloud {
+        Cloud::new(vec![5.0, 1.0, 5.0, 2.0, 1.0, 5.0], 1).unwrap()
+    }
+
+    #[test]
+    fn coinciding_points_are_all_named() {
+        assert_eq!(coinciding_points(&cloud(), |_| true), [0, 1, 2, 4, 5]);
+        assert_eq!(coinciding_points(&cloud(), |point| point != 1), [0, 2, 5]);
+        assert_eq!(count_duplicates(&cloud()), 3);
+    }
+
+    #[test]
+    fn merging_keeps_the_order_of_first_occurrence_and_averages() {
+        let (merged, merge) = Merge::duplicates_of(&cloud()).unwrap();
+        assert_eq!(merged.coordinates(), [5.0, 1.0, 2.0]);
+        assert_eq!((merge.n_points(), merge.n_merged()), (6, 3));
+        assert_eq!(merge.mean(&[3.0, 1.0, 6.0, 7.0, 3.0, 9.0]), [6.0, 2.0, 7.0]);
+        assert_eq!(merge.spread(&[3.0, 4.0, 5.0]), [1.0, 2.0, 1.0, 5.0, 2.0, 1.0]);
+        assert_eq!(Merge::duplicates_of(&merged), None);
+    }
+}

@@ -1,0 +1,97 @@
+//! Eigenvalues of the small symmetric matrices that shape operators are.
+
+/// Sweeps after which Jacobi has converged to rounding for any matrix of the sizes met here.
+const MAX_SWEEPS: usize = 30;
+
+/// Eigenvalues in ascending order with orthonormal eigenvectors: `vectors[k]` belongs to `values[k]`.
+///
+/// Cyclic Jacobi rotations (Golub and Van Loan 2013, sec. 8.5), accurate to rounding relative to the norm of the matrix,
+/// given row-major `[k, k]`. Reads the upper triangle.
+pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let mut a = matrix.to_vec();
+    let mut v: Vec<Vec<f64>> =
+        (0..k).map(|i| (0..k).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+    for _ in 0..MAX_SWEEPS {
+        let mut rotated = false;
+        for p in 0..k {
+            for q in p + 1..k {
+                rotated |= rotate(&mut a, &mut v, k, p, q);
+            }
+        }
+        if !rotated {
+            break;
+        }
+    }
+    let mut order: Vec<usize> = (0..k).collect();
+    order.sort_by(|&i, &j| a[i * k + i].total_cmp(&a[j * k + j]));
+    (order.iter().map(|&i| a[i * k + i]).collect(), order.iter().map(|&i| v[i].clone()).collect())
+}
+
+/// Annihilates `a[p][q]`; answers whether it was worth it.
+fn rotate(a: &mut [f64], v: &mut [Vec<f64>], k: usize, p: usize, q: usize) -> bool {
+    let (app, aqq, apq) = (a[p * k + p], a[q * k + q], a[p * k + q]);
+    if apq.abs() <= 0.25 * f64::EPSILON * (app.abs() * aqq.abs()).sqrt() || apq == 0.0 {
+        return false;
+    }
+    let theta = (aqq - app) / (2.0 * apq);
+    let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+    let c = 1.0 / t.hypot(1.0);
+    let s = t * c;
+    a[p * k + p] = app - t * apq;
+    a[q * k + q] = aqq + t * apq;
+    a[p * k + q] = 0.0;
+    for i in (0..k).filter(|&i| i != p && i != q) {
+        let (at_p, at_q) = (index(k, i, p), index(k, i, q));
+        let (x, y) = (a[at_p], a[at_q]);
+        a[at_p] = c * x - s * y;
+        a[at_q] = s * x + c * y;
+    }
+    for i in 0..k {
+        let (x, y) = (v[p][i], v[q][i]);
+        v[p][i] = c * x - s * y;
+        v[q][i] = s * x + c * y;
+    }
+    true
+}
+
+/// Where the upper triangle keeps the entry (i, j).
+fn index(k: usize, i: usize, j: usize) -> usize {
+    i.min(j) * k + i.max(j)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn eigenpairs_reproduce_the_matrix(k in 1usize..7, entries in prop::collection::vec(-3.0f64..3.0, 36)) {
+            let entry = |i: usize, j: usize| entries[i.min(j) * 6 + i.max(j)];
+            let matrix: Vec<f64> = (0..k * k).map(|at| entry(at / k, at % k)).collect();
+            let (values, vectors) = symmetric_eigen(&matrix, k);
+            prop_assert!(values.windows(2).all(|w| w[0] <= w[1]));
+            for (value, vector) in values.iter().zip(&vectors) {
+                for i in 0..k {
+                    let image: f64 = (0..k).map(|j| matrix[i * k + j] * vector[j]).sum();
+                    // Rounding is a small multiple of ε times the norm, at most 18 here.
+                    prop_assert!((image - value * vector[i]).abs() < 1e-13);
+                }
+            }
+            for (a, x) in vectors.iter().enumerate() {
+                for (b, y) in vectors.iter().enumerate() {
+                    let dot: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();
+                    prop_assert!((dot - f64::from(u8::from(a == b))).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn equal_eigenvalues_keep_an_orthonormal_basis() {
+        let (values, vectors) = symmetric_eigen(&[2.0, 0.0, 0.0, 2.0], 2);
+        assert_eq!(values, [2.0, 2.0]);
+        assert_eq!(vectors, [[1.0, 0.0], [0.0, 1.0]]);
+    }
+}

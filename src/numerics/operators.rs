@@ -1,0 +1,226 @@
+//! Surface gradient and Laplace–Beltrami operator, applied to values and as matrices.
+//!
+//! The surface comes as a [`Geometry`], the values as an [`Interpolant`]: both may live on different clouds and kernels (the
+//! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
+//! to each kernel translate, by a solve with m right-hand sides.
+
+use std::sync::Arc;
+
+use faer::MatMut;
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::cloud::Cloud;
+use super::error::NumericsError;
+use super::geometry::{Geometry, dot, tangential_trace};
+use super::interpolant::Interpolant;
+use super::jets::{JetOrder, check_smooth_at};
+use super::kernel::Kernel;
+use super::nodes::Nodes;
+use super::observer::{Observer, Stage};
+use super::simd::{BLOCK, Block, fma};
+use super::solver::GramFactor;
+
+/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at degenerate queries.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn surface_gradient(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
+    let d = queries.dimension();
+    let mut gradients = vec![0.0; queries.n_points() * d];
+    for query in regular(geometry) {
+        let (gradient, normal) = (jets.gradient(query), geometry.normal(query));
+        let along = dot(gradient, normal);
+        for (c, slot) in gradients[query * d..][..d].iter_mut().enumerate() {
+            *slot = gradient[c] - along * normal[c];
+        }
+    }
+    Ok(gradients)
+}
+
+/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at degenerate queries.
+///
+/// Minus before the last term: errata.md, 1. On the unit circle Δ cos θ = −cos θ. Independent of the orientation of ν.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn laplace_beltrami(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+    let mut values = vec![0.0; queries.n_points()];
+    for query in regular(geometry) {
+        let normal = geometry.normal(query);
+        let along = dot(jets.gradient(query), normal);
+        values[query] =
+            tangential_trace(&jets.hessian(query), normal) - geometry.trace_of_shape_operator(query) * along;
+    }
+    Ok(values)
+}
+
+/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of degenerate queries are zero.
+///
+/// # Errors
+/// Those of [`operator_matrix`].
+pub fn surface_gradient_matrices(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    operator_matrix(geometry, factor, queries, Operator::SurfaceGradient, observer)
+}
+
+/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of degenerate queries are zero. Not symmetric in general.
+///
+/// # Errors
+/// Those of [`operator_matrix`].
+pub fn laplace_beltrami_matrix(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    operator_matrix(geometry, factor, queries, Operator::LaplaceBeltrami, observer)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Operator {
+    SurfaceGradient,
+    LaplaceBeltrami,
+}
+
+impl Operator {
+    /// Rows per query.
+    fn n_components(self, dimension: usize) -> usize {
+        match self {
+            Self::SurfaceGradient => dimension,
+            Self::LaplaceBeltrami => 1,
+        }
+    }
+}
+
+/// Fills B, `[components, m, n]` row-major, and solves `Wᵀ` for its rows in place: that buffer is the answer.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
+fn operator_matrix(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    operator: Operator,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let (cloud, kernel) = (factor.cloud(), factor.kernel());
+    cloud.check_same_dimension(queries)?;
+    check_smooth_at(cloud, kernel, queries)?;
+    observer.enter(Stage::Evaluate);
+    let (n, m) = (cloud.n_points(), queries.n_points());
+    let n_rows = operator.n_components(cloud.dimension()) * m;
+    let (nodes, arch) = (Nodes::of(cloud), pulp::Arch::new());
+    let mut matrix = vec![0.0; n_rows * n];
+    matrix.par_chunks_mut(n).enumerate().try_for_each(|(index, row)| {
+        observer.checkpoint()?;
+        let (component, query) = (index / m, index % m);
+        if !geometry.is_degenerate()[query] {
+            let x = queries.point(query);
+            arch.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
+        }
+        Ok(())
+    })?;
+    observer.enter(Stage::Solve);
+    for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {
+        observer.checkpoint()?;
+        let count = rows.len() / n;
+        factor.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
+    }
+    match matrix.iter().position(|x| !x.is_finite()) {
+        Some(at) => Err(NumericsError::Overflow { query: at / n % m }),
+        None => Ok(matrix),
+    }
+}
+
+/// Right-hand sides per solve: enough for the solve to run at the speed of matrix products, few enough to notice a
+/// cancellation within a fraction of a second.
+const ROWS_PER_SOLVE: usize = 1024;
+
+fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
+    (0..geometry.n_queries()).filter(|&query| !geometry.is_degenerate()[query])
+}
+
+/// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:
+/// `P∇k = 2vφ′/ℓ² (D − aν)` and `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+struct Row<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    geometry: &'a Geometry,
+    operator: Operator,
+    component: usize,
+    query: usize,
+    x: &'a [f64],
+    row: &'a mut [f64],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let normal = self.geometry.normal(self.query);
+        let inverse = 1.0 / self.kernel.length_scale();
+        let first = 2.0 * self.kernel.variance() * inverse * inverse;
+        let second = 4.0 * self.kernel.variance() * inverse * inverse;
+        let tangent_dimension = (normal.len() - 1) as f64;
+        let trace = self.geometry.trace_of_shape_operator(self.query);
+        let mut differences = vec![[0.0; BLOCK]; normal.len()];
+        let (mut q, mut phi, mut out) = ([0.0; BLOCK], [[0.0; BLOCK]; 3], [0.0; BLOCK]);
+        for (block, row) in self.row.chunks_mut(BLOCK).enumerate() {
+            self.nodes.differences::<S>(block, self.x, self.kernel, &mut differences, &mut q);
+            let along = along_normal::<S>(normal, &differences);
+            match self.operator {
+                Operator::SurfaceGradient => {
+                    self.kernel.profile_block::<S, 1>(&q, &mut phi);
+                    let (difference, normal) = (&differences[self.component], normal[self.component]);
+                    for i in 0..BLOCK {
+                        out[i] = first * phi[1][i] * fma::<S>(-along[i], normal, difference[i]);
+                    }
+                }
+                Operator::LaplaceBeltrami => {
+                    self.kernel.profile_block::<S, 2>(&q, &mut phi);
+                    for i in 0..BLOCK {
+                        // (|D|² − a²)/ℓ², with |D|²/ℓ² = q.
+                        let tangential = q[i] - along[i] * along[i] * inverse * inverse;
+                        let slope = fma::<S>(-trace, along[i], tangent_dimension);
+                        out[i] = fma::<S>(second * phi[2][i], tangential, first * phi[1][i] * slope);
+                    }
+                }
+            }
+            row.copy_from_slice(&out[..row.len()]);
+        }
+    }
+}
+
+/// `a = ν·D` pair by pair.
+#[inline(always)]
+fn along_normal<S: Simd>(normal: &[f64], differences: &[Block]) -> Block {
+    let mut along = [0.0; BLOCK];
+    for (&normal, difference) in normal.iter().zip(differences) {
+        for i in 0..BLOCK {
+            along[i] = fma::<S>(normal, difference[i], along[i]);
+        }
+    }
+    along
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,81 @@
+//! Estimate of the 1-norm of a linear map that is only known by its action.
+
+use faer::{Mat, MatMut};
+
+/// Iterations after which the estimate has stopped growing in practice (Higham 2002, sec. 15.3).
+const MAX_ITERATIONS: usize = 5;
+
+/// A lower bound of `‖W‖₁` for an `[n, n]` map, nearly always within a factor 3 of it.
+///
+/// Hager's algorithm with Higham's safeguard (Higham 2002, "Accuracy and Stability of Numerical Algorithms", algorithm
+/// 15.1): a power method on the 1-norm whose every step costs one application of W and one of Wᵀ. A bound that is not
+/// finite means the map overflows.
+pub(super) fn estimate_norm1(
+    n: usize,
+    apply: impl Fn(MatMut<'_, f64>),
+    apply_transposed: impl Fn(MatMut<'_, f64>),
+) -> f64 {
+    let norm1 = |x: &Mat<f64>| (0..n).map(|i| x[(i, 0)].abs()).sum::<f64>();
+    let mut estimate = 0.0;
+    let mut last = usize::MAX;
+    let mut x = Mat::from_fn(n, 1, |_, _| 1.0 / n as f64);
+    for _ in 0..MAX_ITERATIONS {
+        apply(x.as_mut());
+        let found = norm1(&x);
+        if !found.is_finite() {
+            return found;
+        }
+        if found <= estimate {
+            break;
+        }
+        estimate = found;
+        let mut signs = Mat::from_fn(n, 1, |i, _| if x[(i, 0)] < 0.0 { -1.0 } else { 1.0 });
+        apply_transposed(signs.as_mut());
+        let steepest =
+            (0..n).max_by(|&a, &b| signs[(a, 0)].abs().total_cmp(&signs[(b, 0)].abs())).unwrap_or(0);
+        if steepest == last {
+            break;
+        }
+        last = steepest;
+        x = Mat::from_fn(n, 1, |i, _| if i == steepest { 1.0 } else { 0.0 });
+    }
+    // The safeguard: a vector of alternating signs, against the matrices on which the iteration is blind.
+    let ramp = |i: usize| 1.0 + i as f64 / (n.max(2) - 1) as f64;
+    let mut alternating = Mat::from_fn(n, 1, |i, _| if i % 2 == 0 { ramp(i) } else { -ramp(i) });
+    apply(alternating.as_mut());
+    estimate.max(2.0 * norm1(&alternating) / (3.0 * n as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(w: &Mat<f64>) -> f64 {
+        let apply = |mut x: MatMut<'_, f64>| {
+            let y = w * x.as_ref();
+            x.copy_from(&y);
+        };
+        let apply_transposed = |mut x: MatMut<'_, f64>| {
+            let y = w.transpose() * x.as_ref();
+            x.copy_from(&y);
+        };
+        estimate_norm1(w.nrows(), apply, apply_transposed)
+    }
+
+    #[test]
+    fn the_estimate_is_a_lower_bound_within_a_factor_three() {
+        for seed in 0..20 {
+            let n = 30;
+            let entry = |i: usize, j: usize| (1.7 * (seed * 900 + i * 30 + j) as f64).sin();
+            let w = Mat::from_fn(n, n, |i, j| entry(i, j) * 10f64.powi(-(((i + j) % 7) as i32)));
+            let exact = (0..n).map(|j| (0..n).map(|i| w[(i, j)].abs()).sum::<f64>()).fold(0.0, f64::max);
+            let found = estimate(&w);
+            assert!(found <= exact * (1.0 + 1e-14) && found >= exact / 3.0, "{found} of {exact}");
+        }
+    }
+
+    #[test]
+    fn the_estimate_of_a_number_is_its_absolute_value() {
+        assert_eq!(estimate(&Mat::from_fn(1, 1, |_, _| -4.0)), 4.0);
+    }
+}

@@ -1,0 +1,234 @@
+//! The factorization of `K + αI` and the verbs it offers: solve, apply transposed, evaluate, whiten, diagnostics.
+
+mod cholesky;
+mod condition;
+mod pivoted_cholesky;
+mod solution;
+
+use std::sync::Arc;
+
+use faer::{MatMut, Par};
+
+use super::cloud::Cloud;
+use super::duplicates::coinciding_points;
+use super::error::{NotDefinite, NumericsError};
+use super::gram::fill_lower_gram;
+use super::kernel::Kernel;
+use super::observer::{Observer, Stage};
+use super::regularization::Regularization;
+pub use solution::Solution;
+
+use cholesky::Cholesky;
+use condition::estimate_norm1;
+use pivoted_cholesky::PivotedCholesky;
+use solution::MAX_RELATIVE_RESIDUAL;
+
+/// How `K + αI` was factorized.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// `K + αI = LLᵀ`, in place.
+    Cholesky,
+    /// Rank-revealing pivoted Cholesky and least squares on the pivots, where Cholesky fails in float64.
+    PivotedCholesky,
+}
+
+/// A factorization of `K(X, X) + αI`: the asset that everything is served from.
+///
+/// It keeps the cloud, kernel and regularization it was made from, so that it cannot be used with others.
+pub struct GramFactor {
+    cloud: Arc<Cloud>,
+    kernel: Kernel,
+    regularization: Regularization,
+    factorization: Factorization,
+    norm1: f64,
+    reciprocal_condition: f64,
+}
+
+enum Factorization {
+    Cholesky(Cholesky),
+    PivotedCholesky { factor: PivotedCholesky, failed_at: usize },
+}
+
+impl GramFactor {
+    /// Bytes a dense factorization of n points needs at its peak, checked.
+    pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
+        n_points.checked_mul(Cholesky::stride_for(n_points))?.checked_mul(size_of::<f64>())
+    }
+
+    /// Flops of a dense factorization of n points.
+    pub fn flops_needed(n_points: usize) -> f64 {
+        (n_points as f64).powi(3) / 3.0
+    }
+
+    /// Assembles and factorizes `K(X, X) + αI` exactly as given: no jitter is ever added.
+    ///
+    /// Cholesky in place; where that fails in float64, pivoted Cholesky to 64 ε k₀ and least squares on the pivots.
+    ///
+    /// # Errors
+    /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension, [`NumericsError::LengthMismatch`] of noise
+    /// variances, [`NumericsError::DuplicatePoints`] where two coinciding points have no regularization,
+    /// [`NumericsError::Cancelled`].
+    pub fn factorize(
+        cloud: Arc<Cloud>,
+        kernel: Kernel,
+        regularization: Regularization,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        kernel.check_dimension(cloud.dimension())?;
+        regularization.check_matches(&cloud)?;
+        let twins = coinciding_points(&cloud, |point| regularization.at(point) == 0.0);
+        if !twins.is_empty() {
+            return Err(NumericsError::DuplicatePoints { points: twins });
+        }
+        observer.enter(Stage::Gram);
+        let mut gram = Cholesky::allocate(cloud.n_points());
+        let stride = gram.stride();
+        fill_lower_gram(&cloud, &kernel, &regularization, gram.buffer_mut(), stride, observer)?;
+        observer.enter(Stage::Factor);
+        let norm1 = gram.norm1();
+        let factorization = match gram.factorize(observer)? {
+            Ok(factor) => Factorization::Cholesky(factor),
+            Err(failed_at) => {
+                let factor = PivotedCholesky::factorize(&cloud, &kernel, &regularization, observer)?;
+                Factorization::PivotedCholesky { factor, failed_at }
+            }
+        };
+        let mut this =
+            Self { cloud, kernel, regularization, factorization, norm1, reciprocal_condition: 0.0 };
+        let inverse_norm1 = estimate_norm1(
+            this.n_points(),
+            |x| this.solve_in_place(x),
+            |x| {
+                this.solve_transposed_in_place(x);
+            },
+        );
+        let product = norm1 * inverse_norm1;
+        this.reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
+        Ok(this)
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        &self.cloud
+    }
+
+    pub fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    pub fn regularization(&self) -> &Regularization {
+        &self.regularization
+    }
+
+    pub fn n_points(&self) -> usize {
+        self.cloud.n_points()
+    }
+
+    pub fn method(&self) -> Method {
+        match self.factorization {
+            Factorization::Cholesky(_) => Method::Cholesky,
+            Factorization::PivotedCholesky { .. } => Method::PivotedCholesky,
+        }
+    }
+
+    /// Numerical rank: n for Cholesky, the number of pivots for the fallback.
+    pub fn rank(&self) -> usize {
+        match &self.factorization {
+            Factorization::Cholesky(_) => self.n_points(),
+            Factorization::PivotedCholesky { factor, .. } => factor.rank(),
+        }
+    }
+
+    /// `1/(‖K + αI‖₁ ‖W‖₁)` where W maps values to weights, estimated from the factor (Higham 2002, alg. 15.1).
+    pub fn reciprocal_condition(&self) -> f64 {
+        self.reciprocal_condition
+    }
+
+    /// `‖K + αI‖₁`.
+    pub(crate) fn norm1(&self) -> f64 {
+        self.norm1
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        let factor = match &self.factorization {
+            Factorization::Cholesky(factor) => factor.n_bytes(),
+            Factorization::PivotedCholesky { factor, .. } => factor.n_bytes(),
+        };
+        let noise = match &self.regularization {
+            Regularization::Uniform(_) => 0,
+            Regularization::PerPoint(variances) => size_of_val(variances.as_slice()),
+        };
+        factor + noise + size_of_val(self.cloud.coordinates())
+    }
+
+    /// Overwrites the columns of `[n, k]` values by weights, `Λ = W Y` with `W = (K + αI)⁻¹` (its least-squares
+    /// substitute for the fallback).
+    pub(crate) fn solve_in_place(&self, values: MatMut<'_, f64>) {
+        match &self.factorization {
+            Factorization::Cholesky(factor) => factor.solve_in_place(values),
+            Factorization::PivotedCholesky { factor, .. } => factor.solve_in_place(values),
+        }
+    }
+
+    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them: turns functionals of the weights into functionals of the
+    /// values, which is how operators become matrices.
+    pub(crate) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
+        match &self.factorization {
+            Factorization::Cholesky(factor) => factor.solve_in_place(functionals),
+            Factorization::PivotedCholesky { factor, .. } => factor.solve_transposed_in_place(functionals),
+        }
+    }
+
+    /// Overwrites the columns of `[n, k]` by `L⁻¹` times them.
+    ///
+    /// # Errors
+    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
+    pub(crate) fn whiten_in_place(&self, columns: MatMut<'_, f64>) -> Result<(), NumericsError> {
+        self.cholesky()?.whiten_in_place(columns);
+        Ok(())
+    }
+
+    /// `ln det(K + αI)`.
+    ///
+    /// # Errors
+    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
+    pub(crate) fn log_determinant(&self) -> Result<f64, NumericsError> {
+        Ok(self.cholesky()?.log_determinant())
+    }
+
+    fn cholesky(&self) -> Result<&Cholesky, NumericsError> {
+        match &self.factorization {
+            Factorization::Cholesky(factor) => Ok(factor),
+            Factorization::PivotedCholesky { failed_at, .. } => {
+                Err(self.not_positive_definite(NotDefinite::NeedsCholesky { point: *failed_at }))
+            }
+        }
+    }
+
+    /// The refusal with its remedy: an α for which Cholesky is sure to succeed in float64, `4 n ε ‖K‖₁`, and, where the
+    /// residual was too large, one for which `ε ‖K‖₁ ‖Λ‖ ≤ ε ‖K‖₁ ‖Y‖/α` is small enough for any values.
+    pub(crate) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
+        let multiple = match reason {
+            NotDefinite::Residual { .. } => (self.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
+            NotDefinite::BackwardError { .. }
+            | NotDefinite::NeedsCholesky { .. }
+            | NotDefinite::NegativeVariance { .. } => self.n_points() as f64,
+        };
+        NumericsError::NotPositiveDefinite {
+            reason,
+            minimum_alpha: 4.0 * multiple * f64::EPSILON * self.norm1,
+        }
+    }
+}
+
+/// Flops below which waking other threads costs more than it gains.
+const SEQUENTIAL_FLOPS: f64 = 1e6;
+
+/// The parallelism for a piece of work, in the rayon pool of the calling thread.
+pub(crate) fn parallelism(flops: f64) -> Par {
+    let n_threads = rayon::current_num_threads();
+    if n_threads == 1 || flops < SEQUENTIAL_FLOPS { Par::Seq } else { Par::rayon(n_threads) }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! Weights for given values, and what is known of their quality.
+
+use faer::MatMut;
+
+use super::GramFactor;
+use crate::numerics::error::{NotDefinite, NumericsError};
+use crate::numerics::jets::{JetOrder, Jets};
+use crate::numerics::observer::{Observer, Stage};
+
+/// Relative residuals above this are worth one step of refinement: backward stable solves stay below it unless the weights
+/// are huge against the values.
+const REFINE_ABOVE: f64 = 1e-12;
+
+/// Beyond these no honest answer exists (numerics.md, Fit 3).
+pub(super) const MAX_RELATIVE_RESIDUAL: f64 = 1e-5;
+const MAX_BACKWARD_ERROR: f64 = 1e-13;
+
+/// `Λ = (K + αI)⁻¹ Y` with its residual and norms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// Λ, `[n]`.
+    pub weights: Vec<f64>,
+    /// `‖Y − (K + αI)Λ‖₂ / ‖Y‖₂`, 0 for Y = 0.
+    pub relative_residual: f64,
+    /// `‖Y − (K + αI)Λ‖_∞`, unit of the values.
+    pub residual_max: f64,
+    /// `‖u‖²_H = Λᵀ K Λ`.
+    pub native_norm_squared: f64,
+    /// `|u(X) − Y|₂`, unit of the values; 0 up to rounding at α = 0.
+    pub misfit: f64,
+    /// Whether a step of iterative refinement was kept.
+    pub refined: bool,
+}
+
+impl Solution {
+    /// Solves for values `[n]`, checks the residual against the matrix itself (not its factor), and refines once where that
+    /// helps.
+    ///
+    /// # Errors
+    /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::NotPositiveDefinite`] if the
+    /// residual exceeds 1e-5 or the backward error 1e-13, [`NumericsError::Cancelled`].
+    pub fn of(factor: &GramFactor, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+        factor.cloud().check_one_per_point(values)?;
+        observer.enter(Stage::Solve);
+        let mut candidate = Candidate::new(factor, values, solve(factor, values), observer)?;
+        let mut refined = false;
+        if candidate.relative_residual(values) > REFINE_ABOVE {
+            let correction = solve(factor, &candidate.residual);
+            let weights = candidate.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
+            match Candidate::new(factor, values, weights, observer) {
+                Ok(next) if next.relative_residual(values) < candidate.relative_residual(values) => {
+                    (candidate, refined) = (next, true);
+                }
+                Err(NumericsError::Cancelled) => return Err(NumericsError::Cancelled),
+                Ok(_) | Err(_) => {}
+            }
+        }
+        candidate.accept(factor, values, refined)
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        size_of_val(self.weights.as_slice())
+    }
+}
+
+fn solve(factor: &GramFactor, values: &[f64]) -> Vec<f64> {
+    let mut weights = values.to_vec();
+    let n = weights.len();
+    factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
+    weights
+}
+
+/// Weights with `KΛ`, evaluated afresh from the kernel, and the residual.
+struct Candidate {
+    weights: Vec<f64>,
+    at_points: Vec<f64>,
+    residual: Vec<f64>,
+}
+
+impl Candidate {
+    fn new(
+        factor: &GramFactor,
+        values: &[f64],
+        weights: Vec<f64>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        if weights.iter().any(|w| !w.is_finite()) {
+            return Err(NumericsError::WeightsOverflow);
+        }
+        let cloud = factor.cloud();
+        let jets = Jets::evaluate(cloud, factor.kernel(), &weights, cloud, JetOrder::Value, observer)?;
+        let at_points = jets.values();
+        let residual = (0..values.len())
+            .map(|i| values[i] - at_points[i] - factor.regularization().at(i) * weights[i])
+            .collect();
+        Ok(Self { weights, at_points, residual })
+    }
+
+    fn relative_residual(&self, values: &[f64]) -> f64 {
+        let scale = norm2(values);
+        if scale == 0.0 { 0.0 } else { norm2(&self.residual) / scale }
+    }
+
+    fn accept(self, factor: &GramFactor, values: &[f64], refined: bool) -> Result<Solution, NumericsError> {
+        let relative_residual = self.relative_residual(values);
+        let residual_max = norm_max(&self.residual);
+        let scale = factor.norm1() * norm_max(&self.weights) + norm_max(values);
+        let backward_error = if scale == 0.0 { 0.0 } else { residual_max / scale };
+        // Negated comparisons refuse NaN as well.
+        if !(relative_residual <= MAX_RELATIVE_RESIDUAL) {
+            return Err(factor.not_positive_definite(NotDefinite::Residual { relative_residual }));
+        }
+        if !(backward_error <= MAX_BACKWARD_ERROR) {
+            return Err(factor.not_positive_definite(NotDefinite::BackwardError { backward_error }));
+        }
+        let native_norm_squared = self.weights.iter().zip(&self.at_points).map(|(w, u)| w * u).sum();
+        let misfits: Vec<f64> = self.at_points.iter().zip(values).map(|(u, y)| u - y).collect();
+        let misfit = norm2(&misfits);
+        Ok(Solution {
+            weights: self.weights,
+            relative_residual,
+            residual_max,
+            native_norm_squared,
+            misfit,
+            refined,
+        })
+    }
+}
+
+/// Scaled, so that squares neither overflow nor vanish.
+fn norm2(x: &[f64]) -> f64 {
+    let largest = norm_max(x);
+    if largest == 0.0 || !largest.is_finite() {
+        return largest;
+    }
+    largest * x.iter().map(|v| (v / largest) * (v / largest)).sum::<f64>().sqrt()
+}
+
+fn norm_max(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |a, &b| if b.is_nan() { f64::NAN } else { a.max(b.abs()) })
+}
