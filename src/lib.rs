@@ -1,2 +1,4 @@
 //! gramian
+pub mod config;
 pub mod numerics;
+pub mod store;

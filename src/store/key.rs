@@ -1,0 +1,162 @@
+//! Names of clouds, factorizations and values, from canonical bytes.
+
+use std::fmt;
+
+use super::Owner;
+use crate::numerics::cloud::Cloud;
+use crate::numerics::kernel::{Family, Kernel, WendlandSmoothness};
+use crate::numerics::regularization::Regularization;
+
+/// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
+/// likewise if given; written as 64 hexadecimal digits.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CloudId([u8; 32]);
+
+impl CloudId {
+    /// Names a cloud; normals, if any, are `[n, d]`.
+    pub fn of(cloud: &Cloud, normals: Option<&Cloud>) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&(cloud.dimension() as u64).to_le_bytes());
+        hasher.update(&(cloud.n_points() as u64).to_le_bytes());
+        update_with_floats(&mut hasher, cloud.coordinates());
+        if let Some(normals) = normals {
+            update_with_floats(&mut hasher, normals.coordinates());
+        }
+        Self(hasher.finalize().into())
+    }
+
+    /// Reads 64 lower-case hexadecimal digits.
+    pub fn parse(text: &str) -> Option<Self> {
+        let is_digit = |c: u8| matches!(c, b'0'..=b'9' | b'a'..=b'f');
+        if text.len() != 64 || !text.bytes().all(is_digit) {
+            return None;
+        }
+        blake3::Hash::from_hex(text).ok().map(|hash| Self(hash.into()))
+    }
+}
+
+impl fmt::Display for CloudId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&blake3::Hash::from(self.0).to_hex())
+    }
+}
+
+impl fmt::Debug for CloudId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Everything a factorization depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FactorKey {
+    pub owner: Owner,
+    pub cloud_id: CloudId,
+    /// BLAKE3 of kernel, regularization, solver and whether duplicates were merged.
+    fit: [u8; 32],
+}
+
+impl FactorKey {
+    /// Names the dense factorization of a cloud (with duplicates merged or not).
+    pub fn of_dense(
+        owner: Owner,
+        cloud_id: CloudId,
+        kernel: &Kernel,
+        regularization: &Regularization,
+        merged: bool,
+    ) -> Self {
+        let (family, parameter) = match kernel.family() {
+            Family::Gauss => (0, 0.0),
+            Family::Laplace { epsilon } => (1, epsilon),
+            Family::Matern { order } => (2, f64::from(order)),
+            Family::Wendland { smoothness: WendlandSmoothness::C2 } => (3, 2.0),
+            Family::Wendland { smoothness: WendlandSmoothness::C4 } => (3, 4.0),
+            Family::Wendland { smoothness: WendlandSmoothness::C6 } => (3, 6.0),
+            Family::InverseMultiquadric => (4, 0.0),
+        };
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&[family, u8::from(merged)]);
+        update_with_floats(&mut hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
+        match regularization {
+            Regularization::Uniform(alpha) => {
+                hasher.update(&[0]);
+                update_with_floats(&mut hasher, &[*alpha]);
+            }
+            Regularization::PerPoint(variances) => {
+                hasher.update(&[1]);
+                update_with_floats(&mut hasher, variances);
+            }
+        }
+        Self { owner, cloud_id, fit: hasher.finalize().into() }
+    }
+}
+
+/// BLAKE3 of the values of a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ValuesKey([u8; 32]);
+
+impl ValuesKey {
+    pub fn of(values: &[f64]) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        update_with_floats(&mut hasher, values);
+        Self(hasher.finalize().into())
+    }
+}
+
+/// Bytes go through a stack buffer: hashing number by number costs more than the hash.
+fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
+    let mut bytes = [0u8; 4096];
+    for chunk in numbers.chunks(bytes.len() / 8) {
+        for (slot, x) in bytes.chunks_exact_mut(8).zip(chunk) {
+            slot.copy_from_slice(&(x + 0.0).to_le_bytes());
+        }
+        hasher.update(&bytes[..chunk.len() * 8]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cloud_id_is_the_hash_of_the_documented_bytes() {
+        let cloud = Cloud::new(vec![-0.0, 1.0, 2.0, 3.5], 2).unwrap();
+        let mut bytes = Vec::new();
+        bytes.extend(2u64.to_le_bytes());
+        bytes.extend(2u64.to_le_bytes());
+        for x in [0.0f64, 1.0, 2.0, 3.5] {
+            bytes.extend(x.to_le_bytes());
+        }
+        let id = CloudId::of(&cloud, None);
+        assert_eq!(id.to_string(), blake3::hash(&bytes).to_hex().to_string());
+        assert_eq!(CloudId::parse(&id.to_string()), Some(id));
+        assert_eq!(CloudId::parse(&id.to_string().to_uppercase()), None);
+        assert_ne!(CloudId::of(&cloud, Some(&cloud)), id);
+    }
+
+    #[test]
+    fn every_ingredient_of_a_fit_changes_its_key() {
+        let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
+        let id = CloudId::of(&cloud, None);
+        let kernel = |family, length_scale, variance| Kernel::new(family, length_scale, variance).unwrap();
+        let alpha = Regularization::Uniform;
+        let of = |owner, kernel: &Kernel, regularization: &Regularization, merged| {
+            FactorKey::of_dense(Owner(owner), id, kernel, regularization, merged)
+        };
+        let gauss = kernel(Family::Gauss, 1.0, 1.0);
+        let keys = [
+            of(0, &gauss, &alpha(0.0), false),
+            of(1, &gauss, &alpha(0.0), false),
+            of(0, &gauss, &alpha(0.0), true),
+            of(0, &gauss, &alpha(1e-3), false),
+            of(0, &gauss, &Regularization::PerPoint(vec![0.0, 0.0]), false),
+            of(0, &kernel(Family::Gauss, 2.0, 1.0), &alpha(0.0), false),
+            of(0, &kernel(Family::Gauss, 1.0, 2.0), &alpha(0.0), false),
+            of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), false),
+            of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
+            of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
+        ];
+        let distinct: std::collections::HashSet<_> = keys.iter().collect();
+        assert_eq!(distinct.len(), keys.len());
+    }
+}

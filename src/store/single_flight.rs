@@ -1,0 +1,120 @@
+//! One computation for all who ask for the same thing at once.
+
+use std::collections::HashMap;
+use std::hash::Hash;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use futures_util::FutureExt;
+use futures_util::future::{BoxFuture, WeakShared};
+
+type Outcome<V, E> = Result<V, E>;
+type WeakFlight<V, E> = WeakShared<BoxFuture<'static, Outcome<V, E>>>;
+
+/// Futures under way, by key.
+///
+/// Whoever waits polls the shared future, so it goes on when the client that began it leaves; the map itself holds it
+/// weakly, so when the last waiter leaves it is dropped and with it the work.
+pub(super) struct SingleFlight<K, V, E> {
+    flights: Arc<Mutex<HashMap<K, WeakFlight<V, E>>>>,
+}
+
+/// Whether a waiter's flight was already under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Boarding {
+    Began,
+    Joined,
+}
+
+impl<K, V, E> SingleFlight<K, V, E>
+where
+    K: Hash + Eq + Copy + Send + 'static,
+    V: Clone + Send + Sync + 'static,
+    E: Clone + Send + Sync + 'static,
+{
+    pub(super) fn new() -> Self {
+        Self { flights: Arc::default() }
+    }
+
+    /// Joins the flight of `key`, or begins it with `compute`.
+    pub(super) async fn join<F>(&self, key: K, compute: impl FnOnce() -> F) -> (Boarding, Outcome<V, E>)
+    where
+        F: Future<Output = Outcome<V, E>> + Send + 'static,
+    {
+        let (boarding, flight) = {
+            let mut flights = self.flights.lock().unwrap_or_else(PoisonError::into_inner);
+            match flights.get(&key).and_then(WeakShared::upgrade) {
+                Some(flight) => (Boarding::Joined, flight),
+                None => {
+                    let flight = compute().boxed().shared();
+                    // Entries of flights that nobody finished are swept here, so the map stays as small as the traffic.
+                    flights.retain(|_, weak| weak.upgrade().is_some());
+                    if let Some(weak) = flight.downgrade() {
+                        flights.insert(key, weak);
+                    }
+                    (Boarding::Began, flight)
+                }
+            }
+        };
+        (boarding, flight.await)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+
+    use tokio::sync::oneshot;
+
+    use super::*;
+
+    type Numbers = SingleFlight<u8, u32, &'static str>;
+
+    #[tokio::test]
+    async fn concurrent_callers_share_one_computation_which_survives_its_beginner() {
+        let (flights, runs) = (Arc::new(Numbers::new()), Arc::new(AtomicUsize::new(0)));
+        let (release, released) = oneshot::channel::<()>();
+        let beginner = {
+            let (flights, runs) = (flights.clone(), runs.clone());
+            tokio::spawn(async move {
+                let compute = async move {
+                    runs.fetch_add(1, SeqCst);
+                    released.await.ok();
+                    Ok(7)
+                };
+                flights.join(1, || compute).await
+            })
+        };
+        while runs.load(SeqCst) == 0 {
+            tokio::task::yield_now().await;
+        }
+        let mut waiter = Box::pin(flights.join(1, || async { Err("a second computation") }));
+        assert!(futures_util::poll!(&mut waiter).is_pending());
+        beginner.abort();
+        assert!(beginner.await.is_err());
+        release.send(()).unwrap();
+        assert_eq!(waiter.await, (Boarding::Joined, Ok(7)));
+        assert_eq!(runs.load(SeqCst), 1);
+    }
+
+    #[tokio::test]
+    async fn a_failure_is_shared_but_not_kept() {
+        let flights = Numbers::new();
+        assert_eq!(flights.join(1, || async { Err("no") }).await, (Boarding::Began, Err("no")));
+        assert_eq!(flights.join(1, || async { Ok(2) }).await, (Boarding::Began, Ok(2)));
+    }
+
+    #[tokio::test]
+    async fn when_the_last_waiter_leaves_the_computation_is_dropped() {
+        let flights = Numbers::new();
+        let (sender, receiver) = oneshot::channel::<()>();
+        let compute = async move {
+            let _held = sender;
+            std::future::pending().await
+        };
+        let mut only = Box::pin(flights.join(1, || compute));
+        assert!(futures_util::poll!(&mut only).is_pending());
+        drop(only);
+        assert!(receiver.await.is_err());
+        assert_eq!(flights.join(1, || async { Ok(3) }).await, (Boarding::Began, Ok(3)));
+    }
+}
