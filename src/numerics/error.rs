@@ -53,6 +53,8 @@ pub enum NotDefinite {
     BackwardError { backward_error: f64 },
     #[error("Cholesky fails at point {point}, and what was asked for needs its factor")]
     NeedsCholesky { point: usize },
+    #[error("the reciprocal condition {reciprocal_condition:.1e} leaves no digit of what was asked for")]
+    Singular { reciprocal_condition: f64 },
     #[error("the variance at query {query} is {variance:.1e}, beyond rounding")]
     NegativeVariance { query: usize, variance: f64 },
 }

@@ -24,3 +24,21 @@ mod nodes;
 mod simd;
 #[cfg(test)]
 mod testing;
+
+/// The instruction set that the kernel loops run on, chosen at run time.
+pub fn instruction_set() -> &'static str {
+    struct Name;
+    impl pulp::WithSimd for Name {
+        type Output = &'static str;
+        #[inline(always)]
+        fn with_simd<S: pulp::Simd>(self, _simd: S) -> &'static str {
+            match S::F64_LANES {
+                8 => "AVX-512",
+                4 => "AVX2 and FMA",
+                2 => "128-bit vectors",
+                _ => "portable",
+            }
+        }
+    }
+    pulp::Arch::new().dispatch(Name)
+}

@@ -51,7 +51,8 @@ pub fn variances(
         for (k, column) in columns.chunks_exact(n).enumerate() {
             let query = variances.latent.len();
             let variance = k0 - dot(column, column);
-            if variance < 0.0 {
+            // Negated, so that NaN is refused as well.
+            if !(variance >= 0.0) {
                 check_is_rounding(factor, &nodes, query, block.point(k), variance, observer)?;
                 variances.clamped.push(query);
             }
@@ -196,6 +197,17 @@ mod tests {
                 assert!((variance - covariance[query * 301]).abs() < 1e-13 * k0, "{family:?}");
                 assert!(variance >= 0.0 && variance <= k0 * (1.0 + 1e-15), "{family:?}");
             }
+        }
+    }
+
+    #[test]
+    fn far_from_the_cloud_the_variance_is_the_prior() {
+        let cloud = fibonacci_sphere(30);
+        let queries = Cloud::new(vec![1e40, 0.0, 0.0, 0.0, 1e150, 0.0], 3).unwrap();
+        for family in all_families().into_iter().filter(|&f| f != Family::InverseMultiquadric) {
+            let factor = factor(&cloud, family, 1e-6);
+            let found = variances(&factor, &queries, &Unobserved).unwrap();
+            assert_eq!(found.latent, [factor.kernel().at_zero(); 2], "{family:?}");
         }
     }
 

@@ -8,13 +8,17 @@ use pulp::Simd;
 use super::TINY;
 use crate::numerics::simd::{exp_nonpositive, fma};
 
+/// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
+const FAR: f64 = 1e3;
+
 /// φ, φ′, φ″ with θ_{−1} = 1/s and θ_{−2} = (1 + s)/s³, which only the orders 0 and 1 meet.
 #[inline(always)]
 pub(super) fn profile<S: Simd, const P: usize>(q: f64) -> [f64; 3] {
     let nu = P as f64 + 0.5;
-    let s_squared = 2.0 * nu * q;
-    let s = s_squared.sqrt();
+    let s = (2.0 * nu * q).sqrt();
     let s = if s < TINY { TINY } else { s };
+    let s = if s > FAR { FAR } else { s };
+    let s_squared = s * s;
     let inverse = 1.0 / s;
     // theta[p + 2] is θ_p, from θ_p = (2p − 1) θ_{p−1} + s² θ_{p−2}.
     let mut theta = [0.0; 11];

@@ -121,3 +121,13 @@ fn parameters_outside_their_range_are_refused() {
     let wendland = Kernel::new(Family::Wendland { smoothness: WendlandSmoothness::C4 }, 1.0, 1.0).unwrap();
     assert!(wendland.check_dimension(3).is_ok() && wendland.check_dimension(4).is_err());
 }
+
+#[test]
+fn far_away_every_profile_vanishes_and_stays_finite() {
+    for family in all_families().into_iter().filter(|&f| f != Family::InverseMultiquadric) {
+        for q in [1e8, 1e60, 1e120, 1e300] {
+            assert_eq!(profile(family, q).map(f64::abs), [0.0; 3], "{family:?} at {q:e}");
+        }
+    }
+    assert!(profile(Family::InverseMultiquadric, 1e300).iter().all(|p| p.abs() <= 1e-150));
+}

@@ -5,17 +5,18 @@
 
 use super::TINY;
 
-/// 1 − r, cut off at 0.
+/// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it.
 #[inline(always)]
-fn inside(r: f64) -> f64 {
-    if r < 1.0 { 1.0 - r } else { 0.0 }
+fn cut_off(q: f64) -> (f64, f64) {
+    let r = q.sqrt();
+    let r = if r < 1.0 { r } else { 1.0 };
+    (r, 1.0 - r)
 }
 
 /// C²: φ = (1−r)⁴(4r+1), φ′ = −10(1−r)³, φ″ = 15(1−r)²/r.
 #[inline(always)]
 pub(super) fn profile_c2(q: f64) -> [f64; 3] {
-    let r = q.sqrt();
-    let w = inside(r);
+    let (r, w) = cut_off(q);
     let w2 = w * w;
     let divisor = if r < TINY { TINY } else { r };
     [w2 * w2 * (4.0 * r + 1.0), -10.0 * w2 * w, 15.0 * w2 / divisor]
@@ -24,8 +25,7 @@ pub(super) fn profile_c2(q: f64) -> [f64; 3] {
 /// C⁴: φ = (1−r)⁶(35r²+18r+3)/3, φ′ = −(28/3)(1−r)⁵(5r+1), φ″ = 140(1−r)⁴.
 #[inline(always)]
 pub(super) fn profile_c4(q: f64) -> [f64; 3] {
-    let r = q.sqrt();
-    let w = inside(r);
+    let (r, w) = cut_off(q);
     let w2 = w * w;
     let w4 = w2 * w2;
     [
@@ -38,8 +38,7 @@ pub(super) fn profile_c4(q: f64) -> [f64; 3] {
 /// C⁶: φ = (1−r)⁸(32r³+25r²+8r+1), φ′ = −11(1−r)⁷(16r²+7r+1), φ″ = 132(1−r)⁶(6r+1).
 #[inline(always)]
 pub(super) fn profile_c6(q: f64) -> [f64; 3] {
-    let r = q.sqrt();
-    let w = inside(r);
+    let (r, w) = cut_off(q);
     let w2 = w * w;
     let w4 = w2 * w2;
     [

@@ -196,8 +196,14 @@ impl GramFactor {
         Ok(self.cholesky()?.log_determinant())
     }
 
+    /// The Cholesky factor, unless the matrix is singular to rounding: such a factor exists by luck, still solves smooth
+    /// right-hand sides, but variances and determinants from it are off by tens of percent.
     fn cholesky(&self) -> Result<&Cholesky, NumericsError> {
         match &self.factorization {
+            Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
+                let reciprocal_condition = self.reciprocal_condition;
+                Err(self.not_positive_definite(NotDefinite::Singular { reciprocal_condition }))
+            }
             Factorization::Cholesky(factor) => Ok(factor),
             Factorization::PivotedCholesky { failed_at, .. } => {
                 Err(self.not_positive_definite(NotDefinite::NeedsCholesky { point: *failed_at }))
@@ -212,6 +218,7 @@ impl GramFactor {
             NotDefinite::Residual { .. } => (self.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
             NotDefinite::BackwardError { .. }
             | NotDefinite::NeedsCholesky { .. }
+            | NotDefinite::Singular { .. }
             | NotDefinite::NegativeVariance { .. } => self.n_points() as f64,
         };
         NumericsError::NotPositiveDefinite {

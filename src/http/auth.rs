@@ -1,0 +1,79 @@
+//! Bearer keys: who asks.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::header;
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
+
+use super::problem::Problem;
+use super::slug::Slug;
+use crate::app::App;
+use crate::store::Owner;
+
+/// The configured keys as hashes; the keys themselves are not kept.
+pub struct Keys(Vec<[u8; 32]>);
+
+impl Keys {
+    /// Empty entries are ignored, so that an empty variable leaves the service open.
+    pub fn new(keys: &[String]) -> Self {
+        let digest = |key: &String| blake3::hash(key.trim().as_bytes()).into();
+        Self(keys.iter().filter(|key| !key.trim().is_empty()).map(digest).collect())
+    }
+
+    /// Whether anyone may call.
+    pub fn is_open(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Finds the owner of a key in time that does not depend on the keys: hashes are compared in full, and all of them.
+    pub fn owner_of(&self, key: &str) -> Option<Owner> {
+        let digest: [u8; 32] = blake3::hash(key.as_bytes()).into();
+        let (mut found, mut position) = (Choice::from(0), 0u64);
+        for (index, candidate) in self.0.iter().enumerate() {
+            let is_equal = candidate.ct_eq(&digest);
+            position.conditional_assign(&(index as u64), is_equal);
+            found |= is_equal;
+        }
+        bool::from(found).then_some(Owner(position as usize))
+    }
+}
+
+/// Lets requests with a valid key through, with their [`Owner`] as an extension.
+pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
+    let owner = if app.keys.is_open() {
+        Some(Owner(0))
+    } else {
+        bearer_key(&request).and_then(|key| app.keys.owner_of(key))
+    };
+    match owner {
+        Some(owner) => {
+            request.extensions_mut().insert(owner);
+            next.run(request).await
+        }
+        None => Problem::new(Slug::Unauthorized, "send Authorization: Bearer <key> with a valid key")
+            .into_response(),
+    }
+}
+
+/// The scheme is case-insensitive (RFC 9110, section 11.1).
+fn bearer_key(request: &Request) -> Option<&str> {
+    let (scheme, key) = request.headers().get(header::AUTHORIZATION)?.to_str().ok()?.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then(|| key.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_key_has_its_owner_and_others_have_none() {
+        let keys = Keys::new(&["one".to_owned(), "".to_owned(), " two ".to_owned()]);
+        assert_eq!(keys.owner_of("one"), Some(Owner(0)));
+        assert_eq!(keys.owner_of("two"), Some(Owner(1)));
+        assert_eq!(keys.owner_of(""), None);
+        assert!(!keys.is_open() && Keys::new(&[String::new()]).is_open());
+    }
+}

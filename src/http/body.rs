@@ -1,0 +1,301 @@
+//! Bodies in: bytes within the limit, JSON into types, refusals with pointers.
+
+use std::marker::PhantomData;
+
+use axum::body::Body;
+use axum::http::{HeaderMap, header};
+use http_body_util::BodyExt;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::error::Category;
+
+use super::problem::Problem;
+use super::slug::Slug;
+
+/// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
+/// answer instead of a broken connection.
+const MAX_DRAINED_BYTES: usize = 64 << 20;
+
+/// Reads a JSON body of at most `limit` bytes.
+///
+/// # Errors
+/// 415 unless the headers announce plain JSON, 413 beyond the limit, 400 if the connection breaks off.
+pub async fn read_json_body(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u8>, Problem> {
+    check_is_json(headers)?;
+    let announced = headers
+        .get(header::CONTENT_LENGTH)
+        .and_then(|length| length.to_str().ok())
+        .and_then(|length| length.parse::<usize>().ok());
+    if let Some(required) = announced.filter(|&length| length > limit) {
+        drain(body).await;
+        return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, Some(required)));
+    }
+    let mut body = body;
+    let mut bytes = Vec::with_capacity(announced.unwrap_or(0));
+    while let Some(frame) = body.frame().await {
+        let frame = frame.map_err(|_| Problem::new(Slug::MalformedJson, "the body broke off"))?;
+        let Ok(data) = frame.into_data() else { continue };
+        if bytes.len() + data.len() > limit {
+            drain(body).await;
+            return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, None));
+        }
+        bytes.extend_from_slice(&data);
+    }
+    Ok(bytes)
+}
+
+async fn drain(mut body: Body) {
+    let mut drained = 0;
+    while let Some(Ok(frame)) = body.frame().await {
+        drained += frame.into_data().map_or(0, |data| data.len());
+        if drained > MAX_DRAINED_BYTES {
+            break;
+        }
+    }
+}
+
+fn check_is_json(headers: &HeaderMap) -> Result<(), Problem> {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let essence = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
+    if !essence.eq_ignore_ascii_case("application/json") {
+        let found = if essence.is_empty() { "no Content-Type" } else { essence };
+        let detail = format!("expected Content-Type: application/json, found {found:?}");
+        return Err(Problem::new(Slug::UnsupportedMediaType, detail));
+    }
+    match text(header::CONTENT_ENCODING) {
+        None => Ok(()),
+        Some(encoding) if encoding.eq_ignore_ascii_case("identity") => Ok(()),
+        Some(encoding) => {
+            let detail =
+                format!("Content-Encoding {encoding:?} is not supported; send the body uncompressed");
+            Err(Problem::new(Slug::UnsupportedMediaType, detail))
+        }
+    }
+}
+
+/// Parses JSON into a request.
+///
+/// # Errors
+/// 400 `malformed-json` for what is not JSON, 422 `invalid-request` with a pointer for what is, but not this request.
+pub fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let parsed = object(&mut deserializer).and_then(|request| deserializer.end().map(|()| request));
+    parsed.map_err(|error| match error.classify() {
+        Category::Syntax | Category::Eof | Category::Io => malformed(&error),
+        // The type error came first, but the rest may not even be JSON.
+        Category::Data => match serde_json::from_slice::<IgnoredAny>(bytes) {
+            Err(error) => malformed(&error),
+            Ok(IgnoredAny) => invalid::<T>(bytes, &error),
+        },
+    })
+}
+
+fn malformed(error: &serde_json::Error) -> Problem {
+    Problem::new(Slug::MalformedJson, error.to_string())
+}
+
+/// Parses again, this time tracking the path: only refused requests pay for it.
+fn invalid<T: DeserializeOwned>(bytes: &[u8], error: &serde_json::Error) -> Problem {
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let mut track = serde_path_to_error::Track::new();
+    let tracked = serde_path_to_error::Deserializer::new(&mut deserializer, &mut track);
+    let (pointer, message) = match object::<T, _>(tracked) {
+        Ok(_) => (String::new(), error.to_string()),
+        Err(error) => (pointer_of(&track.path()), error.to_string()),
+    };
+    // The position in bytes says less than the pointer.
+    let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
+    Problem::invalid_request(pointer, message)
+}
+
+/// RFC 6901: segments behind slashes, `~` as `~0` and `/` as `~1`.
+fn pointer_of(path: &serde_path_to_error::Path) -> String {
+    use serde_path_to_error::Segment;
+    let mut pointer = String::new();
+    for segment in path {
+        let text = match segment {
+            Segment::Seq { index } => index.to_string(),
+            Segment::Map { key } => key.replace('~', "~0").replace('/', "~1"),
+            Segment::Enum { variant } => variant.clone(),
+            Segment::Unknown => continue,
+        };
+        pointer.push('/');
+        pointer.push_str(&text);
+    }
+    pointer
+}
+
+/// For optional fields: absent is `None`, null is refused by the type itself.
+///
+/// # Errors
+/// Those of the type.
+pub fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+/// For fields that are objects: serde would also take an array of their members in order, which is no part of the contract.
+///
+/// # Errors
+/// Those of the type, and anything that is no object.
+pub fn object<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    struct ObjectVisitor<T>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for ObjectVisitor<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("an object")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, members: A) -> Result<T, A::Error> {
+            T::deserialize(MapAccessDeserializer::new(members))
+        }
+    }
+
+    deserializer.deserialize_map(ObjectVisitor(PhantomData))
+}
+
+/// [`object`] for optional fields.
+///
+/// # Errors
+/// Those of [`object`].
+pub fn present_object<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
+where
+    T: Deserialize<'de>,
+    D: Deserializer<'de>,
+{
+    object(deserializer).map(Some)
+}
+
+/// Points as they come: one flat buffer, whatever their number, with the first row that differs in length.
+#[derive(Debug, Clone, Default)]
+pub struct Points {
+    pub coordinates: Vec<f64>,
+    pub dimension: usize,
+    /// Index and length of the first ragged row, behind which nothing is kept.
+    pub ragged: Option<(usize, usize)>,
+}
+
+impl<'de> Deserialize<'de> for Points {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(PointsVisitor)
+    }
+}
+
+struct PointsVisitor;
+
+impl<'de> Visitor<'de> for PointsVisitor {
+    type Value = Points;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a list of points")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Points, A::Error> {
+        let mut points = Points::default();
+        let mut n_rows = 0;
+        loop {
+            let start = points.coordinates.len();
+            if rows.next_element_seed(Row(&mut points.coordinates))?.is_none() {
+                return Ok(points);
+            }
+            let length = points.coordinates.len() - start;
+            if n_rows == 0 {
+                points.dimension = length;
+            }
+            if points.ragged.is_some() || length != points.dimension {
+                points.ragged = points.ragged.or(Some((n_rows, length)));
+                points.coordinates.truncate(start);
+            }
+            n_rows += 1;
+        }
+    }
+}
+
+/// Appends one row.
+struct Row<'a>(&'a mut Vec<f64>);
+
+impl<'de> serde::de::DeserializeSeed<'de> for Row<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Row<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a point: a list of coordinates")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut coordinates: A) -> Result<(), A::Error> {
+        while let Some(x) = coordinates.next_element()? {
+            self.0.push(x);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Request {
+        points: Points,
+        #[serde(default, deserialize_with = "present")]
+        alpha: Option<f64>,
+    }
+
+    fn refusal(text: &str) -> (Slug, String) {
+        let problem = parse_json::<Request>(text.as_bytes()).unwrap_err();
+        let document = serde_json::to_value(problem.document("")).unwrap();
+        let pointer = document["errors"][0]["pointer"].as_str().unwrap_or("-").to_owned();
+        (problem.slug(), pointer)
+    }
+
+    #[test]
+    fn what_is_not_json_is_malformed() {
+        for text in [
+            "",
+            "{",
+            r#"{"points": [[1, 2"#,
+            r#"{"points": [[NaN]]}"#,
+            r#"{"points": [[1e400]]}"#,
+            r#"{"points": [[1]]} x"#,
+            r#"{"points": 3, "alpha": "#,
+        ] {
+            assert_eq!(refusal(text).0, Slug::MalformedJson, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_json_but_not_the_request_points_to_the_field() {
+        for (text, pointer) in [
+            (r#"{"points": [[1, 2], [3, null]]}"#, "/points/1/1"),
+            (r#"{"points": [[1, 2], [3, "4"]]}"#, "/points/1/1"),
+            (r#"{"points": [1]}"#, "/points/0"),
+            (r#"{"points": null}"#, "/points"),
+            (r#"{"points": [[1]], "alpha": null}"#, "/alpha"),
+            (r#"{"points": [[1]], "a/b": 1}"#, "/a~1b"),
+            (r#"{}"#, ""),
+            (r#"[]"#, ""),
+        ] {
+            assert_eq!(refusal(text), (Slug::InvalidRequest, pointer.to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn points_are_flat_and_remember_the_first_ragged_row() {
+        let request: Request = parse_json(br#"{"points": [[1, 2], [3, 4]], "alpha": 1}"#).unwrap();
+        assert_eq!(request.points.coordinates, [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!((request.points.dimension, request.points.ragged, request.alpha), (2, None, Some(1.0)));
+        let request: Request = parse_json(br#"{"points": [[1, 2], [3], [4, 5], []]}"#).unwrap();
+        assert_eq!((request.points.coordinates.len(), request.points.ragged), (2, Some((1, 1))));
+    }
+}

@@ -1,0 +1,380 @@
+//! From the shared objects of a request to validated inputs of the numerics.
+
+use std::sync::Arc;
+
+use super::body::Points;
+use super::problem::{Place, Problem};
+use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, KernelFamily, SolverChoice};
+use super::slug::Slug;
+use crate::app::App;
+use crate::numerics::cloud::Cloud;
+use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit, length_scale_for};
+use crate::numerics::duplicates::Merge;
+use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
+use crate::numerics::neighbours::Neighbours;
+use crate::numerics::regularization::Regularization;
+use crate::numerics::solver::GramFactor;
+use crate::store::Owner;
+use crate::store::clouds::StoredCloud;
+use crate::store::key::{CloudId, FactorKey};
+
+/// Bytes that a number takes in JSON at most, with its comma.
+const BYTES_PER_NUMBER: usize = 25;
+
+/// A fit whose inputs are checked and whose cost is known and admitted.
+#[derive(Clone)]
+pub struct FitPlan {
+    pub stored: Arc<StoredCloud>,
+    /// The cloud that is factorized: without the merged duplicates.
+    pub fitted: Arc<Cloud>,
+    pub merge: Option<Arc<Merge>>,
+    pub kernel: NumericalKernel,
+    pub regularization: Regularization,
+    pub key: FactorKey,
+    pub place: Place,
+}
+
+/// Validates the parts of a request against the limits and the stored clouds.
+pub struct Planner<'a> {
+    pub app: &'a App,
+    pub owner: Owner,
+}
+
+impl Planner<'_> {
+    /// Checks the fit of a request.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<FitPlan, Problem> {
+        let stored = self.cloud(fit.cloud, "/cloud")?;
+        let (SolverChoice::Auto | SolverChoice::Dense) = fit.solver;
+        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
+        self.plan(stored, chosen, fit.duplicates, purpose, Place::Request)
+    }
+
+    /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(FitPlan, FitPlan), Problem> {
+        let geometry = geometry.unwrap_or_default();
+        let values_cloud = self.cloud(fit.cloud, "/cloud")?;
+        let surface_cloud = match geometry.cloud {
+            None => values_cloud.clone(),
+            Some(cloud) => self.cloud(cloud, "/geometry/cloud")?,
+        };
+        let (expected, found) = (values_cloud.cloud.dimension(), surface_cloud.cloud.dimension());
+        if expected != found {
+            return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
+        }
+        let (SolverChoice::Auto | SolverChoice::Dense) = geometry.solver.unwrap_or(fit.solver);
+        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
+        let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
+        let surface_chosen = Chosen {
+            kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
+            alpha: if inherits_noise { chosen.alpha } else { geometry.alpha },
+            noise_variances: match inherits_noise {
+                true => chosen.noise_variances.clone(),
+                false => geometry.noise_variances,
+            },
+        };
+        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, Place::Request)?;
+        let surface =
+            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, Place::Geometry)?;
+        Ok((values, surface))
+    }
+
+    /// Queries of the dimension of a cloud; absent, the points of `default`.
+    ///
+    /// # Errors
+    /// 413 beyond the limit, 422 for what is no list of points of this dimension.
+    pub fn queries(&self, queries: Option<Points>, default: &StoredCloud) -> Result<Arc<Cloud>, Problem> {
+        let Some(points) = queries else {
+            return Ok(default.cloud.clone());
+        };
+        let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
+        let (limit, required) = (self.app.config.max_queries, queries.n_points());
+        if required > limit {
+            return Err(
+                Problem::too_large(Slug::ProblemTooLarge, "queries", limit, Some(required)).at("/queries")
+            );
+        }
+        let (expected, found) = (default.cloud.dimension(), queries.dimension());
+        if expected != found {
+            return Err(Problem::dimension_mismatch("/queries", expected, found));
+        }
+        Ok(Arc::new(queries))
+    }
+
+    /// Checks one entry per point of the cloud.
+    ///
+    /// # Errors
+    /// 422 `length-mismatch`.
+    pub fn check_values(&self, values: &[f64], plan: &FitPlan) -> Result<(), Problem> {
+        let (expected, found) = (plan.stored.cloud.n_points(), values.len());
+        if expected == found { Ok(()) } else { Err(Problem::length_mismatch("/values", expected, found)) }
+    }
+
+    /// Admits an answer of so many numbers.
+    ///
+    /// # Errors
+    /// 413 `problem-too-large` if it would be over the limit, or not countable.
+    pub fn check_answer(&self, n_numbers: Option<usize>) -> Result<(), Problem> {
+        let limit = self.app.config.max_response_bytes;
+        let required = n_numbers.and_then(|n| n.checked_mul(BYTES_PER_NUMBER)).unwrap_or(usize::MAX);
+        if required <= limit {
+            return Ok(());
+        }
+        Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)))
+    }
+
+    /// Finds a registered cloud, or registers the points given.
+    ///
+    /// # Errors
+    /// 404 `unknown-cloud`, 413 beyond the limits, 422 for what is no cloud.
+    pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<StoredCloud>, Problem> {
+        match (cloud.id, cloud.points) {
+            (Some(id), None) => {
+                if cloud.normals.is_some() {
+                    let detail = "normals are given with points, not with an id";
+                    return Err(Problem::invalid_request(format!("{pointer}/normals"), detail));
+                }
+                let found = CloudId::parse(&id).and_then(|id| self.app.clouds.get(self.owner, id));
+                found.ok_or_else(|| unknown_cloud(&id).at(format!("{pointer}/id")))
+            }
+            (None, Some(points)) => Ok(self.register(points, cloud.normals, pointer)?.0),
+            (Some(_), Some(_)) | (None, None) => {
+                Err(Problem::invalid_request(pointer, "exactly one of id and points is needed"))
+            }
+        }
+    }
+
+    /// Validates and registers points; says whether they are new.
+    ///
+    /// # Errors
+    /// 413 beyond the limits, 422 for what is no cloud.
+    pub fn register(
+        &self,
+        points: Points,
+        normals: Option<Points>,
+        pointer: &str,
+    ) -> Result<(Arc<StoredCloud>, bool), Problem> {
+        let at = format!("{pointer}/points");
+        let cloud = rectangular(points, &at, Slug::InvalidCloud)?;
+        let checks = [
+            ("points", self.app.config.max_points, cloud.n_points()),
+            ("coordinates a point", self.app.config.max_dimension, cloud.dimension()),
+        ];
+        for (what, limit, required) in checks {
+            if required > limit {
+                return Err(Problem::too_large(Slug::ProblemTooLarge, what, limit, Some(required)).at(at));
+            }
+        }
+        let normals = match normals {
+            None => None,
+            Some(normals) => Some(check_normals(normals, &cloud, &format!("{pointer}/normals"))?),
+        };
+        Ok(self.app.clouds.register(self.owner, cloud, normals))
+    }
+
+    fn plan(
+        &self,
+        stored: Arc<StoredCloud>,
+        chosen: Chosen,
+        duplicates: DuplicatePolicy,
+        purpose: Purpose,
+        place: Place,
+    ) -> Result<FitPlan, Problem> {
+        let (kernel, regularization) = chosen.resolve(&stored, purpose, place)?;
+        kernel.check_dimension(stored.cloud.dimension()).map_err(|e| Problem::from_numerics(e, place))?;
+        let n = stored.cloud.n_points();
+        if GramFactor::n_bytes_needed(n).is_none() {
+            return Err(Problem::too_large(
+                Slug::ProblemTooLarge,
+                "points",
+                self.app.config.max_points,
+                Some(n),
+            ));
+        }
+        let merges = duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
+        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
+        let key = FactorKey::of_dense(self.owner, stored.id, &kernel, &regularization, merged.is_some());
+        let (fitted, merge) = match merged {
+            None => (stored.cloud.clone(), None),
+            Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
+        };
+        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, place })
+    }
+}
+
+/// 404 for an id that names no cloud of this owner.
+pub fn unknown_cloud(id: &str) -> Problem {
+    let shown: String = id.chars().take(64).collect();
+    Problem::new(Slug::UnknownCloud, format!("no cloud {shown:?} is registered; post its points again"))
+}
+
+/// What the client chose of kernel and regularization.
+struct Chosen {
+    kernel: Option<Kernel>,
+    alpha: Option<f64>,
+    noise_variances: Option<Vec<f64>>,
+}
+
+impl Chosen {
+    fn resolve(
+        self,
+        stored: &StoredCloud,
+        purpose: Purpose,
+        place: Place,
+    ) -> Result<(NumericalKernel, Regularization), Problem> {
+        let refuse = |error| Problem::from_numerics(error, place);
+        let (kernel, default_alpha) = match &self.kernel {
+            Some(kernel) => (kernel.resolve(&stored.cloud, || stored.neighbours(), place)?, DEFAULT_ALPHA),
+            None => default_fit(&stored.cloud, stored.neighbours(), purpose).map_err(refuse)?,
+        };
+        let regularization = match (self.alpha, self.noise_variances) {
+            (Some(_), Some(_)) => {
+                let detail = "noise_variances stands instead of alpha; give one of them";
+                return Err(Problem::invalid_request(place.pointer("/noise_variances"), detail));
+            }
+            (alpha, None) => Regularization::uniform(alpha.unwrap_or(default_alpha)).map_err(refuse)?,
+            (None, Some(variances)) => {
+                let (expected, found) = (stored.cloud.n_points(), variances.len());
+                if expected != found {
+                    let pointer = place.pointer("/noise_variances");
+                    return Err(Problem::length_mismatch(pointer, expected, found));
+                }
+                Regularization::per_point(variances).map_err(refuse)?
+            }
+        };
+        Ok((kernel, regularization))
+    }
+}
+
+impl Kernel {
+    /// Fills in what is absent and checks the rest.
+    fn resolve<'a>(
+        &self,
+        cloud: &Cloud,
+        neighbours: impl FnOnce() -> &'a Neighbours,
+        place: Place,
+    ) -> Result<NumericalKernel, Problem> {
+        let family = self.resolve_family(place)?;
+        let length_scale = match self.length_scale {
+            Some(length_scale) => length_scale,
+            None => length_scale_for(cloud, neighbours(), family),
+        };
+        NumericalKernel::new(family, length_scale, self.variance.unwrap_or(1.0))
+            .map_err(|error| Problem::from_numerics(error, place))
+    }
+
+    fn resolve_family(&self, place: Place) -> Result<Family, Problem> {
+        let of_others = [
+            ("epsilon", KernelFamily::Laplace, self.epsilon.is_some()),
+            ("nu", KernelFamily::Matern, self.nu.is_some()),
+            ("smoothness", KernelFamily::Wendland, self.smoothness.is_some()),
+        ];
+        for (name, owner, is_given) in of_others {
+            if is_given && self.family != owner {
+                let detail = format!("{name} is a parameter of another family");
+                return Err(Problem::invalid_request(place.pointer(&format!("/kernel/{name}")), detail));
+            }
+        }
+        match self.family {
+            KernelFamily::Gauss => Ok(Family::Gauss),
+            KernelFamily::Laplace => Ok(Family::Laplace { epsilon: self.epsilon.unwrap_or(0.0) }),
+            KernelFamily::InverseMultiquadric => Ok(Family::InverseMultiquadric),
+            KernelFamily::Matern => {
+                let nu = self.nu.unwrap_or(2.5);
+                let order = nu - 0.5;
+                if (0.0..=8.0).contains(&order) && order.fract() == 0.0 {
+                    return Ok(Family::Matern { order: order as u8 });
+                }
+                let detail = format!("nu must be one of 0.5, 1.5, ..., 8.5, found {nu}");
+                Err(Problem::invalid_request(place.pointer("/kernel/nu"), detail))
+            }
+            KernelFamily::Wendland => {
+                let smoothness = match self.smoothness.unwrap_or(4) {
+                    2 => WendlandSmoothness::C2,
+                    4 => WendlandSmoothness::C4,
+                    6 => WendlandSmoothness::C6,
+                    other => {
+                        let detail = format!("smoothness must be 2, 4 or 6, found {other}");
+                        return Err(Problem::invalid_request(place.pointer("/kernel/smoothness"), detail));
+                    }
+                };
+                Ok(Family::Wendland { smoothness })
+            }
+        }
+    }
+}
+
+impl From<&NumericalKernel> for Kernel {
+    /// Every number used, so that a client can pin them.
+    fn from(kernel: &NumericalKernel) -> Self {
+        let mut full = Self {
+            family: KernelFamily::Gauss,
+            length_scale: Some(kernel.length_scale()),
+            variance: Some(kernel.variance()),
+            epsilon: None,
+            nu: None,
+            smoothness: None,
+        };
+        match kernel.family() {
+            Family::Gauss => full.family = KernelFamily::Gauss,
+            Family::InverseMultiquadric => full.family = KernelFamily::InverseMultiquadric,
+            Family::Laplace { epsilon } => {
+                full.family = KernelFamily::Laplace;
+                full.epsilon = Some(epsilon);
+            }
+            Family::Matern { order } => {
+                full.family = KernelFamily::Matern;
+                full.nu = Some(f64::from(order) + 0.5);
+            }
+            Family::Wendland { smoothness } => {
+                full.family = KernelFamily::Wendland;
+                full.smoothness = Some(match smoothness {
+                    WendlandSmoothness::C2 => 2,
+                    WendlandSmoothness::C4 => 4,
+                    WendlandSmoothness::C6 => 6,
+                });
+            }
+        }
+        full
+    }
+}
+
+/// Points with rows of one length.
+fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Problem> {
+    if let Some((row, found)) = points.ragged {
+        let detail =
+            format!("point {row} has {found} coordinates, the points before it have {}", points.dimension);
+        return Err(Problem::of_field(slug, format!("{pointer}/{row}"), detail));
+    }
+    Cloud::new(points.coordinates, points.dimension).map_err(|error| {
+        let detail = match points.dimension {
+            0 => "at least one point with one coordinate is needed".to_owned(),
+            _ => error.to_string(),
+        };
+        Problem::of_field(slug, pointer, detail)
+    })
+}
+
+/// One normal per point, of its dimension and not zero.
+fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud, Problem> {
+    let normals = rectangular(normals, pointer, Slug::InvalidCloud)?;
+    if normals.n_points() != cloud.n_points() {
+        return Err(Problem::length_mismatch(pointer, cloud.n_points(), normals.n_points()));
+    }
+    if normals.dimension() != cloud.dimension() {
+        return Err(Problem::dimension_mismatch(pointer, cloud.dimension(), normals.dimension()));
+    }
+    let zero = normals.points().position(|normal| normal.iter().all(|&x| x == 0.0));
+    match zero {
+        None => Ok(normals),
+        Some(row) => {
+            let detail = format!("normal {row} is zero and points nowhere");
+            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail))
+        }
+    }
+}

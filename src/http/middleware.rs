@@ -1,0 +1,153 @@
+//! What happens around every handler: request id and log line, problem documents, negotiation, deadline.
+
+use std::any::Any;
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::problem::Problem;
+use super::slug::Slug;
+use crate::app::App;
+
+/// Names the request, writes problem documents that need that name, and logs one line.
+///
+/// The line has method, path and status, never a body: clouds stay out of the log.
+pub async fn name_and_log(request: Request, next: Next) -> Response {
+    let began = Instant::now();
+    let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
+    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let mut response = with_problem_document(next.run(request).await, &request_id);
+    if let Ok(value) = HeaderValue::from_str(&request_id) {
+        response.headers_mut().insert("x-request-id", value);
+    }
+    let status = response.status().as_u16();
+    let duration_ms = began.elapsed().as_secs_f64() * 1e3;
+    let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
+    tracing::info!(request_id, %method, path, status, duration_ms, cache, "{method} {path} {status}");
+    response
+}
+
+/// A client's own id, if it is short and harmless in logs and headers.
+fn client_request_id(headers: &HeaderMap) -> Option<String> {
+    let id = headers.get("x-request-id")?.to_str().ok()?;
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    (!id.is_empty() && id.len() <= 128 && id.chars().all(is_plain)).then(|| id.to_owned())
+}
+
+/// Writes the document of a problem, also for errors that a library answered on its own. Other headers are kept.
+fn with_problem_document(response: Response, request_id: &str) -> Response {
+    let status = response.status();
+    if !status.is_client_error() && !status.is_server_error() {
+        return response;
+    }
+    let problem = response.extensions().get::<Problem>().cloned().unwrap_or_else(|| foreign(status));
+    let mut documented = problem.to_response(request_id);
+    for (name, value) in response.headers() {
+        if name != header::CONTENT_TYPE && name != header::CONTENT_LENGTH {
+            documented.headers_mut().append(name, value.clone());
+        }
+    }
+    documented
+}
+
+/// An error that no handler of ours made.
+fn foreign(status: StatusCode) -> Problem {
+    match status {
+        StatusCode::NOT_FOUND => not_found_problem(),
+        StatusCode::METHOD_NOT_ALLOWED => Problem::new(Slug::MethodNotAllowed, "see the Allow header"),
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
+            Problem::new(Slug::UnsupportedMediaType, "send application/json")
+        }
+        _ if status.is_client_error() => Problem::new(Slug::InvalidRequest, "the request cannot be read"),
+        _ => Problem::internal(),
+    }
+}
+
+pub async fn not_found() -> Problem {
+    not_found_problem()
+}
+
+fn not_found_problem() -> Problem {
+    Problem::new(Slug::NotFound, "no such path; /openapi.json lists every path")
+}
+
+pub async fn method_not_allowed() -> Problem {
+    Problem::new(Slug::MethodNotAllowed, "this path does not have this method; see the Allow header")
+}
+
+/// A panic is a bug: logged by the panic hook, answered without detail.
+pub fn recover(_panic: Box<dyn Any + Send + 'static>) -> Response {
+    Problem::internal().into_response()
+}
+
+/// Refuses requests that accept no JSON.
+pub async fn negotiate(request: Request, next: Next) -> Response {
+    let accepts: Vec<&str> =
+        request.headers().get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok()).collect();
+    if accepts.is_empty() || accepts_json(&accepts.join(",")) {
+        return next.run(request).await;
+    }
+    Problem::new(Slug::NotAcceptable, "answers come as application/json; add it to Accept").into_response()
+}
+
+/// RFC 9110, section 12.5.1: the most specific media range that matches decides; weight 0 refuses.
+fn accepts_json(accept: &str) -> bool {
+    let weight = |range: &str| -> Option<(u8, f64)> {
+        let mut parts = range.split(';').map(str::trim);
+        let specificity = match parts.next()?.to_ascii_lowercase().as_str() {
+            "application/json" => 2,
+            "application/*" => 1,
+            "*/*" => 0,
+            _ => return None,
+        };
+        let q =
+            parts.find_map(|p| p.strip_prefix("q=").or(p.strip_prefix("Q="))).and_then(|q| q.parse().ok());
+        Some((specificity, q.unwrap_or(1.0)))
+    };
+    let best = accept.split(',').filter_map(weight).max_by(|a, b| a.0.cmp(&b.0));
+    best.is_some_and(|(_, q)| q > 0.0)
+}
+
+/// Answers 504 when the deadline passes; dropping the handler cancels its work.
+pub async fn meet_deadline(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let deadline = app.config.deadline();
+    match tokio::time::timeout(deadline, next.run(request)).await {
+        Ok(response) => response,
+        Err(_) => {
+            let detail = format!("no answer within {} s; the work was cancelled", deadline.as_secs_f64());
+            Problem::new(Slug::DeadlineExceeded, detail).into_response()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_specific_range_decides() {
+        for accept in ["application/json", "*/*", "text/html, application/*;q=0.1", "APPLICATION/JSON; q=0.5"]
+        {
+            assert!(accepts_json(accept), "{accept}");
+        }
+        for refuse in ["text/html", "application/json;q=0, */*", "application/x-npy", ""] {
+            assert!(!accepts_json(refuse), "{refuse}");
+        }
+    }
+
+    #[test]
+    fn only_harmless_request_ids_are_taken_over() {
+        let with = |id: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert("x-request-id", HeaderValue::from_str(id).unwrap());
+            client_request_id(&headers)
+        };
+        assert_eq!(with("trace-1.a_b"), Some("trace-1.a_b".to_owned()));
+        assert_eq!(with("a b"), None);
+        assert_eq!(with(&"x".repeat(129)), None);
+    }
+}

@@ -1,0 +1,103 @@
+//! HTTP: every route on this page, middleware beneath.
+
+mod array;
+pub mod auth;
+mod body;
+pub mod compute;
+mod fit;
+mod fitted;
+mod middleware;
+mod openapi;
+mod operation;
+pub mod problem;
+mod responses;
+mod routes;
+mod shared;
+pub mod slug;
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::http::{HeaderName, HeaderValue, Method, header};
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::routing::get;
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::cors::{AllowOrigin, CorsLayer};
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+use utoipa_swagger_ui::SwaggerUi;
+
+use crate::app::App;
+use routes::{
+    clouds, interpolation, kernels, laplace_beltrami, posterior, process, surface, surface_gradient,
+};
+
+/// The service as one router.
+pub fn router(app: Arc<App>) -> Router {
+    let (v1, probes, document) = parts();
+    let document = Arc::<str>::from(to_json(&document));
+    let v1 = v1
+        .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
+        .layer(from_fn_with_state(app.clone(), auth::authenticate))
+        .layer(from_fn(middleware::negotiate));
+    let serve_document =
+        move || async move { ([(header::CONTENT_TYPE, "application/json")], document.to_string()) };
+    v1.merge(probes)
+        .route("/openapi.json", get(serve_document))
+        .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
+        .fallback(middleware::not_found)
+        .method_not_allowed_fallback(middleware::method_not_allowed)
+        .layer(CatchPanicLayer::custom(middleware::recover))
+        .layer(cors(&app.config.cors_origins))
+        .layer(from_fn(middleware::name_and_log))
+        .with_state(app)
+}
+
+/// The OpenAPI document of this version, as JSON.
+pub fn openapi_json() -> String {
+    to_json(&parts().2)
+}
+
+/// Routes behind keys, routes for everyone, and the document of both.
+fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
+    let v1 = OpenApiRouter::with_openapi(openapi::Document::openapi())
+        .routes(routes!(clouds::create_cloud, clouds::list_clouds))
+        .routes(routes!(clouds::get_cloud, clouds::check_cloud, clouds::delete_cloud))
+        .routes(routes!(interpolation::compute_interpolation))
+        .routes(routes!(posterior::compute_posterior))
+        .routes(routes!(kernels::list_kernels))
+        .routes(routes!(surface::compute_normals))
+        .routes(routes!(surface::compute_curvatures))
+        .routes(routes!(surface_gradient::compute_surface_gradient))
+        .routes(routes!(surface_gradient::assemble_surface_gradient_matrix))
+        .routes(routes!(laplace_beltrami::compute_laplace_beltrami))
+        .routes(routes!(laplace_beltrami::assemble_laplace_beltrami_matrix));
+    let probes = OpenApiRouter::new()
+        .routes(routes!(process::check_live))
+        .routes(routes!(process::check_ready))
+        .routes(routes!(process::get_version))
+        .routes(routes!(process::get_problem_page));
+    let (v1, mut document) = v1.split_for_parts();
+    let (probes, of_probes) = probes.split_for_parts();
+    document.merge(of_probes);
+    (v1, probes, document)
+}
+
+fn to_json(document: &utoipa::openapi::OpenApi) -> String {
+    // Serialization of a document that utoipa built cannot fail; an empty one would be caught by the test of the file.
+    document.to_pretty_json().map(|json| json + "\n").unwrap_or_default()
+}
+
+/// No origin unless configured.
+fn cors(origins: &[String]) -> CorsLayer {
+    let exposed = ["x-request-id", "server-timing", "cache-status", "location", "retry-after", "etag"];
+    let layer = CorsLayer::new()
+        .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
+        .allow_headers([header::AUTHORIZATION, header::CONTENT_TYPE, HeaderName::from_static("x-request-id")])
+        .expose_headers(exposed.map(HeaderName::from_static));
+    if origins.iter().any(|origin| origin == "*") {
+        return layer.allow_origin(AllowOrigin::any());
+    }
+    layer.allow_origin(AllowOrigin::list(origins.iter().filter_map(|o| HeaderValue::from_str(o.trim()).ok())))
+}

@@ -1,0 +1,311 @@
+//! `/v1/clouds`: registered clouds, named by their content.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Path, RawQuery, Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::app::App;
+use crate::http::body::{Points, parse_json, present, read_json_body};
+use crate::http::fit::{Planner, unknown_cloud};
+use crate::http::problem::Problem;
+use crate::http::responses::{ComputeProblems, ListProblems, LookUpProblems};
+use crate::store::Owner;
+use crate::store::clouds::StoredCloud;
+use crate::store::key::CloudId;
+
+/// Clouds in a page when the client names no number.
+const DEFAULT_PAGE: usize = 50;
+/// Clouds in a page at most.
+const MAX_PAGE: usize = 1000;
+
+/// Points to register.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CloudRequest {
+    /// The points, one row of coordinates each, all of the same length.
+    #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
+    pub points: Points,
+    /// Normals at the points, one row each.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    pub normals: Option<Points>,
+}
+
+/// The smallest box around a cloud.
+#[derive(Serialize, ToSchema)]
+pub struct BoundingBox {
+    /// The least value of each coordinate.
+    min: Vec<f64>,
+    /// The greatest value of each coordinate.
+    max: Vec<f64>,
+}
+
+/// Distances from each point to the nearest point elsewhere.
+#[derive(Serialize, ToSchema)]
+pub struct Spacing {
+    /// The least of them.
+    min: f64,
+    /// The middle one.
+    median: f64,
+    /// The greatest of them.
+    max: f64,
+}
+
+/// A registered cloud.
+#[derive(Serialize, ToSchema)]
+pub struct Cloud {
+    /// 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
+    #[schema(pattern = "^[0-9a-f]{64}$")]
+    cloud_id: String,
+    /// Number of points, n.
+    n_points: usize,
+    /// Coordinates of each point, d.
+    dimension: usize,
+    /// The smallest box around the points.
+    bounding_box: BoundingBox,
+    /// Distances between nearest points; absent if all points coincide.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    spacing: Option<Spacing>,
+    /// Points that coincide with an earlier one.
+    n_duplicates: usize,
+    /// When it was registered, in UTC.
+    #[schema(format = DateTime)]
+    created_at: String,
+}
+
+impl From<&StoredCloud> for Cloud {
+    fn from(stored: &StoredCloud) -> Self {
+        let (min, max) = stored.cloud.bounding_box();
+        let spacings = stored.spacings();
+        Self {
+            cloud_id: stored.id.to_string(),
+            n_points: stored.cloud.n_points(),
+            dimension: stored.cloud.dimension(),
+            bounding_box: BoundingBox { min, max },
+            spacing: spacings.min_median_max.map(|[min, median, max]| Spacing { min, median, max }),
+            n_duplicates: spacings.n_duplicates,
+            created_at: humantime::format_rfc3339_millis(stored.created_at).to_string(),
+        }
+    }
+}
+
+/// A page of clouds, oldest first.
+#[derive(Serialize, ToSchema)]
+pub struct CloudList {
+    /// The clouds of this page.
+    clouds: Vec<Cloud>,
+    /// The cursor of the next page; absent on the last one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    next: Option<String>,
+}
+
+/// Register a cloud
+///
+/// Keeps the points under an id that is the hash of their coordinates, so that later requests need not repeat them. Posting
+/// the same points again answers 200 with the same id. Clouds live in a bounded store, least recently used out first.
+#[utoipa::path(
+    post,
+    path = "/v1/clouds",
+    operation_id = "create_cloud",
+    tag = "clouds",
+    request_body = CloudRequest,
+    responses(
+        (status = 201, description = "Registered", body = Cloud, headers(("Location" = String, description = "The path of the cloud"))),
+        (status = 200, description = "Known already", body = Cloud, headers(("Location" = String, description = "The path of the cloud"))),
+        ComputeProblems
+    ),
+    security((), ("bearer" = []))
+)]
+pub async fn create_cloud(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    let bytes = read_json_body(&parts.headers, body, app.config.max_body_bytes).await?;
+    let _admission = app.compute.admit()?;
+    let shared = app.clone();
+    let job = move |_: &_| {
+        let request: CloudRequest = parse_json(&bytes)?;
+        let planner = Planner { app: &shared, owner };
+        let (stored, is_new) = planner.register(request.points, request.normals, "")?;
+        Ok::<_, Problem>((Cloud::from(stored.as_ref()), is_new))
+    };
+    let (cloud, is_new) = app.compute.run(0.0, job).await?.0?;
+    let location = format!("/v1/clouds/{}", cloud.cloud_id);
+    let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
+    Ok((status, [(header::LOCATION, location)], axum::Json(cloud)).into_response())
+}
+
+/// Describe a cloud
+#[utoipa::path(
+    get,
+    path = "/v1/clouds/{cloud_id}",
+    operation_id = "get_cloud",
+    tag = "clouds",
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    responses(
+        (status = 200, description = "The cloud", body = Cloud, headers(("ETag" = String, description = "The id in quotes"))),
+        (status = 304, description = "The client has it already"),
+        LookUpProblems
+    ),
+    security((), ("bearer" = []))
+)]
+pub async fn get_cloud(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(cloud_id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let stored = find(&app, owner, &cloud_id)?;
+    let etag = format!("\"{}\"", stored.id);
+    if is_known(&headers, &etag) {
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
+    }
+    // Spacings of a large cloud take longer than an async worker may be held.
+    let cloud = app.compute.run(0.0, move |_| Cloud::from(stored.as_ref())).await?.0;
+    Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
+}
+
+/// Check for a cloud
+///
+/// As GET, without the body.
+#[utoipa::path(
+    head,
+    path = "/v1/clouds/{cloud_id}",
+    operation_id = "check_cloud",
+    tag = "clouds",
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    responses((status = 200, description = "Registered"), (status = 304, description = "The client has it already"), LookUpProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn check_cloud(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(cloud_id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let etag = format!("\"{}\"", find(&app, owner, &cloud_id)?.id);
+    let status = if is_known(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
+    let json = HeaderValue::from_static("application/json");
+    let mut response = (status, [(header::ETAG, etag)]).into_response();
+    response.headers_mut().insert(header::CONTENT_TYPE, json);
+    Ok(response)
+}
+
+/// Delete a cloud
+///
+/// Forgets the points and everything that was computed from them.
+#[utoipa::path(
+    delete,
+    path = "/v1/clouds/{cloud_id}",
+    operation_id = "delete_cloud",
+    tag = "clouds",
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    responses((status = 204, description = "Deleted"), LookUpProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn delete_cloud(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(cloud_id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    let id = CloudId::parse(&cloud_id).ok_or_else(|| unknown_cloud(&cloud_id))?;
+    if !app.clouds.remove(owner, id) {
+        return Err(unknown_cloud(&cloud_id));
+    }
+    app.factors.forget_cloud(owner, id);
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// List clouds
+///
+/// The clouds registered with this key, oldest first.
+#[utoipa::path(
+    get,
+    path = "/v1/clouds",
+    operation_id = "list_clouds",
+    tag = "clouds",
+    params(
+        ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000),
+        ("cursor" = Option<String>, Query, description = "`next` of the page before", pattern = "^[0-9a-f]{64}$")
+    ),
+    responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn list_clouds(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    RawQuery(query): RawQuery,
+) -> Result<axum::Json<CloudList>, Problem> {
+    let page = Page::parse(query.as_deref().unwrap_or(""))?;
+    let shared = app.clone();
+    let job = move |_: &_| {
+        let clouds = shared.clouds.list(owner);
+        let start = match page.after {
+            None => 0,
+            Some(id) => match clouds.iter().position(|stored| stored.id == id) {
+                Some(position) => position + 1,
+                None => {
+                    return Err(Problem::invalid_request("/cursor", "this cursor has expired; list again"));
+                }
+            },
+        };
+        let shown = &clouds[start..clouds.len().min(start.saturating_add(page.limit))];
+        let is_last = start + shown.len() == clouds.len();
+        let next = shown.last().filter(|_| !is_last).map(|stored| stored.id.to_string());
+        Ok(CloudList { clouds: shown.iter().map(|stored| Cloud::from(stored.as_ref())).collect(), next })
+    };
+    app.compute.run(0.0, job).await?.0.map(axum::Json)
+}
+
+struct Page {
+    limit: usize,
+    /// The last cloud of the page before. Opaque to clients.
+    after: Option<CloudId>,
+}
+
+impl Page {
+    fn parse(query: &str) -> Result<Self, Problem> {
+        let mut page = Self { limit: DEFAULT_PAGE, after: None };
+        for pair in query.split('&').filter(|pair| !pair.is_empty()) {
+            let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
+            match name {
+                "limit" => match value.parse() {
+                    Ok(limit) if (1..=MAX_PAGE).contains(&limit) => page.limit = limit,
+                    _ => {
+                        let detail = format!("limit must be an integer from 1 to {MAX_PAGE}");
+                        return Err(Problem::invalid_request("/limit", detail));
+                    }
+                },
+                "cursor" => match CloudId::parse(value) {
+                    Some(id) => page.after = Some(id),
+                    None => return Err(Problem::invalid_request("/cursor", "this is no cursor of a page")),
+                },
+                _ => {
+                    let pointer = format!("/{}", name.chars().take(64).collect::<String>());
+                    return Err(Problem::invalid_request(pointer, "unknown query parameter"));
+                }
+            }
+        }
+        Ok(page)
+    }
+}
+
+fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<StoredCloud>, Problem> {
+    let found = CloudId::parse(cloud_id).and_then(|id| app.clouds.get(owner, id));
+    found.ok_or_else(|| unknown_cloud(cloud_id))
+}
+
+/// RFC 9110, section 13.1.2: a list of tags, weak or strong, or `*`.
+fn is_known(headers: &HeaderMap, etag: &str) -> bool {
+    let tags = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok()).unwrap_or("");
+    tags.split(',').map(str::trim).any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
+}

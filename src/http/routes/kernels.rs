@@ -1,0 +1,103 @@
+//! `GET /v1/kernels`.
+
+use axum::Json;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::http::responses::ReadProblems;
+use crate::http::shared::KernelFamily;
+
+/// A parameter that a family takes beside `length_scale` and `variance`.
+#[derive(Serialize, ToSchema)]
+pub struct KernelParameter {
+    /// Its name in a kernel object.
+    name: &'static str,
+    /// The value if absent.
+    default: f64,
+    /// The values it may take.
+    range: &'static str,
+}
+
+/// A family of kernels.
+#[derive(Serialize, ToSchema)]
+pub struct KernelDescription {
+    /// The name in a kernel object.
+    family: KernelFamily,
+    /// φ as a function of r = |x − y|/length_scale; the kernel is variance · φ.
+    formula: &'static str,
+    /// How smooth functions fitted with it are.
+    smoothness: &'static str,
+    /// Parameters beside `length_scale` and `variance`.
+    parameters: Vec<KernelParameter>,
+    /// The greatest dimension in which it is positive definite; absent if every one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    max_dimension: Option<usize>,
+    /// Whether it has derivatives at the points of the cloud, as geometry and operators need there.
+    differentiable_at_points: &'static str,
+}
+
+/// All families.
+#[derive(Serialize, ToSchema)]
+pub struct KernelList {
+    /// The families, in the order of their names in the documentation.
+    kernels: Vec<KernelDescription>,
+}
+
+/// List kernels
+///
+/// The families of kernels with their formulas, parameters and smoothness.
+#[utoipa::path(
+    get,
+    path = "/v1/kernels",
+    operation_id = "list_kernels",
+    tag = "values",
+    responses((status = 200, description = "All families", body = KernelList), ReadProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn list_kernels() -> Json<KernelList> {
+    let always = "always";
+    let kernels = vec![
+        KernelDescription {
+            family: KernelFamily::Gauss,
+            formula: "exp(-r^2)",
+            smoothness: "analytic",
+            parameters: vec![],
+            max_dimension: None,
+            differentiable_at_points: always,
+        },
+        KernelDescription {
+            family: KernelFamily::Laplace,
+            formula: "exp(-sqrt(r^2 + epsilon)), with phi(0) = exp(-sqrt(epsilon))",
+            smoothness: "analytic if epsilon > 0, continuous with a kink if epsilon = 0",
+            parameters: vec![KernelParameter { name: "epsilon", default: 0.0, range: "0 to 1e5" }],
+            max_dimension: None,
+            differentiable_at_points: "if epsilon > 0",
+        },
+        KernelDescription {
+            family: KernelFamily::Matern,
+            formula: "exp(-s) theta_p(s)/theta_p(0), s = sqrt(2 nu) r, nu = p + 1/2, theta_p the reverse Bessel polynomial",
+            smoothness: "2p times continuously differentiable, p = nu - 1/2",
+            parameters: vec![KernelParameter { name: "nu", default: 2.5, range: "0.5, 1.5, ..., 8.5" }],
+            max_dimension: None,
+            differentiable_at_points: "if nu >= 1.5",
+        },
+        KernelDescription {
+            family: KernelFamily::Wendland,
+            formula: "for r < 1, else 0: (1-r)^4 (4r+1); (1-r)^6 (35r^2+18r+3)/3; (1-r)^8 (32r^3+25r^2+8r+1)",
+            smoothness: "2, 4 or 6 times continuously differentiable, as the parameter smoothness says",
+            parameters: vec![KernelParameter { name: "smoothness", default: 4.0, range: "2, 4, 6" }],
+            max_dimension: Some(crate::numerics::kernel::MAX_WENDLAND_DIMENSION),
+            differentiable_at_points: always,
+        },
+        KernelDescription {
+            family: KernelFamily::InverseMultiquadric,
+            formula: "(1 + r^2)^(-1/2)",
+            smoothness: "analytic",
+            parameters: vec![],
+            max_dimension: None,
+            differentiable_at_points: always,
+        },
+    ];
+    Json(KernelList { kernels })
+}

@@ -1,0 +1,279 @@
+//! `POST /v1/laplace-beltrami` and `POST /v1/laplace-beltrami/matrix`, and what they share with the surface gradient.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::surface::check_is_surface;
+use crate::app::App;
+use crate::http::array::Array;
+use crate::http::body::{Points, present, present_object};
+use crate::http::compute::JobObserver;
+use crate::http::fit::Planner;
+use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::operation::{Operation, Plan, serve};
+use crate::http::problem::Problem;
+use crate::http::responses::ComputeProblems;
+use crate::http::shared::{
+    Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, SurfaceChoice, request,
+};
+use crate::numerics::cloud::Cloud;
+use crate::numerics::interpolant::Interpolant;
+use crate::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix};
+use crate::store::Owner;
+
+request! {
+    /// Values on a surface, and where their Laplace–Beltrami operator is wanted.
+    pub struct LaplaceBeltramiRequest {
+        /// The values at the points of `cloud`, in their order.
+        #[schema(min_items = 1)]
+        pub values: Vec<f64>,
+        /// Where answers are wanted; the points of the surface's cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where its fit differs from that of the values.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+    }
+}
+
+/// How a matrix is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MatrixFormat {
+    /// Every entry, row by row.
+    #[default]
+    Dense,
+}
+
+request! {
+    /// A cloud of nodes on a surface, and where rows of its Laplace–Beltrami matrix are wanted.
+    pub struct LaplaceBeltramiMatrixRequest {
+        /// Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where its fit differs from that of the values.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+        /// How the matrix is written; `dense` if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub format: Option<MatrixFormat>,
+    }
+}
+
+/// The Laplace–Beltrami operator of the values at the queries.
+#[derive(Serialize, ToSchema)]
+pub struct LaplaceBeltramiResponse {
+    /// Δu at each query, unit of the values per length squared; null where there is no normal.
+    #[schema(value_type = Vec<Option<f64>>)]
+    values: Array,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// The Laplace–Beltrami operator as a matrix.
+#[derive(Serialize, ToSchema)]
+pub struct LaplaceBeltramiMatrixResponse {
+    /// Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
+    /// in general.
+    #[schema(value_type = Vec<Option<Vec<f64>>>)]
+    matrix: Array,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// Compute the Laplace–Beltrami operator
+///
+/// Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the signature function. On
+/// the unit circle Δ cos θ = −cos θ.
+#[utoipa::path(
+    post,
+    path = "/v1/laplace-beltrami",
+    operation_id = "compute_laplace_beltrami",
+    tag = "operators",
+    request_body = LaplaceBeltramiRequest,
+    responses((status = 200, description = "Δu at the queries", body = LaplaceBeltramiResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_laplace_beltrami(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<LaplaceBeltramiRequest>(app, owner, request).await
+}
+
+/// Assemble the Laplace–Beltrami matrix
+///
+/// The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square, or not.
+#[utoipa::path(
+    post,
+    path = "/v1/laplace-beltrami/matrix",
+    operation_id = "assemble_laplace_beltrami_matrix",
+    tag = "operators",
+    request_body = LaplaceBeltramiMatrixRequest,
+    responses((status = 200, description = "The matrix", body = LaplaceBeltramiMatrixResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn assemble_laplace_beltrami_matrix(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<LaplaceBeltramiMatrixRequest>(app, owner, request).await
+}
+
+impl Operation for LaplaceBeltramiRequest {
+    type Work = AppliedWork;
+    type Answer = LaplaceBeltramiResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
+        let fit = self.take_fit();
+        plan_applied(planner, fit, self.geometry, self.values, self.queries, |_| 1)
+    }
+
+    fn compute(
+        work: AppliedWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<LaplaceBeltramiResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let interpolant = fits.interpolant(&work.values, observer)?;
+        let values = laplace_beltrami(&geometry, &interpolant, &work.queries, observer)
+            .map_err(|error| fits.main.refused(error))?;
+        let m = geometry.n_queries();
+        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
+        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        Ok(LaplaceBeltramiResponse {
+            values: per_query(&geometry, values, &[m]),
+            degenerate: degenerate(&geometry),
+            diagnostics,
+        })
+    }
+}
+
+impl Operation for LaplaceBeltramiMatrixRequest {
+    type Work = MatrixWork;
+    type Answer = LaplaceBeltramiMatrixResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
+        let MatrixFormat::Dense = self.format.unwrap_or_default();
+        let fit = self.take_fit();
+        plan_matrix(planner, fit, self.geometry, self.queries, |_| 1)
+    }
+
+    fn compute(
+        work: MatrixWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let matrix = laplace_beltrami_matrix(&geometry, &fits.main.stored.factor, &work.queries, observer)
+            .map_err(|error| fits.main.refused(error))?;
+        let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
+        let diagnostics = work.diagnostics(fits, &signature, observer)?;
+        Ok(LaplaceBeltramiMatrixResponse {
+            matrix: per_query(&geometry, fits.main.unmerge(matrix), &shape),
+            degenerate: degenerate(&geometry),
+            diagnostics,
+        })
+    }
+}
+
+/// A checked request to apply an operator to values.
+pub struct AppliedWork {
+    pub values: Vec<f64>,
+    pub queries: Arc<Cloud>,
+}
+
+/// A checked request for an operator as a matrix.
+pub struct MatrixWork {
+    pub queries: Arc<Cloud>,
+}
+
+impl MatrixWork {
+    /// Without values, the quality of the main fit is that of Y = 1.
+    ///
+    /// # Errors
+    /// Those of the solve.
+    pub fn diagnostics(
+        &self,
+        fits: &Fits,
+        signature: &Interpolant,
+        observer: &JobObserver,
+    ) -> Result<Diagnostics, Problem> {
+        let m = self.queries.n_points();
+        let constant = match &fits.surface {
+            None => signature.clone(),
+            Some(_) => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
+        };
+        let mut diagnostics = fits.main.diagnostics(&constant.solution, m);
+        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        Ok(diagnostics)
+    }
+}
+
+/// Plans an operator applied to values, with so many numbers of answer per query.
+///
+/// # Errors
+/// A [`Problem`] with a pointer to the field.
+pub fn plan_applied(
+    planner: &Planner<'_>,
+    fit: Fit,
+    geometry: Option<Geometry>,
+    values: Vec<f64>,
+    queries: Option<Points>,
+    numbers_per_query: impl Fn(usize) -> usize,
+) -> Result<Plan<AppliedWork>, Problem> {
+    check_surface_choice(&geometry);
+    let (main, surface) = planner.fits(fit, geometry)?;
+    check_is_surface(&main.stored.cloud)?;
+    planner.check_values(&values, &main)?;
+    let queries = planner.queries(queries, &surface.stored)?;
+    let m = queries.n_points();
+    planner.check_answer(m.checked_mul(numbers_per_query(queries.dimension())))?;
+    let n = (main.fitted.n_points() + surface.fitted.n_points()) as f64;
+    let flops = 60.0 * n * (n + m as f64);
+    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries }, flops })
+}
+
+/// Plans an operator as a matrix, with so many rows per query.
+///
+/// # Errors
+/// A [`Problem`] with a pointer to the field.
+pub fn plan_matrix(
+    planner: &Planner<'_>,
+    fit: Fit,
+    geometry: Option<Geometry>,
+    queries: Option<Points>,
+    rows_per_query: impl Fn(usize) -> usize,
+) -> Result<Plan<MatrixWork>, Problem> {
+    check_surface_choice(&geometry);
+    let (main, surface) = planner.fits(fit, geometry)?;
+    check_is_surface(&main.stored.cloud)?;
+    let queries = planner.queries(queries, &surface.stored)?;
+    let n = main.stored.cloud.n_points();
+    let n_rows = queries.n_points().checked_mul(rows_per_query(queries.dimension()));
+    planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?;
+    let flops = 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64;
+    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries }, flops })
+}
+
+/// Every choice means the signature function.
+fn check_surface_choice(geometry: &Option<Geometry>) {
+    let chosen = geometry.as_ref().and_then(|geometry| geometry.surface).unwrap_or_default();
+    let (SurfaceChoice::Auto | SurfaceChoice::Signature) = chosen;
+}

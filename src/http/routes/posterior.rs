@@ -1,0 +1,217 @@
+//! `POST /v1/posterior`.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::app::App;
+use crate::http::array::Array;
+use crate::http::body::{Points, present};
+use crate::http::compute::JobObserver;
+use crate::http::fit::{FitPlan, Planner};
+use crate::http::fitted::Fits;
+use crate::http::operation::{Operation, Plan, serve};
+use crate::http::problem::Problem;
+use crate::http::responses::ComputeProblems;
+use crate::http::shared::{Diagnostics, Warning, WarningCode, request};
+use crate::numerics::cloud::Cloud;
+use crate::numerics::defaults::Purpose;
+use crate::numerics::jets::JetOrder;
+use crate::numerics::posterior::{Variances, covariance, log_marginal_likelihood, variances};
+use crate::numerics::regularization::Regularization;
+use crate::store::Owner;
+
+/// What may be asked of a posterior beside its mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PosteriorQuantity {
+    /// The variance of the latent function at each query.
+    Variance,
+    /// The variance of a new observation at each query: the latent one plus alpha.
+    ObservationVariance,
+    /// The covariance of the latent function between queries.
+    Covariance,
+    /// The gradient of the mean at each query.
+    Gradients,
+    /// The logarithm of the probability density of the values.
+    LogMarginalLikelihood,
+}
+
+request! {
+    /// Noisy values at the points of a cloud, and where the posterior is wanted.
+    pub struct PosteriorRequest {
+        /// The observed values at the points, in their order.
+        #[schema(min_items = 1)]
+        pub values: Vec<f64>,
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// What is wanted beside the mean; nothing if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<PosteriorQuantity>>,
+    }
+}
+
+/// The Gaussian process given the values.
+#[derive(Serialize, ToSchema)]
+pub struct PosteriorResponse {
+    /// The posterior mean at each query, unit of the values.
+    #[schema(value_type = Vec<f64>)]
+    means: Array,
+    /// The variance of the latent function at each query, no noise added, unit of the values squared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+    variances: Option<Array>,
+    /// The variance of a new observation at each query.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+    observation_variances: Option<Array>,
+    /// The covariance of the latent function between queries.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+    covariance: Option<Array>,
+    /// The gradient of the mean at each query, unit of the values per length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+    gradients: Option<Array>,
+    /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    log_marginal_likelihood: Option<f64>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// Compute the Gaussian process posterior
+///
+/// With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
+/// queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+#[utoipa::path(
+    post,
+    path = "/v1/posterior",
+    operation_id = "compute_posterior",
+    tag = "values",
+    request_body = PosteriorRequest,
+    responses((status = 200, description = "The posterior at the queries", body = PosteriorResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_posterior(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<PosteriorRequest>(app, owner, request).await
+}
+
+/// A checked request.
+pub struct Work {
+    values: Vec<f64>,
+    queries: Arc<Cloud>,
+    include: Vec<PosteriorQuantity>,
+}
+
+impl Work {
+    fn wants(&self, quantity: PosteriorQuantity) -> bool {
+        self.include.contains(&quantity)
+    }
+}
+
+impl Operation for PosteriorRequest {
+    type Work = Work;
+    type Answer = PosteriorResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let main = planner.fit(self.take_fit(), Purpose::Values)?;
+        planner.check_values(&self.values, &main)?;
+        let queries = planner.queries(self.queries, &main.stored)?;
+        let work = Work { values: self.values, queries, include: self.include.unwrap_or_default() };
+        check_observation_noise(&work, &main)?;
+        let (n, m, d) = (main.fitted.n_points(), work.queries.n_points(), work.queries.dimension());
+        let has_covariance = work.wants(PosteriorQuantity::Covariance);
+        planner.check_answer(m.checked_mul(d + 3 + if has_covariance { m } else { 0 }))?;
+        let whitened = has_covariance
+            || work.wants(PosteriorQuantity::Variance)
+            || work.wants(PosteriorQuantity::ObservationVariance);
+        let (nf, mf) = (n as f64, m as f64);
+        let flops = 40.0 * nf * (nf + mf)
+            + if whitened { nf * nf * mf } else { 0.0 }
+            + if has_covariance { nf * mf * mf } else { 0.0 };
+        Ok(Plan { main, surface: None, work, flops })
+    }
+
+    fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
+        use PosteriorQuantity as Q;
+        let refused = |error| fits.main.refused(error);
+        let interpolant = fits.interpolant(&work.values, observer)?;
+        let (factor, queries) = (&interpolant.factor, &work.queries);
+        let order = if work.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value };
+        let jets = interpolant.at(queries, order, observer).map_err(refused)?;
+        let (m, d) = (jets.n_queries(), jets.dimension());
+        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
+        let wants_variances = work.wants(Q::Variance) || work.wants(Q::ObservationVariance);
+        let latent = match wants_variances {
+            false => None,
+            true => Some(variances(factor, queries, observer).map_err(refused)?),
+        };
+        if let Some(latent) = &latent {
+            warn_of_clamping(latent, &mut diagnostics);
+        }
+        let covariance = match work.wants(Q::Covariance) {
+            false => None,
+            true => Some(covariance(factor, queries, observer).map_err(refused)?),
+        };
+        let log_marginal_likelihood = match work.wants(Q::LogMarginalLikelihood) {
+            false => None,
+            true => {
+                let values = fits.main.merged(&work.values);
+                Some(log_marginal_likelihood(factor, &interpolant.solution, &values).map_err(refused)?)
+            }
+        };
+        let alpha = factor.regularization().at(0);
+        let of_latent = |quantity, noise: f64| {
+            let latent = latent.as_ref().filter(|_| work.wants(quantity))?;
+            Some(Array::new(latent.latent.iter().map(|v| v + noise).collect(), &[m]))
+        };
+        Ok(PosteriorResponse {
+            means: Array::new(jets.values(), &[m]),
+            variances: of_latent(Q::Variance, 0.0),
+            observation_variances: of_latent(Q::ObservationVariance, alpha),
+            covariance: covariance.map(|covariance| Array::new(covariance, &[m, m])),
+            gradients: work.wants(Q::Gradients).then(|| {
+                Array::new((0..m).flat_map(|query| jets.gradient(query).to_vec()).collect(), &[m, d])
+            }),
+            log_marginal_likelihood,
+            diagnostics,
+        })
+    }
+}
+
+/// A new observation's noise is only known if it is the same everywhere.
+fn check_observation_noise(work: &Work, plan: &FitPlan) -> Result<(), Problem> {
+    let wants = work.wants(PosteriorQuantity::ObservationVariance);
+    match plan.regularization {
+        Regularization::PerPoint(_) if wants => {
+            let detail =
+                "observation_variance needs alpha: with noise_variances the noise at queries is unknown";
+            Err(Problem::invalid_request("/include", detail))
+        }
+        Regularization::PerPoint(_) | Regularization::Uniform(_) => Ok(()),
+    }
+}
+
+fn warn_of_clamping(variances: &Variances, diagnostics: &mut Diagnostics) {
+    let Some(first) = variances.clamped.first() else { return };
+    let count = variances.clamped.len();
+    diagnostics.warnings.push(Warning {
+        code: WarningCode::VarianceClamped,
+        detail: format!(
+            "{count} variances came out negative within rounding, first at query {first}; served as 0"
+        ),
+    });
+}

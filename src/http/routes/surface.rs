@@ -1,0 +1,246 @@
+//! `POST /v1/normals` and `POST /v1/curvatures`: the geometry of the surface that a cloud samples.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::app::App;
+use crate::http::array::Array;
+use crate::http::body::{Points, present};
+use crate::http::compute::JobObserver;
+use crate::http::fit::Planner;
+use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::operation::{Operation, Plan, serve};
+use crate::http::problem::Problem;
+use crate::http::responses::ComputeProblems;
+use crate::http::shared::{
+    Degenerate, Diagnostics, Fit, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+};
+use crate::http::slug::Slug;
+use crate::numerics::cloud::Cloud;
+use crate::numerics::defaults::Purpose;
+use crate::store::Owner;
+
+request! {
+    /// A cloud that samples a closed hypersurface, and where its normals are wanted.
+    pub struct NormalsRequest {
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// Which function's level surface is meant.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub surface: Option<SurfaceChoice>,
+        /// Which way normals point; `outward` if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub orientation: Option<OrientationChoice>,
+    }
+}
+
+request! {
+    /// A cloud that samples a closed hypersurface, and where its curvatures are wanted.
+    pub struct CurvaturesRequest {
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// Which function's level surface is meant.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub surface: Option<SurfaceChoice>,
+        /// Which way normals point, and with them the sign of curvatures; `outward` if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub orientation: Option<OrientationChoice>,
+    }
+}
+
+/// Unit normals of the surface at the queries.
+#[derive(Serialize, ToSchema)]
+pub struct NormalsResponse {
+    /// The normal at each query, of length 1; null where the gradient vanishes.
+    #[schema(value_type = Vec<Option<Vec<f64>>>)]
+    normals: Array,
+    /// |∇u| at each query, 1/length.
+    #[schema(value_type = Vec<f64>)]
+    gradient_norms: Array,
+    /// u at each query: 1 on the surface, above it inside a closed one.
+    #[schema(value_type = Vec<f64>)]
+    levels: Array,
+    /// The function whose level surface was used at each query.
+    surfaces: Vec<SurfaceUsed>,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// Curvatures of the surface at the queries.
+#[derive(Serialize, ToSchema)]
+pub struct CurvaturesResponse {
+    /// The d − 1 principal curvatures at each query, ascending, 1/length; null where the gradient vanishes.
+    #[schema(value_type = Vec<Option<Vec<f64>>>)]
+    principal_curvatures: Array,
+    /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
+    #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
+    principal_directions: Array,
+    /// Their average at each query, 1/length.
+    #[schema(value_type = Vec<Option<f64>>)]
+    mean_curvatures: Array,
+    /// Their product at each query, 1/length to the d − 1.
+    #[schema(value_type = Vec<Option<f64>>)]
+    gaussian_curvatures: Array,
+    /// The normal at each query, of length 1.
+    #[schema(value_type = Vec<Option<Vec<f64>>>)]
+    normals: Array,
+    /// |∇u| at each query, 1/length.
+    #[schema(value_type = Vec<f64>)]
+    gradient_norms: Array,
+    /// u at each query: 1 on the surface, above it inside a closed one.
+    #[schema(value_type = Vec<f64>)]
+    levels: Array,
+    /// The function whose level surface was used at each query.
+    surfaces: Vec<SurfaceUsed>,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// Compute normals
+///
+/// The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the interpolant of the
+/// constant 1. The cloud needs no mesh and no neighbourhoods.
+#[utoipa::path(
+    post,
+    path = "/v1/normals",
+    operation_id = "compute_normals",
+    tag = "geometry",
+    request_body = NormalsRequest,
+    responses((status = 200, description = "Normals at the queries", body = NormalsResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_normals(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<NormalsRequest>(app, owner, request).await
+}
+
+/// Compute curvatures
+///
+/// Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator S = σPD²uP/|∇u| of
+/// the level surface of the signature function u. A sphere of radius r has curvatures +1/r with outward normals.
+#[utoipa::path(
+    post,
+    path = "/v1/curvatures",
+    operation_id = "compute_curvatures",
+    tag = "geometry",
+    request_body = CurvaturesRequest,
+    responses((status = 200, description = "Curvatures at the queries", body = CurvaturesResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_curvatures(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<CurvaturesRequest>(app, owner, request).await
+}
+
+/// A checked request of either kind.
+pub struct Work {
+    queries: Arc<Cloud>,
+    orientation: OrientationChoice,
+}
+
+impl Operation for NormalsRequest {
+    type Work = Work;
+    type Answer = NormalsResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let (SurfaceChoice::Auto | SurfaceChoice::Signature) = self.surface.unwrap_or_default();
+        let fit = self.take_fit();
+        plan(planner, fit, self.queries, self.orientation, Purpose::Normals, |d| d + 2)
+    }
+
+    fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<NormalsResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, work.orientation, observer)?;
+        let (m, d) = (geometry.n_queries(), geometry.dimension());
+        Ok(NormalsResponse {
+            normals: per_query(&geometry, geometry.normals().to_vec(), &[m, d]),
+            gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
+            levels: Array::new(geometry.levels(), &[m]),
+            surfaces: vec![SurfaceUsed::Signature; m],
+            degenerate: degenerate(&geometry),
+            diagnostics: fits.surface().diagnostics(&signature.solution, m),
+        })
+    }
+}
+
+impl Operation for CurvaturesRequest {
+    type Work = Work;
+    type Answer = CurvaturesResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let (SurfaceChoice::Auto | SurfaceChoice::Signature) = self.surface.unwrap_or_default();
+        let fit = self.take_fit();
+        plan(planner, fit, self.queries, self.orientation, Purpose::Curvatures, |d| d * d + d + 3)
+    }
+
+    fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<CurvaturesResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, work.orientation, observer)?;
+        let (m, d) = (geometry.n_queries(), geometry.dimension());
+        let curvatures = geometry.curvatures();
+        Ok(CurvaturesResponse {
+            principal_curvatures: per_query(&geometry, curvatures.principal, &[m, d - 1]),
+            principal_directions: per_query(&geometry, curvatures.directions, &[m, d - 1, d]),
+            mean_curvatures: per_query(&geometry, curvatures.mean, &[m]),
+            gaussian_curvatures: per_query(&geometry, curvatures.gaussian, &[m]),
+            normals: per_query(&geometry, geometry.normals().to_vec(), &[m, d]),
+            gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
+            levels: Array::new(geometry.levels(), &[m]),
+            surfaces: vec![SurfaceUsed::Signature; m],
+            degenerate: degenerate(&geometry),
+            diagnostics: fits.surface().diagnostics(&signature.solution, m),
+        })
+    }
+}
+
+fn plan(
+    planner: &Planner<'_>,
+    fit: Fit,
+    queries: Option<Points>,
+    orientation: Option<OrientationChoice>,
+    purpose: Purpose,
+    numbers_per_query: impl Fn(usize) -> usize,
+) -> Result<Plan<Work>, Problem> {
+    let main = planner.fit(fit, purpose)?;
+    check_is_surface(&main.stored.cloud)?;
+    let queries = planner.queries(queries, &main.stored)?;
+    let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
+    planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
+    let flops = 60.0 * (n as f64) * (m + n) as f64;
+    Ok(Plan {
+        main,
+        surface: None,
+        work: Work { queries, orientation: orientation.unwrap_or_default() },
+        flops,
+    })
+}
+
+/// Refuses geometry in dimension 1 before anything is computed.
+pub(super) fn check_is_surface(cloud: &Cloud) -> Result<(), Problem> {
+    if cloud.dimension() >= 2 {
+        return Ok(());
+    }
+    let detail = "the geometry of a hypersurface needs points of dimension 2 or more, found 1";
+    Err(Problem::of_field(Slug::InvalidCloud, "/cloud/points", detail))
+}

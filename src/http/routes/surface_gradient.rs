@@ -1,0 +1,176 @@
+//! `POST /v1/surface-gradient` and `POST /v1/surface-gradient/matrix`.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::laplace_beltrami::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use crate::app::App;
+use crate::http::array::Array;
+use crate::http::body::{Points, present, present_object};
+use crate::http::compute::JobObserver;
+use crate::http::fit::Planner;
+use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::operation::{Operation, Plan, serve};
+use crate::http::problem::Problem;
+use crate::http::responses::ComputeProblems;
+use crate::http::shared::{Degenerate, Diagnostics, Geometry, OrientationChoice, request};
+use crate::numerics::operators::{surface_gradient, surface_gradient_matrices};
+use crate::store::Owner;
+
+request! {
+    /// Values on a surface, and where their surface gradient is wanted.
+    pub struct SurfaceGradientRequest {
+        /// The values at the points of `cloud`, in their order.
+        #[schema(min_items = 1)]
+        pub values: Vec<f64>,
+        /// Where answers are wanted; the points of the surface's cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where its fit differs from that of the values.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+    }
+}
+
+request! {
+    /// A cloud of nodes on a surface, and where rows of its surface gradient matrices are wanted.
+    pub struct SurfaceGradientMatrixRequest {
+        /// Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where its fit differs from that of the values.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+    }
+}
+
+/// Surface gradients at the queries.
+#[derive(Serialize, ToSchema)]
+pub struct SurfaceGradientResponse {
+    /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
+    #[schema(value_type = Vec<Option<Vec<f64>>>)]
+    gradients: Array,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// The surface gradient as matrices.
+#[derive(Serialize, ToSchema)]
+pub struct SurfaceGradientMatrixResponse {
+    /// One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
+    /// is no normal.
+    #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
+    matrices: Array,
+    /// The queries where geometry has no meaning.
+    degenerate: Vec<Degenerate>,
+    /// How the answer came about.
+    diagnostics: Diagnostics,
+}
+
+/// Compute surface gradients
+///
+/// The tangential part of the gradient of the function through the values, on the level surface of the signature function.
+#[utoipa::path(
+    post,
+    path = "/v1/surface-gradient",
+    operation_id = "compute_surface_gradient",
+    tag = "operators",
+    request_body = SurfaceGradientRequest,
+    responses((status = 200, description = "Surface gradients at the queries", body = SurfaceGradientResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_surface_gradient(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<SurfaceGradientRequest>(app, owner, request).await
+}
+
+/// Assemble surface gradient matrices
+///
+/// One matrix per coordinate that turns values at the nodes into that component of the surface gradient at the queries.
+#[utoipa::path(
+    post,
+    path = "/v1/surface-gradient/matrix",
+    operation_id = "assemble_surface_gradient_matrix",
+    tag = "operators",
+    request_body = SurfaceGradientMatrixRequest,
+    responses((status = 200, description = "The matrices", body = SurfaceGradientMatrixResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn assemble_surface_gradient_matrix(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<SurfaceGradientMatrixRequest>(app, owner, request).await
+}
+
+impl Operation for SurfaceGradientRequest {
+    type Work = AppliedWork;
+    type Answer = SurfaceGradientResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
+        let fit = self.take_fit();
+        plan_applied(planner, fit, self.geometry, self.values, self.queries, |d| d)
+    }
+
+    fn compute(
+        work: AppliedWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<SurfaceGradientResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let interpolant = fits.interpolant(&work.values, observer)?;
+        let gradients = surface_gradient(&geometry, &interpolant, &work.queries, observer)
+            .map_err(|error| fits.main.refused(error))?;
+        let (m, d) = (geometry.n_queries(), geometry.dimension());
+        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
+        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        Ok(SurfaceGradientResponse {
+            gradients: per_query(&geometry, gradients, &[m, d]),
+            degenerate: degenerate(&geometry),
+            diagnostics,
+        })
+    }
+}
+
+impl Operation for SurfaceGradientMatrixRequest {
+    type Work = MatrixWork;
+    type Answer = SurfaceGradientMatrixResponse;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
+        let fit = self.take_fit();
+        plan_matrix(planner, fit, self.geometry, self.queries, |d| d)
+    }
+
+    fn compute(
+        work: MatrixWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<SurfaceGradientMatrixResponse, Problem> {
+        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let matrices =
+            surface_gradient_matrices(&geometry, &fits.main.stored.factor, &work.queries, observer)
+                .map_err(|error| fits.main.refused(error))?;
+        let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
+        let diagnostics = work.diagnostics(fits, &signature, observer)?;
+        Ok(SurfaceGradientMatrixResponse {
+            matrices: Array::new(fits.main.unmerge(matrices), &shape).with_nulls(1, geometry.is_degenerate()),
+            degenerate: degenerate(&geometry),
+            diagnostics,
+        })
+    }
+}

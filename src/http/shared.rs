@@ -1,0 +1,313 @@
+//! The objects that requests and answers share: CloudRef, Kernel, Fit, Geometry, Diagnostics, Degenerate.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::body::{Points, present, present_object};
+
+/// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CloudRef {
+    /// The id of a registered cloud, 64 hexadecimal digits.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, pattern = "^[0-9a-f]{64}$")]
+    pub id: Option<String>,
+    /// The points, one row of coordinates each, all of the same length; the cloud is registered with them.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    pub points: Option<Points>,
+    /// Normals at the points, one row each, with `points` only.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    pub normals: Option<Points>,
+}
+
+/// The families of kernels; `GET /v1/kernels` has their formulas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelFamily {
+    Gauss,
+    Laplace,
+    Matern,
+    Wendland,
+    InverseMultiquadric,
+}
+
+/// A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Kernel {
+    /// The family, which determines φ.
+    pub family: KernelFamily,
+    /// The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub length_scale: Option<f64>,
+    /// The factor of φ, unit of the values squared; 1 if absent.
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub variance: Option<f64>,
+    /// laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0)]
+    pub epsilon: Option<f64>,
+    /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.5, maximum = 8.5)]
+    pub nu: Option<f64>,
+    /// wendland: 2, 4 or 6 times differentiable; 4 if absent.
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 2, maximum = 6)]
+    pub smoothness: Option<u8>,
+}
+
+/// How the linear system is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverChoice {
+    /// The service chooses.
+    #[default]
+    Auto,
+    /// Cholesky factorization of the full matrix: n³/3 flops, 8n² bytes.
+    Dense,
+}
+
+/// What to do with points that coincide when alpha is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DuplicatePolicy {
+    /// Answer 422 `duplicate-points`.
+    #[default]
+    Refuse,
+    /// Average their values; columns of matrices split the weight equally.
+    Merge,
+}
+
+/// Which function's level surface is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceChoice {
+    /// The service chooses.
+    #[default]
+    Auto,
+    /// The interpolant of the constant 1.
+    Signature,
+}
+
+/// The function whose level surface was used at a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceUsed {
+    /// The interpolant of the constant 1.
+    Signature,
+}
+
+/// Which way normals point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OrientationChoice {
+    /// Against the gradient of the signature function, which is out of closed surfaces while the length scale is not small
+    /// against their features. A sphere has positive curvatures.
+    #[default]
+    Outward,
+    /// Along the gradient of the signature function.
+    Gradient,
+}
+
+/// The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as in
+/// the request.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Geometry {
+    /// The cloud whose level surface carries the operator.
+    #[serde(default, deserialize_with = "present_object")]
+    #[schema(nullable = false)]
+    pub cloud: Option<CloudRef>,
+    /// The kernel of its signature function.
+    #[serde(default, deserialize_with = "present_object")]
+    #[schema(nullable = false)]
+    pub kernel: Option<Kernel>,
+    /// Added to the diagonal of its Gram matrix.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, minimum = 0.0)]
+    pub alpha: Option<f64>,
+    /// One entry per point of its cloud, instead of `alpha`.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, min_items = 1)]
+    pub noise_variances: Option<Vec<f64>>,
+    /// How its linear system is solved.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false)]
+    pub solver: Option<SolverChoice>,
+    /// Which function's level surface is meant.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false)]
+    pub surface: Option<SurfaceChoice>,
+}
+
+/// The fields of a request that determine its fit, taken out of it.
+#[derive(Debug, Default)]
+pub struct Fit {
+    pub cloud: CloudRef,
+    pub kernel: Option<Kernel>,
+    pub alpha: Option<f64>,
+    pub noise_variances: Option<Vec<f64>>,
+    pub solver: SolverChoice,
+    pub duplicates: DuplicatePolicy,
+}
+
+/// Declares a request: the fields of a fit, which stand directly in it, and its own.
+macro_rules! request {
+    (
+        $(#[$meta:meta])*
+        pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)* }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, serde::Deserialize, utoipa::ToSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            /// The points where values are known, or that sample the surface.
+            #[serde(deserialize_with = "crate::http::body::object")]
+            pub cloud: $crate::http::shared::CloudRef,
+            /// The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+            #[serde(default, deserialize_with = "crate::http::body::present_object")]
+            #[schema(nullable = false)]
+            pub kernel: Option<$crate::http::shared::Kernel>,
+            /// Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+            /// of the noise regresses. 1e-10 if absent with a kernel given.
+            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[schema(nullable = false, minimum = 0.0)]
+            pub alpha: Option<f64>,
+            /// The variance of the noise at each point, instead of `alpha`.
+            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[schema(nullable = false, min_items = 1)]
+            pub noise_variances: Option<Vec<f64>>,
+            /// How the linear system is solved.
+            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[schema(nullable = false)]
+            pub solver: Option<$crate::http::shared::SolverChoice>,
+            /// What to do with points that coincide when alpha is 0.
+            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[schema(nullable = false)]
+            pub duplicates: Option<$crate::http::shared::DuplicatePolicy>,
+            $($(#[$field_meta])* pub $field: $type,)*
+        }
+
+        impl $name {
+            /// Takes the fields of the fit out.
+            fn take_fit(&mut self) -> $crate::http::shared::Fit {
+                $crate::http::shared::Fit {
+                    cloud: std::mem::take(&mut self.cloud),
+                    kernel: self.kernel.take(),
+                    alpha: self.alpha,
+                    noise_variances: self.noise_variances.take(),
+                    solver: self.solver.unwrap_or_default(),
+                    duplicates: self.duplicates.unwrap_or_default(),
+                }
+            }
+        }
+    };
+}
+pub(crate) use request;
+
+/// How the Gram matrix was factorized.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FactorizationUsed {
+    /// Cholesky, exact up to rounding.
+    Cholesky,
+    /// Rank-revealing pivoted Cholesky and least squares on its pivots, where Cholesky fails in float64.
+    PivotedCholesky,
+}
+
+/// The solver that was used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverUsed {
+    /// A factorization of the full matrix.
+    Dense,
+}
+
+/// What a warning is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WarningCode {
+    /// Digits of the weights are lost: their relative error may reach machine precision over the reciprocal condition.
+    IllConditioned,
+    /// A step of iterative refinement reduced the residual.
+    Refined,
+    /// Points that coincide were merged.
+    DuplicatesMerged,
+    /// Variances that came out negative within rounding are served as 0.
+    VarianceClamped,
+}
+
+/// Something that was changed, or that limits the accuracy of the answer.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Warning {
+    /// What it is about.
+    pub code: WarningCode,
+    /// The same in words, with numbers.
+    pub detail: String,
+}
+
+/// What an answer says of itself: the numbers used, how the system was solved, and how well.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Diagnostics {
+    /// The id of the cloud, to refer to it in later requests.
+    pub cloud_id: String,
+    /// Points of the cloud, n.
+    pub n_points: usize,
+    /// Queries answered, m.
+    pub n_queries: usize,
+    /// Coordinates of each point, d.
+    pub dimension: usize,
+    /// The kernel used, in full.
+    pub kernel: Kernel,
+    /// What was added to the diagonal; absent with `noise_variances`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub alpha: Option<f64>,
+    /// The solver used.
+    pub solver: SolverUsed,
+    /// How the matrix was factorized.
+    pub factorization: FactorizationUsed,
+    /// Numerical rank of the matrix.
+    pub rank: usize,
+    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
+    pub reciprocal_condition: f64,
+    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+    pub relative_residual: f64,
+    /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+    pub native_norm_squared: f64,
+    /// |u(X) − Y|, unit of the values.
+    pub misfit: f64,
+    /// Points that were merged into an earlier one.
+    pub n_merged_duplicates: usize,
+    /// What was changed or limits the accuracy.
+    pub warnings: Vec<Warning>,
+    /// The same for the fit of the surface, in answers about values on a surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, no_recursion)]
+    pub geometry: Option<Box<Diagnostics>>,
+}
+
+/// Why a query is degenerate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DegenerateReason {
+    /// The gradient of the signature function vanishes, so that there is no normal: the entry is null.
+    VanishingGradient,
+}
+
+/// A query where geometry has no meaning.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Degenerate {
+    /// The position of the query.
+    pub query: usize,
+    /// Why.
+    pub reason: DegenerateReason,
+    /// |∇u| there, 1/length.
+    pub gradient_norm: f64,
+}
