@@ -1,0 +1,131 @@
+//! A server under test and a client for it.
+
+use std::net::SocketAddr;
+
+use clap::Parser;
+use gramian::app::App;
+use gramian::config::Config;
+use gramian::server::serve;
+use serde_json::{Value, json};
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
+
+/// A server on a port of its own, in this process; it drains when dropped.
+pub struct Server {
+    pub address: SocketAddr,
+    pub client: reqwest::Client,
+    _stop: oneshot::Sender<()>,
+}
+
+/// Flags as on the command line, so that tests configure what users configure.
+#[derive(Parser)]
+struct Flags {
+    #[command(flatten)]
+    config: Config,
+}
+
+/// An answer, read to its end.
+pub struct Answer {
+    pub status: u16,
+    pub headers: reqwest::header::HeaderMap,
+    pub text: String,
+}
+
+impl Answer {
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.text).unwrap_or_else(|error| panic!("{error}: {}", self.text))
+    }
+
+    pub fn header(&self, name: &str) -> &str {
+        self.headers.get(name).map_or("", |value| value.to_str().unwrap())
+    }
+
+    /// The answer of a request that must have succeeded.
+    pub fn expect_ok(self) -> Value {
+        assert_eq!(self.status, 200, "{}", self.text);
+        self.json()
+    }
+
+    /// The document of a problem, checked for what every problem has.
+    pub fn expect_problem(&self, status: u16, slug: &str) -> Value {
+        let document = self.json();
+        assert_eq!(
+            (self.status, &document["type"]),
+            (status, &json!(format!("/problems/{slug}"))),
+            "{}",
+            self.text
+        );
+        assert_eq!(self.header("content-type"), "application/problem+json");
+        assert_eq!(document["status"], json!(status));
+        assert_eq!(document["instance"], json!(self.header("x-request-id")));
+        assert!(document["title"].is_string() && document["detail"].is_string());
+        document
+    }
+}
+
+impl Server {
+    pub async fn start() -> Self {
+        Self::with_flags(&[]).await
+    }
+
+    pub async fn with_flags(flags: &[&str]) -> Self {
+        let config = Flags::parse_from(["gramian"].iter().chain(flags)).config;
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let (stop, stopped) = oneshot::channel::<()>();
+        let stop_signal = async move {
+            stopped.await.ok();
+        };
+        tokio::spawn(serve(App::new(config).unwrap(), listener, stop_signal));
+        Self { address, client: reqwest::Client::new(), _stop: stop }
+    }
+
+    pub fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+
+    pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
+        let response = request.send().await.unwrap();
+        Answer {
+            status: response.status().as_u16(),
+            headers: response.headers().clone(),
+            text: response.text().await.unwrap(),
+        }
+    }
+
+    pub async fn get(&self, path: &str) -> Answer {
+        self.send(self.client.get(self.url(path))).await
+    }
+
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        self.send(self.client.post(self.url(path)).json(body)).await
+    }
+
+    /// A body as it is, announced as JSON.
+    pub async fn post_text(&self, path: &str, body: impl Into<reqwest::Body>) -> Answer {
+        let request = self.client.post(self.url(path)).header("content-type", "application/json");
+        self.send(request.body(body)).await
+    }
+}
+
+/// n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i.
+pub fn fibonacci_sphere(n: usize) -> Vec<[f64; 3]> {
+    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    (0..n)
+        .map(|i| {
+            let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+            let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
+            [r * t.cos(), r * t.sin(), z]
+        })
+        .collect()
+}
+
+/// All numbers of nested arrays, in order; nulls are passed over.
+pub fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        Value::Number(number) => vec![number.as_f64().unwrap()],
+        Value::Null => vec![],
+        other => panic!("no number: {other}"),
+    }
+}
