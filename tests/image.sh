@@ -14,7 +14,7 @@ set -euo pipefail
 
 readonly image=localhost/gramian:test
 readonly container=gramian
-readonly needed_gib=8
+readonly needed_gib=4
 readonly ready_seconds=30
 readonly stop_seconds=5
 

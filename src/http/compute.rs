@@ -151,7 +151,7 @@ impl StageTimes {
     fn of(&mut self, stage: Stage) -> &mut Duration {
         match stage {
             Stage::Gram => &mut self.gram,
-            Stage::Factor => &mut self.factor,
+            Stage::Factor | Stage::Condition => &mut self.factor,
             Stage::Solve => &mut self.solve,
             Stage::Evaluate => &mut self.evaluate,
         }

@@ -7,8 +7,10 @@ use super::error::NumericsError;
 pub enum Stage {
     /// Assembly of the Gram matrix.
     Gram,
-    /// Its factorization and condition estimate.
+    /// Its factorization.
     Factor,
+    /// The estimate of its condition.
+    Condition,
     /// Solves with the factor.
     Solve,
     /// Sums over the cloud at the queries, and what is derived from them.

@@ -20,19 +20,15 @@ pub(super) fn profile<S: Simd, const P: usize>(q: f64) -> [f64; 3] {
     let s = if s > FAR { FAR } else { s };
     let s_squared = s * s;
     let inverse = 1.0 / s;
-    // theta[p + 2] is θ_p, from θ_p = (2p − 1) θ_{p−1} + s² θ_{p−2}.
-    let mut theta = [0.0; 11];
-    theta[0] = (1.0 + s) * inverse * inverse * inverse;
-    theta[1] = inverse;
-    theta[2] = 1.0;
-    theta[3] = 1.0 + s;
+    // θ_{p−2}, θ_{p−1}, θ_p, raised one by one by θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}. Three numbers and no array: an array
+    // would keep the compiler from vectorising the loop around this (0.04 against 0.5 G pairs/s).
+    let (mut lowest, mut lower, mut theta) = ((1.0 + s) * inverse * inverse * inverse, inverse, 1.0);
     let mut at_zero = 1.0;
-    for p in 2..=P {
-        theta[p + 2] = fma::<S>((2 * p - 1) as f64, theta[p + 1], s_squared * theta[p]);
-    }
-    for p in 1..=P {
-        at_zero *= (2 * p - 1) as f64;
+    for p in 0..P {
+        let odd = (2 * p + 1) as f64;
+        (lowest, lower, theta) = (lower, theta, fma::<S>(odd, theta, s_squared * lower));
+        at_zero *= odd;
     }
     let e = exp_nonpositive::<S>(-s) * (1.0 / at_zero);
-    [e * theta[P + 2], -nu * e * theta[P + 1], nu * nu * e * theta[P]]
+    [e * theta, -nu * e * lower, nu * nu * e * lowest]
 }

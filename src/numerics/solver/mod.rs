@@ -84,8 +84,8 @@ impl GramFactor {
         let mut gram = Cholesky::allocate(cloud.n_points());
         let stride = gram.stride();
         fill_lower_gram(&cloud, &kernel, &regularization, gram.buffer_mut(), stride, observer)?;
-        observer.enter(Stage::Factor);
         let norm1 = gram.norm1();
+        observer.enter(Stage::Factor);
         let factorization = match gram.factorize(observer)? {
             Ok(factor) => Factorization::Cholesky(factor),
             Err(failed_at) => {
@@ -93,6 +93,7 @@ impl GramFactor {
                 Factorization::PivotedCholesky { factor, failed_at }
             }
         };
+        observer.enter(Stage::Condition);
         let mut this =
             Self { cloud, kernel, regularization, factorization, norm1, reciprocal_condition: 0.0 };
         let inverse_norm1 = estimate_norm1(
