@@ -3,6 +3,9 @@
 //! Layers, arrows pointing down: [`server`] → [`http`] → [`store`] → [`numerics`]. `numerics` is pure: f64 in, f64 out. Only
 //! `http` knows status codes and JSON. ARCHITECTURE.md has the map.
 
+// A request must never bring a thread down; tests may.
+#![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable))]
+
 pub mod numerics;
 pub mod store;
 

@@ -7,7 +7,7 @@ pub mod compute;
 mod fit;
 mod fitted;
 mod middleware;
-mod openapi;
+pub mod openapi;
 mod operation;
 pub mod problem;
 mod responses;
@@ -81,6 +81,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     let (v1, mut document) = v1.split_for_parts();
     let (probes, of_probes) = probes.split_for_parts();
     document.merge(of_probes);
+    openapi::add_examples(&mut document);
     (v1, probes, document)
 }
 

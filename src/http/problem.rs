@@ -16,6 +16,13 @@ const MAX_POINT_INDICES: usize = 1000;
 pub struct Problem {
     slug: Slug,
     detail: String,
+    /// Boxed, since every fallible function carries a problem and few have these.
+    members: Box<Members>,
+}
+
+/// The members that only some problems have.
+#[derive(Debug, Clone, Default)]
+struct Members {
     errors: Vec<FieldError>,
     minimum_alpha: Option<f64>,
     point_indices: Vec<usize>,
@@ -91,16 +98,7 @@ impl Place {
 
 impl Problem {
     pub fn new(slug: Slug, detail: impl Into<String>) -> Self {
-        Self {
-            slug,
-            detail: detail.into(),
-            errors: Vec::new(),
-            minimum_alpha: None,
-            point_indices: Vec::new(),
-            limit: None,
-            required: None,
-            retry_after_seconds: None,
-        }
+        Self { slug, detail: detail.into(), members: Box::default() }
     }
 
     /// A problem of one field; its detail is the field's.
@@ -126,15 +124,15 @@ impl Problem {
     pub fn too_large(slug: Slug, what: &str, limit: usize, required: Option<usize>) -> Self {
         let needed = required.map(|n| format!(", this request has {n}")).unwrap_or_default();
         let mut problem = Self::new(slug, format!("at most {limit} {what} are served{needed}"));
-        problem.limit = Some(limit as u64);
-        problem.required = required.map(|n| n as u64);
+        problem.members.limit = Some(limit as u64);
+        problem.members.required = required.map(|n| n as u64);
         problem
     }
 
     pub fn overloaded(retry_after_seconds: u64) -> Self {
         let detail = format!("all places in the queue are taken; try again in {retry_after_seconds} s");
         let mut problem = Self::new(Slug::Overloaded, detail);
-        problem.retry_after_seconds = Some(retry_after_seconds);
+        problem.members.retry_after_seconds = Some(retry_after_seconds);
         problem
     }
 
@@ -145,7 +143,7 @@ impl Problem {
 
     /// Adds a field with this problem's detail.
     pub fn at(mut self, pointer: impl Into<String>) -> Self {
-        self.errors.push(FieldError { pointer: pointer.into(), detail: self.detail.clone() });
+        self.members.errors.push(FieldError { pointer: pointer.into(), detail: self.detail.clone() });
         self
     }
 
@@ -190,21 +188,21 @@ impl Problem {
                 );
                 let mut problem = Self::new(Slug::DuplicatePoints, remedy);
                 for point in points.iter().take(10) {
-                    problem.errors.push(FieldError {
+                    problem.members.errors.push(FieldError {
                         pointer: place.pointer(&format!("/cloud/points/{point}")),
                         detail: "coincides with another point".to_owned(),
                     });
                 }
-                problem.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
+                problem.members.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
                 problem
             }
             E::NotPositiveDefinite { reason, minimum_alpha } => {
                 let remedy =
                     format!("{detail}; set alpha to {minimum_alpha:.1e} or more, or use a rougher kernel");
                 let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.pointer("/alpha"), remedy);
-                problem.minimum_alpha = Some(minimum_alpha);
+                problem.members.minimum_alpha = Some(minimum_alpha);
                 if let NotDefinite::NeedsCholesky { point } = reason {
-                    problem.point_indices = vec![point];
+                    problem.members.point_indices = vec![point];
                 }
                 problem
             }
@@ -226,11 +224,11 @@ impl Problem {
             status: self.slug.status().as_u16(),
             detail: &self.detail,
             instance: request_id,
-            errors: &self.errors,
-            minimum_alpha: self.minimum_alpha,
-            point_indices: &self.point_indices,
-            limit: self.limit,
-            required: self.required,
+            errors: &self.members.errors,
+            minimum_alpha: self.members.minimum_alpha,
+            point_indices: &self.members.point_indices,
+            limit: self.members.limit,
+            required: self.members.required,
         }
     }
 
@@ -240,7 +238,7 @@ impl Problem {
         let mut response = (self.slug.status(), body).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
-        if let Some(seconds) = self.retry_after_seconds {
+        if let Some(seconds) = self.members.retry_after_seconds {
             headers.insert(header::RETRY_AFTER, seconds.into());
         }
         if self.slug.status() == StatusCode::UNAUTHORIZED {
@@ -267,9 +265,9 @@ mod tests {
     fn pointers_lead_into_the_fit_that_failed() {
         let error = NumericsError::RaggedPoints { point: 17, expected: 3, found: 2 };
         let problem = Problem::from_numerics(error.clone(), Place::Request);
-        assert_eq!(problem.errors[0].pointer, "/cloud/points/17");
+        assert_eq!(problem.members.errors[0].pointer, "/cloud/points/17");
         let problem = Problem::from_numerics(error, Place::Geometry);
-        assert_eq!(problem.errors[0].pointer, "/geometry/cloud/points/17");
+        assert_eq!(problem.members.errors[0].pointer, "/geometry/cloud/points/17");
     }
 
     #[test]

@@ -46,10 +46,9 @@ fn rotate(a: &mut [f64], v: &mut [Vec<f64>], k: usize, p: usize, q: usize) -> bo
         a[at_p] = c * x - s * y;
         a[at_q] = s * x + c * y;
     }
-    for i in 0..k {
-        let (x, y) = (v[p][i], v[q][i]);
-        v[p][i] = c * x - s * y;
-        v[q][i] = s * x + c * y;
+    let (before, from_q) = v.split_at_mut(q);
+    for (x, y) in before[p].iter_mut().zip(&mut from_q[0]) {
+        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
     }
     true
 }

@@ -271,8 +271,8 @@ fn add_block<S: Simd, const ORDER: usize>(
     for a in 0..d {
         let mut row = [0.0; BLOCK];
         multiply(&mut row, &second, &differences[a]);
-        for b in a..d {
-            add_products::<S>(&mut sums[at], &row, &differences[b]);
+        for difference in &differences[a..] {
+            add_products::<S>(&mut sums[at], &row, difference);
             at += 1;
         }
     }

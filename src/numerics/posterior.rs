@@ -51,8 +51,7 @@ pub fn variances(
         for (k, column) in columns.chunks_exact(n).enumerate() {
             let query = variances.latent.len();
             let variance = k0 - dot(column, column);
-            // Negated, so that NaN is refused as well.
-            if !(variance >= 0.0) {
+            if variance.is_nan() || variance < 0.0 {
                 check_is_rounding(factor, &nodes, query, block.point(k), variance, observer)?;
                 variances.clamped.push(query);
             }

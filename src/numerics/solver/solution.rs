@@ -107,11 +107,10 @@ impl Candidate {
         let residual_max = norm_max(&self.residual);
         let scale = factor.norm1() * norm_max(&self.weights) + norm_max(values);
         let backward_error = if scale == 0.0 { 0.0 } else { residual_max / scale };
-        // Negated comparisons refuse NaN as well.
-        if !(relative_residual <= MAX_RELATIVE_RESIDUAL) {
+        if relative_residual.is_nan() || relative_residual > MAX_RELATIVE_RESIDUAL {
             return Err(factor.not_positive_definite(NotDefinite::Residual { relative_residual }));
         }
-        if !(backward_error <= MAX_BACKWARD_ERROR) {
+        if backward_error.is_nan() || backward_error > MAX_BACKWARD_ERROR {
             return Err(factor.not_positive_definite(NotDefinite::BackwardError { backward_error }));
         }
         let native_norm_squared = self.weights.iter().zip(&self.at_points).map(|(w, u)| w * u).sum();
