@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use crate::config::Config;
 use crate::http::auth::Keys;
 use crate::http::compute::Compute;
-use crate::http::problem::Problem;
+use crate::http::operation::FactorFailure;
 use crate::store::clouds::CloudStore;
 use crate::store::factors::FactorStore;
 
@@ -15,7 +15,7 @@ pub struct App {
     pub config: Config,
     pub keys: Keys,
     pub clouds: CloudStore,
-    pub factors: FactorStore<Problem>,
+    pub factors: FactorStore<FactorFailure>,
     pub compute: Compute,
     /// Set when the server drains: it still answers, but is not ready for more.
     pub is_draining: AtomicBool,

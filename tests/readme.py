@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Runs the examples of a README against a running server and compares the answers: tests/readme.py [BASE_URL [README]].
+"""Runs the examples of a README against a server and compares the answers.
+
+    tests/readme.py [BASE_URL] [README]              asks the server at BASE_URL, http://localhost:8080 if absent
+    tests/readme.py --binary GRAMIAN [README]        starts that binary for the purpose, on a free port, and ends it
 
 Every ```sh block that contains curl is run by bash, in order, in the folder of the README, with the server's address in
 place of localhost:8080. What it prints is compared with the fenced block that follows, ```json or ```text:
@@ -12,15 +15,22 @@ place of localhost:8080. What it prints is compared with the fenced block that f
 Exits with 1 and the differences if there are any. Needs nothing but the standard library.
 """
 
+import argparse
+import contextlib
 import json
+import os
 import re
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 
 RELATIVE = 1e-6
 ROUNDING = 1e-9
 SECONDS_PER_EXAMPLE = 120
+SECONDS_TO_START = 20
+SECONDS_TO_STOP = 20
 SHOWN_CHARACTERS = 3000
 
 ANY = object()
@@ -28,22 +38,66 @@ NUMBER = re.compile(r"(?<![\w.-])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 
 def main():
-    base = sys.argv[1] if len(sys.argv) > 1 else "http://localhost:8080"
-    readme = Path(sys.argv[2]) if len(sys.argv) > 2 else Path(__file__).resolve().parent.parent / "README.md"
+    arguments = argparse.ArgumentParser(description="Runs the examples of a README against a server.")
+    arguments.add_argument("--binary", metavar="GRAMIAN", help="start this binary instead of asking a running server")
+    arguments.add_argument("places", nargs="*", metavar="BASE_URL or README")
+    arguments = arguments.parse_args()
+    bases = [place for place in arguments.places if "://" in place]
+    readmes = [place for place in arguments.places if "://" not in place]
+    readme = Path(readmes[0] if readmes else Path(__file__).resolve().parent.parent / "README.md").resolve()
+    if arguments.binary:
+        with server(arguments.binary) as base:
+            run(base, readme)
+    else:
+        run(bases[0].rstrip("/") if bases else "http://localhost:8080", readme)
+
+
+@contextlib.contextmanager
+def server(binary):
+    """A server on a port of its own choice, in its default configuration; its base URL."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
+    environment["RUST_LOG"] = "info"
+    with tempfile.TemporaryFile() as log:
+        command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0"]
+        process = subprocess.Popen(command, env=environment, stderr=log)
+        try:
+            yield f"http://{address_of(process, log)}"
+        finally:
+            process.terminate()
+            process.wait(SECONDS_TO_STOP)
+
+
+def address_of(process, log):
+    """The address that the server logs when it listens."""
+    for _ in range(10 * SECONDS_TO_START):
+        log.seek(0)
+        text = log.read().decode(errors="replace")
+        found = re.search(r'"address":"([^"]+)"', text)
+        if found:
+            return found[1]
+        if process.poll() is not None:
+            sys.exit(f"the server ended with status {process.returncode}: {text}")
+        time.sleep(0.1)
+    sys.exit(f"the server does not listen after {SECONDS_TO_START} s")
+
+
+def run(base, readme):
+    """Checks every example; ends the program with status 1 if one fails."""
     examples = examples_of(readme.read_text(encoding="utf-8"))
     if not examples:
         sys.exit(f"{readme} has no ```sh block with curl")
     failed = 0
     for line, script, language, expected in examples:
-        found, problems = check(script, language, expected, base.rstrip("/"), readme.parent)
+        found, problems = check(script, language, expected, base, readme.parent)
         if problems:
             failed += 1
-            print(f"{readme}:{line}:\n{indented(script)}")
+            print(f"{readme.name}:{line}:\n{indented(script)}")
             print("\n".join(f"  {problem}" for problem in problems))
             print(f"  the whole answer:\n{indented(found[:SHOWN_CHARACTERS])}\n")
+    sys.stdout.flush()
     if failed:
-        sys.exit(f"{failed} of {len(examples)} examples of {readme} do not agree with the server at {base}")
-    print(f"{len(examples)} examples of {readme} agree with the server at {base}")
+        sys.exit(f"{failed} of {len(examples)} examples of {readme.name} do not agree with the server at {base}")
+    print(f"{len(examples)} examples of {readme.name} agree with the server at {base}")
 
 
 def examples_of(text):
@@ -125,8 +179,9 @@ def of_lists(pattern, answer, path, scale):
     if ANY not in pattern:
         if len(pattern) != len(answer):
             at = next((i for i, (p, a) in enumerate(zip(pattern, answer)) if differences(p, a, "", scale)), None)
-            where = "" if at is None else f"; the first difference is {differences(pattern[at], answer[at], f'{path}/{at}', scale)[0]}"
-            return [f"{path or 'the answer'}: the README has {len(pattern)} entries or lines, the server {len(answer)}{where}"]
+            counts = f"the README has {len(pattern)} entries or lines, the server {len(answer)}"
+            first = [] if at is None else differences(pattern[at], answer[at], f"{path}/{at}", scale)[:1]
+            return [f"{path or 'the answer'}: {counts}", *first]
         return [d for i, (p, a) in enumerate(zip(pattern, answer)) for d in differences(p, a, f"{path}/{i}", scale)]
     runs = split_at_any(pattern)
     first, last = runs[0], runs[-1]

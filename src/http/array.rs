@@ -40,6 +40,25 @@ impl Serialize for Array {
     }
 }
 
+/// For single numbers of an answer: what JSON cannot say is an error, not a silent null.
+///
+/// # Errors
+/// For NaN and infinities.
+pub fn finite<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    if x.is_finite() { serializer.serialize_f64(*x) } else { Err(S::Error::custom("a number is not finite")) }
+}
+
+/// [`finite`] for optional fields that are present.
+///
+/// # Errors
+/// For NaN and infinities.
+pub fn finite_if_present<S: Serializer>(x: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    match x {
+        Some(x) => finite(x, serializer),
+        None => serializer.serialize_none(),
+    }
+}
+
 /// The part of an array below some indices.
 struct View<'a> {
     data: &'a [f64],

@@ -70,6 +70,11 @@ impl Planner<'_> {
         let (SolverChoice::Auto | SolverChoice::Dense) = geometry.solver.unwrap_or(fit.solver);
         let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
+        if inherits_noise && chosen.noise_variances.is_some() && surface_cloud.id != values_cloud.id {
+            let detail =
+                "noise_variances belong to the points of cloud; give alpha or noise_variances here as well";
+            return Err(Problem::invalid_request("/geometry", detail));
+        }
         let surface_chosen = Chosen {
             kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
             alpha: if inherits_noise { chosen.alpha } else { geometry.alpha },

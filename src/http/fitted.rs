@@ -140,7 +140,7 @@ impl Fitted {
             warn(WarningCode::Refined, detail);
         }
         if n_merged > 0 {
-            warn(WarningCode::DuplicatesMerged, format!("{n_merged} points coincide with an earlier one"));
+            warn(WarningCode::DuplicatesMerged, format!("points merged into an earlier one: {n_merged}"));
         }
         Diagnostics {
             cloud_id: plan.stored.id.to_string(),

@@ -57,7 +57,8 @@ fn with_problem_document(response: Response, request_id: &str) -> Response {
 /// An error that no handler of ours made.
 fn foreign(status: StatusCode) -> Problem {
     match status {
-        StatusCode::NOT_FOUND => not_found_problem(),
+        // axum's own 400 is about a path that is not UTF-8 once decoded.
+        StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST => not_found_problem(),
         StatusCode::METHOD_NOT_ALLOWED => Problem::new(Slug::MethodNotAllowed, "see the Allow header"),
         StatusCode::UNSUPPORTED_MEDIA_TYPE => {
             Problem::new(Slug::UnsupportedMediaType, "send application/json")

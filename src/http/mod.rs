@@ -8,7 +8,7 @@ mod fit;
 mod fitted;
 mod middleware;
 pub mod openapi;
-mod operation;
+pub mod operation;
 pub mod problem;
 mod responses;
 mod routes;

@@ -17,6 +17,7 @@ use super::fitted::{Fits, Fitted};
 use super::problem::Problem;
 use super::slug::Slug;
 use crate::app::App;
+use crate::numerics::error::NumericsError;
 use crate::numerics::solver::GramFactor;
 use crate::store::Owner;
 use crate::store::factors::{CacheOutcome, StoredFactor};
@@ -104,7 +105,11 @@ struct Report {
 impl Report {
     async fn fitted(&mut self, app: &Arc<App>, plan: FitPlan) -> Result<Fitted, Problem> {
         let factorization = || factorize(app.clone(), plan.clone());
-        let (stored, outcome) = app.factors.get_or_factorize(plan.key, factorization).await?;
+        let found = app.factors.get_or_factorize(plan.key, factorization).await;
+        let (stored, outcome) = found.map_err(|failure| match failure {
+            FactorFailure::Refused(error) => Problem::from_numerics(error, plan.place),
+            FactorFailure::Broken(problem) => problem,
+        })?;
         // With two factors the answer is a hit only if both are: the outcomes are ordered by cost.
         self.cache = self.cache.max(Some(outcome));
         if outcome != CacheOutcome::Hit {
@@ -150,13 +155,19 @@ impl Report {
     }
 }
 
-async fn factorize(app: Arc<App>, plan: FitPlan) -> Result<StoredFactor, Problem> {
+/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
+#[derive(Debug, Clone)]
+pub enum FactorFailure {
+    Refused(NumericsError),
+    Broken(Problem),
+}
+
+async fn factorize(app: Arc<App>, plan: FitPlan) -> Result<StoredFactor, FactorFailure> {
     let flops = GramFactor::flops_needed(plan.fitted.n_points());
-    let place = plan.place;
     let job = move |observer: &JobObserver| {
         GramFactor::factorize(plan.fitted, plan.kernel, plan.regularization, observer)
     };
-    let (outcome, times) = app.compute.run(flops, job).await?;
-    let factor = outcome.map_err(|error| Problem::from_numerics(error, place))?;
+    let (outcome, times) = app.compute.run(flops, job).await.map_err(FactorFailure::Broken)?;
+    let factor = outcome.map_err(FactorFailure::Refused)?;
     Ok(StoredFactor::new(factor, times.gram, times.factor))
 }

@@ -159,7 +159,7 @@ impl Problem {
         match error {
             E::EmptyCloud | E::ZeroDimension => at(Slug::InvalidCloud, "/cloud/points"),
             E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &format!("/cloud/points/{point}")),
-            E::NonFiniteCoordinate { point, coordinate } => {
+            E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
                 at(Slug::InvalidCloud, &format!("/cloud/points/{point}/{coordinate}"))
             }
             E::DimensionTooSmall { .. } => at(Slug::InvalidCloud, "/cloud/points"),
@@ -184,7 +184,8 @@ impl Problem {
             }
             E::DuplicatePoints { points } => {
                 let remedy = format!(
-                    "{detail}; set alpha above 0, or \"duplicates\": \"merge\" to average their values"
+                    "{detail}; set alpha (or their noise_variances) above 0, or alpha to 0 and \"duplicates\" to \"merge\" \
+                     to average their values"
                 );
                 let mut problem = Self::new(Slug::DuplicatePoints, remedy);
                 for point in points.iter().take(10) {
@@ -197,8 +198,9 @@ impl Problem {
                 problem
             }
             E::NotPositiveDefinite { reason, minimum_alpha } => {
-                let remedy =
-                    format!("{detail}; set alpha to {minimum_alpha:.1e} or more, or use a rougher kernel");
+                // Rounded up: the remedy must work when it is typed in.
+                let enough = 1.01 * minimum_alpha;
+                let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
                 let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.pointer("/alpha"), remedy);
                 problem.members.minimum_alpha = Some(minimum_alpha);
                 if let NotDefinite::NeedsCholesky { point } = reason {

@@ -44,6 +44,7 @@ problem_set! {
         404 UnknownCloud "`unknown-cloud`: no cloud is registered under the id",
         406 NotAcceptable "`not-acceptable`: answers come as application/json",
         500 Internal "`internal`: a bug",
+        503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
         504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",
     }
 }
@@ -55,6 +56,7 @@ problem_set! {
         406 NotAcceptable "`not-acceptable`: answers come as application/json",
         422 Refused "`invalid-request`: a query parameter is out of its range or unknown",
         500 Internal "`internal`: a bug",
+        503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
         504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::array::finite;
 use super::body::{Points, present, present_object};
 
 /// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
@@ -276,12 +277,16 @@ pub struct Diagnostics {
     /// Numerical rank of the matrix.
     pub rank: usize,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
+    #[serde(serialize_with = "finite")]
     pub reciprocal_condition: f64,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+    #[serde(serialize_with = "finite")]
     pub relative_residual: f64,
     /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+    #[serde(serialize_with = "finite")]
     pub native_norm_squared: f64,
     /// |u(X) − Y|, unit of the values.
+    #[serde(serialize_with = "finite")]
     pub misfit: f64,
     /// Points that were merged into an earlier one.
     pub n_merged_duplicates: usize,
@@ -309,5 +314,6 @@ pub struct Degenerate {
     /// Why.
     pub reason: DegenerateReason,
     /// |∇u| there, 1/length.
+    #[serde(serialize_with = "finite")]
     pub gradient_norm: f64,
 }

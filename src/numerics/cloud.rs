@@ -2,6 +2,9 @@
 
 use super::error::NumericsError;
 
+/// Coordinates up to here have squared distances, and length scales chosen from them, well inside float64.
+pub const MAX_COORDINATE: f64 = 1e100;
+
 /// A list of n ≥ 1 points with d ≥ 1 finite coordinates each.
 ///
 /// Row-major storage, shape `[n, d]`, unit L (the client's length unit). The order of the points is the client's and is
@@ -17,7 +20,8 @@ impl Cloud {
     ///
     /// # Errors
     /// [`NumericsError::EmptyCloud`], [`NumericsError::ZeroDimension`], [`NumericsError::RaggedPoints`] when the length is
-    /// no multiple of `dimension`, [`NumericsError::NonFiniteCoordinate`] with the first offender.
+    /// no multiple of `dimension`, [`NumericsError::NonFiniteCoordinate`] and [`NumericsError::CoordinateTooLarge`] with the
+    /// first offender.
     pub fn new(mut coordinates: Vec<f64>, dimension: usize) -> Result<Self, NumericsError> {
         if dimension == 0 {
             return Err(NumericsError::ZeroDimension);
@@ -32,6 +36,12 @@ impl Cloud {
         }
         if let Some(at) = coordinates.iter().position(|x| !x.is_finite()) {
             return Err(NumericsError::NonFiniteCoordinate {
+                point: at / dimension,
+                coordinate: at % dimension,
+            });
+        }
+        if let Some(at) = coordinates.iter().position(|x| x.abs() > MAX_COORDINATE) {
+            return Err(NumericsError::CoordinateTooLarge {
                 point: at / dimension,
                 coordinate: at % dimension,
             });
@@ -128,6 +138,10 @@ mod tests {
         assert_eq!(
             Cloud::new(vec![0.0, 1.0, 2.0, f64::NAN], 2),
             Err(NumericsError::NonFiniteCoordinate { point: 1, coordinate: 1 })
+        );
+        assert_eq!(
+            Cloud::new(vec![0.0, -1e101], 1),
+            Err(NumericsError::CoordinateTooLarge { point: 1, coordinate: 0 })
         );
     }
 

@@ -32,6 +32,10 @@ const VALUES_SPACINGS: f64 = 10.0;
 const NORMALS_RADII: f64 = 0.3;
 const NORMALS_SMOOTHING: f64 = 0.1;
 
+/// Median spacing against the radius above which a cloud is coarse: the cusps of neighbouring points no longer blend, all
+/// gradients at the points fail T2, and the rule for curvatures, which smooths them away, serves normals as well.
+const COARSE_SPACING: f64 = 0.1;
+
 /// The same for curvatures and operators: right to 1e-3 on a sphere where the rule for normals is off by factors.
 const CURVATURES_RADII: f64 = 0.5;
 const CURVATURES_SMOOTHING: f64 = 2.0;
@@ -56,8 +60,12 @@ pub fn default_fit(
             let length_scale = default_length_scale(&scales, Family::Matern { order: 2 });
             Ok((Kernel::new(Family::Matern { order: 2 }, length_scale, 1.0)?, DEFAULT_ALPHA))
         }
-        Purpose::Normals => Ok((laplace(NORMALS_RADII, NORMALS_SMOOTHING)?, SURFACE_ALPHA)),
-        Purpose::Curvatures => Ok((laplace(CURVATURES_RADII, CURVATURES_SMOOTHING)?, SURFACE_ALPHA)),
+        Purpose::Normals if scales.spacing < COARSE_SPACING * scales.radius => {
+            Ok((laplace(NORMALS_RADII, NORMALS_SMOOTHING)?, SURFACE_ALPHA))
+        }
+        Purpose::Normals | Purpose::Curvatures => {
+            Ok((laplace(CURVATURES_RADII, CURVATURES_SMOOTHING)?, SURFACE_ALPHA))
+        }
     }
 }
 
@@ -106,8 +114,15 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::numerics::testing::fibonacci_sphere;
+    use crate::numerics::geometry::{Geometry, Orientation};
+    use crate::numerics::interpolant::Interpolant;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::regularization::Regularization;
+    use crate::numerics::solver::GramFactor;
+    use crate::numerics::testing::{circle, fibonacci_sphere};
 
     #[test]
     fn defaults_scale_with_the_cloud() {
@@ -117,6 +132,27 @@ mod tests {
             let (a, _) = default_fit(&cloud, &Neighbours::of(&cloud), purpose).unwrap();
             let (b, _) = default_fit(&scaled, &Neighbours::of(&scaled), purpose).unwrap();
             assert!((b.length_scale() / a.length_scale() - 1e3).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn every_circle_has_normals_by_default() {
+        for n in [6, 8, 12, 16, 32, 64, 200] {
+            let cloud = Arc::new(circle(n));
+            let neighbours = Neighbours::of(&cloud);
+            let (kernel, alpha) = default_fit(&cloud, &neighbours, Purpose::Normals).unwrap();
+            let alpha = Regularization::uniform(alpha).unwrap();
+            let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
+            let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
+            let geometry =
+                Geometry::of(&signature, &neighbours, &cloud, Orientation::Outward, &Unobserved).unwrap();
+            assert!(geometry.degenerate().is_empty(), "{n} points");
+            for query in 0..n {
+                let cosine: f64 =
+                    geometry.normal(query).iter().zip(cloud.point(query)).map(|(a, b)| a * b).sum();
+                // By symmetry exact but for rounding.
+                assert!(cosine > 1.0 - 1e-9, "{n} points: {cosine}");
+            }
         }
     }
 

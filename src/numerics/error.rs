@@ -11,6 +11,8 @@ pub enum NumericsError {
     RaggedPoints { point: usize, expected: usize, found: usize },
     #[error("points[{point}][{coordinate}] is not finite")]
     NonFiniteCoordinate { point: usize, coordinate: usize },
+    #[error("points[{point}][{coordinate}] is beyond 1e100 in magnitude")]
+    CoordinateTooLarge { point: usize, coordinate: usize },
     #[error("the geometry of a hypersurface needs dimension 2 or more, the cloud has dimension {found}")]
     DimensionTooSmall { found: usize },
     #[error("expected dimension {expected}, found {found}")]

@@ -1,5 +1,7 @@
 //! Normals, shape operator and curvatures of the level surfaces of the signature function.
 
+use rayon::prelude::*;
+
 use super::cloud::Cloud;
 use super::eigen::symmetric_eigen;
 use super::error::NumericsError;
@@ -96,21 +98,22 @@ impl Geometry {
         let sign = orientation.sign();
         let gradient_norms: Vec<f64> = (0..m).map(|query| norm(jets.gradient(query))).collect();
         let criterion = VanishingGradient { signature, neighbours, jets: &jets };
+        let is_degenerate: Vec<bool> = (0..m)
+            .into_par_iter()
+            .map(|query| criterion.holds(query, queries.point(query), gradient_norms[query]))
+            .collect();
         let mut normals = vec![0.0; m * d];
-        let (mut degenerate, mut is_degenerate) = (Vec::new(), vec![false; m]);
+        let mut degenerate = Vec::new();
         for query in 0..m {
             let gradient_norm = gradient_norms[query];
-            if criterion.holds(query, queries.point(query), gradient_norm) {
-                is_degenerate[query] = true;
-                degenerate.push(Degeneracy {
-                    query,
-                    reason: DegeneracyReason::VanishingGradient,
-                    gradient_norm,
-                });
+            if is_degenerate[query] {
+                let reason = DegeneracyReason::VanishingGradient;
+                degenerate.push(Degeneracy { query, reason, gradient_norm });
                 continue;
             }
-            for (normal, g) in normals[query * d..].iter_mut().zip(jets.gradient(query)) {
-                *normal = sign * g / gradient_norm;
+            for (slot, g) in normals[query * d..].iter_mut().zip(jets.gradient(query)) {
+                // Adding 0 turns −0 into 0.
+                *slot = sign * g / gradient_norm + 0.0;
             }
         }
         Ok(Self { jets, sign, gradient_norms, normals, degenerate, is_degenerate })

@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn far_from_the_cloud_the_variance_is_the_prior() {
         let cloud = fibonacci_sphere(30);
-        let queries = Cloud::new(vec![1e40, 0.0, 0.0, 0.0, 1e150, 0.0], 3).unwrap();
+        let queries = Cloud::new(vec![1e40, 0.0, 0.0, 0.0, 1e100, 0.0], 3).unwrap();
         for family in all_families().into_iter().filter(|&f| f != Family::InverseMultiquadric) {
             let factor = factor(&cloud, family, 1e-6);
             let found = variances(&factor, &queries, &Unobserved).unwrap();

@@ -169,6 +169,7 @@ pub async fn get_cloud(
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
+    let _admission = app.compute.admit()?;
     // Spacings of a large cloud take longer than an async worker may be held.
     let cloud = app.compute.run(0.0, move |_| Cloud::from(stored.as_ref())).await?.0;
     Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
@@ -246,6 +247,7 @@ pub async fn list_clouds(
     RawQuery(query): RawQuery,
 ) -> Result<axum::Json<CloudList>, Problem> {
     let page = Page::parse(query.as_deref().unwrap_or(""))?;
+    let _admission = app.compute.admit()?;
     let shared = app.clone();
     let job = move |_: &_| {
         let clouds = shared.clouds.list(owner);

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::array::Array;
+use crate::http::array::{Array, finite_if_present};
 use crate::http::body::{Points, present};
 use crate::http::compute::JobObserver;
 use crate::http::fit::{FitPlan, Planner};
@@ -81,7 +81,7 @@ pub struct PosteriorResponse {
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     gradients: Option<Array>,
     /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_present")]
     #[schema(nullable = false)]
     log_marginal_likelihood: Option<f64>,
     /// How the answer came about.
