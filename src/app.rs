@@ -1,7 +1,7 @@
 //! What every request shares.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 
 use crate::config::Config;
 use crate::http::auth::Keys;
@@ -17,6 +17,8 @@ pub struct App {
     pub clouds: CloudStore,
     pub factors: FactorStore<FactorFailure>,
     pub compute: Compute,
+    /// Requests between their arrival and their answer.
+    pub n_requests: AtomicUsize,
     /// Set when the server drains: it still answers, but is not ready for more.
     pub is_draining: AtomicBool,
 }
@@ -31,7 +33,8 @@ impl App {
             keys: Keys::new(&config.api_keys),
             clouds: CloudStore::new(config.cloud_bytes),
             factors: FactorStore::new(config.cache_bytes),
-            compute: Compute::new(config.n_threads(), config.max_queue)?,
+            compute: Compute::new(config.n_threads(), config.max_queue, config.cache_bytes)?,
+            n_requests: AtomicUsize::new(0),
             is_draining: AtomicBool::new(false),
             config,
         }))

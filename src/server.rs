@@ -8,11 +8,19 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::net::TcpListener;
+use tokio::sync::oneshot;
 
 use crate::app::App;
 use crate::http::router;
 
-/// Serves until `stop` resolves, then finishes the requests under way; each has the deadline at most.
+/// Time for the last answers to reach their clients once no request is being computed any more.
+const LAST_BYTES: Duration = Duration::from_secs(5);
+
+/// How often a draining server looks whether requests are still being computed.
+const DRAINING_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Serves until `stop` resolves, then finishes the requests under way, each within its deadline, and returns. Connections
+/// that stall, with half a request sent or an answer unread, are not waited for beyond a few seconds.
 ///
 /// # Errors
 /// Those of the listener.
@@ -22,12 +30,26 @@ pub async fn serve(
     stop: impl Future<Output = ()> + Send + 'static,
 ) -> io::Result<()> {
     let draining = app.clone();
+    let (began, has_begun) = oneshot::channel::<()>();
     let stop = async move {
         stop.await;
         draining.is_draining.store(true, Ordering::Relaxed);
         tracing::info!("draining");
+        // The receiver is only gone if the server is.
+        let _ = began.send(());
     };
-    axum::serve(listener, router(app)).with_graceful_shutdown(stop).await
+    let idle = async {
+        has_begun.await.ok();
+        while app.n_requests.load(Ordering::Relaxed) > 0 {
+            tokio::time::sleep(DRAINING_INTERVAL).await;
+        }
+        tokio::time::sleep(LAST_BYTES).await;
+    };
+    let router = router(app.clone());
+    tokio::select! {
+        outcome = axum::serve(listener, router).with_graceful_shutdown(stop) => outcome,
+        () = idle => Ok(()),
+    }
 }
 
 /// Whether a server at this address answers its readiness probe with 200, within two seconds.

@@ -6,7 +6,9 @@ use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use http_body_util::BodyExt;
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Deserialize, DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{
+    Deserialize, DeserializeOwned, Deserializer, IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Visitor,
+};
 use serde_json::error::Category;
 
 use super::problem::Problem;
@@ -15,6 +17,12 @@ use super::slug::Slug;
 /// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
 /// answer instead of a broken connection.
 const MAX_DRAINED_BYTES: usize = 64 << 20;
+
+/// Bytes that are allocated on the word of a Content-Length; beyond it the buffer grows as bytes come.
+const MAX_TRUSTED_BYTES: usize = 1 << 20;
+
+/// Characters of a refused value or name that are repeated to the client.
+const MAX_SHOWN_CHARACTERS: usize = 200;
 
 /// Reads a JSON body of at most `limit` bytes.
 ///
@@ -31,7 +39,7 @@ pub async fn read_json_body(headers: &HeaderMap, body: Body, limit: usize) -> Re
         return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, Some(required)));
     }
     let mut body = body;
-    let mut bytes = Vec::with_capacity(announced.unwrap_or(0));
+    let mut bytes = Vec::with_capacity(announced.unwrap_or(0).min(MAX_TRUSTED_BYTES));
     while let Some(frame) = body.frame().await {
         let frame = frame.map_err(|_| Problem::new(Slug::MalformedJson, "the body broke off"))?;
         let Ok(data) = frame.into_data() else { continue };
@@ -105,7 +113,15 @@ fn invalid<T: DeserializeOwned>(bytes: &[u8], error: &serde_json::Error) -> Prob
     };
     // The position in bytes says less than the pointer.
     let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
-    Problem::invalid_request(pointer, message)
+    Problem::invalid_request(shortened(&pointer), shortened(message))
+}
+
+/// Clients may send megabytes where a name or number belongs.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(MAX_SHOWN_CHARACTERS) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{}…", &text[..end]),
+    }
 }
 
 /// RFC 6901: segments behind slashes, `~` as `~0` and `/` as `~1`.
@@ -167,6 +183,59 @@ where
     D: Deserializer<'de>,
 {
     object(deserializer).map(Some)
+}
+
+/// For enumerations: a string and nothing else. serde would take `{"dense": null}` as well, and `serde_json` calls other types
+/// a syntax error.
+struct Word<T>(T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Word<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WordVisitor<T>(PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for WordVisitor<T> {
+            type Value = Word<T>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a string")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Word<T>, E> {
+                T::deserialize(word.into_deserializer()).map(Word)
+            }
+        }
+
+        deserializer.deserialize_str(WordVisitor(PhantomData))
+    }
+}
+
+/// For fields that are enumerations.
+///
+/// # Errors
+/// For anything but one of their strings.
+pub fn word<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    Word::deserialize(deserializer).map(|Word(word)| word)
+}
+
+/// [`word`] for optional fields.
+///
+/// # Errors
+/// Those of [`word`].
+pub fn present_word<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<T>, D::Error> {
+    word(deserializer).map(Some)
+}
+
+/// [`word`] for optional lists.
+///
+/// # Errors
+/// Those of [`word`], with the position in the list.
+pub fn present_words<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Vec<T>>, D::Error> {
+    let words = Vec::<Word<T>>::deserialize(deserializer)?;
+    Ok(Some(words.into_iter().map(|Word(word)| word).collect()))
 }
 
 /// Points as they come: one flat buffer, whatever their number, with the first row that differs in length.

@@ -12,18 +12,21 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, oneshot};
 
 use super::problem::Problem;
 use crate::numerics::observer::{Observer, Stage};
 
-/// Flops beyond which a job goes to the exclusive lane: some 20 ms on two cores.
-const EXCLUSIVE_FLOPS: f64 = 2e9;
+/// Flops beyond which a job goes to the exclusive lane: some 100 ms on two cores.
+const EXCLUSIVE_FLOPS: f64 = 1e10;
 
 /// Bounded compute threads behind a bounded queue.
 pub struct Compute {
     exclusive: Lane,
     shared: Lane,
+    /// KiB of factorizations that requests may hold beside the cache.
+    memory: Semaphore,
+    memory_kib: u32,
     places: Arc<Semaphore>,
     n_places: usize,
     n_threads: usize,
@@ -67,11 +70,19 @@ impl Compute {
     ///
     /// # Errors
     /// If the operating system refuses them.
-    pub fn new(n_threads: usize, max_queue: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(
+        n_threads: usize,
+        max_queue: usize,
+        memory_bytes: u64,
+    ) -> Result<Self, rayon::ThreadPoolBuildError> {
+        // Tokio counts permits in 32 bits when several are taken at once: KiB reach 4 TiB.
+        let memory_kib = u32::try_from(memory_bytes / 1024).unwrap_or(u32::MAX).max(1);
         let n_places = n_threads.saturating_add(max_queue).min(Semaphore::MAX_PERMITS);
         Ok(Self {
             exclusive: Lane::new("gramian-exclusive", n_threads, 1)?,
             shared: Lane::new("gramian-shared", n_threads, n_threads)?,
+            memory: Semaphore::new(memory_kib as usize),
+            memory_kib,
             places: Arc::new(Semaphore::new(n_places)),
             n_places,
             n_threads,
@@ -92,6 +103,18 @@ impl Compute {
                 Err(Problem::overloaded(wait.ceil().clamp(1.0, 600.0) as u64))
             }
         }
+    }
+
+    /// Waits until so many bytes of factorizations may live beside the cache; hold the permit until they are dropped.
+    ///
+    /// Without it every waiting request would factorize first and keep its factor while it queues for its answer. What
+    /// exceeds the whole budget takes all of it: it runs alone.
+    ///
+    /// # Errors
+    /// 500 `internal` if the pool is gone.
+    pub async fn reserve(&self, n_bytes: usize) -> Result<SemaphorePermit<'_>, Problem> {
+        let kib = u32::try_from(n_bytes.div_ceil(1024)).unwrap_or(u32::MAX).min(self.memory_kib);
+        self.memory.acquire_many(kib).await.map_err(|_| Problem::internal())
     }
 
     /// Whether another request would be admitted.
@@ -206,7 +229,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_full_queue_is_refused_until_a_place_is_free() {
-        let compute = Compute::new(1, 1).unwrap();
+        let compute = Compute::new(1, 1, 1 << 20).unwrap();
         let first = compute.admit().unwrap();
         let _second = compute.admit().unwrap();
         assert!(!compute.has_room());
@@ -217,7 +240,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_panic_is_one_internal_error_and_the_pool_lives() {
-        let compute = Compute::new(1, 1).unwrap();
+        let compute = Compute::new(1, 1, 1 << 20).unwrap();
         let outcome = compute
             .run(0.0, |_| {
                 if true {
@@ -231,7 +254,7 @@ mod tests {
 
     #[tokio::test]
     async fn dropping_the_future_cancels_the_job() {
-        let compute = Compute::new(1, 1).unwrap();
+        let compute = Compute::new(1, 1, 1 << 20).unwrap();
         let (began, has_begun) = oneshot::channel();
         let (stopped, has_stopped) = oneshot::channel();
         let mut job = Box::pin(compute.run(1e12, move |observer| {
@@ -248,8 +271,18 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn what_exceeds_the_memory_runs_alone() {
+        let compute = Compute::new(1, 8, 1 << 20).unwrap();
+        let small = compute.reserve(1 << 10).await.unwrap();
+        let mut large = Box::pin(compute.reserve(1 << 40));
+        assert!(futures_util::poll!(&mut large).is_pending());
+        drop(small);
+        assert!(large.await.is_ok());
+    }
+
+    #[tokio::test]
     async fn small_jobs_run_beside_a_large_one() {
-        let compute = Compute::new(1, 8).unwrap();
+        let compute = Compute::new(1, 8, 1 << 20).unwrap();
         let (release, released) = std::sync::mpsc::channel::<()>();
         let mut large = Box::pin(compute.run(1e12, move |_| released.recv().is_ok()));
         assert!(futures_util::poll!(&mut large).is_pending());

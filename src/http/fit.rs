@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use super::body::Points;
 use super::problem::{Place, Problem};
-use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, KernelFamily, SolverChoice};
+use super::shared::{
+    CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, KernelFamily, KernelUsed, SolverChoice,
+};
 use super::slug::Slug;
 use crate::app::App;
 use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit, length_scale_for};
 use crate::numerics::duplicates::Merge;
+use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use crate::numerics::neighbours::Neighbours;
 use crate::numerics::regularization::Regularization;
@@ -34,6 +37,20 @@ pub struct FitPlan {
     pub place: Place,
 }
 
+impl FitPlan {
+    /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
+    pub fn refused(&self, mut error: NumericsError) -> Problem {
+        use NumericsError::{KernelNotSmooth, NotPositiveDefinite};
+        if let Some(merge) = &self.merge
+            && let KernelNotSmooth { point, .. }
+            | NotPositiveDefinite { reason: NotDefinite::NeedsCholesky { point }, .. } = &mut error
+        {
+            *point = merge.first_point(*point);
+        }
+        Problem::from_numerics(error, self.place)
+    }
+}
+
 /// Validates the parts of a request against the limits and the stored clouds.
 pub struct Planner<'a> {
     pub app: &'a App,
@@ -46,10 +63,11 @@ impl Planner<'_> {
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
     pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<FitPlan, Problem> {
+        let place = place_of(&fit);
         let stored = self.cloud(fit.cloud, "/cloud")?;
         let (SolverChoice::Auto | SolverChoice::Dense) = fit.solver;
         let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
-        self.plan(stored, chosen, fit.duplicates, purpose, Place::Request)
+        self.plan(stored, chosen, fit.duplicates, purpose, place)
     }
 
     /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
@@ -58,6 +76,8 @@ impl Planner<'_> {
     /// A [`Problem`] with a pointer to the field.
     pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(FitPlan, FitPlan), Problem> {
         let geometry = geometry.unwrap_or_default();
+        let place = place_of(&fit);
+        let surface_place = place_of_surface(&geometry, place);
         let values_cloud = self.cloud(fit.cloud, "/cloud")?;
         let surface_cloud = match geometry.cloud {
             None => values_cloud.clone(),
@@ -83,19 +103,24 @@ impl Planner<'_> {
                 false => geometry.noise_variances,
             },
         };
-        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, Place::Request)?;
+        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, place)?;
         let surface =
-            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, Place::Geometry)?;
+            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, surface_place)?;
         Ok((values, surface))
     }
 
-    /// Queries of the dimension of a cloud; absent, the points of `default`.
+    /// Queries of the dimension of a fit's cloud; absent, its points. The fits are told where their queries stand.
     ///
     /// # Errors
     /// 413 beyond the limit, 422 for what is no list of points of this dimension.
-    pub fn queries(&self, queries: Option<Points>, default: &StoredCloud) -> Result<Arc<Cloud>, Problem> {
+    pub fn queries(&self, queries: Option<Points>, fits: &mut [&mut FitPlan]) -> Result<Arc<Cloud>, Problem> {
+        // The last fit is that of the surface, whose points are the default.
+        let Some(default) = fits.last().map(|fit| (fit.stored.cloud.clone(), fit.place.points)) else {
+            return Err(Problem::internal());
+        };
         let Some(points) = queries else {
-            return Ok(default.cloud.clone());
+            fits.iter_mut().for_each(|fit| fit.place.queries = default.1);
+            return Ok(default.0);
         };
         let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
         let (limit, required) = (self.app.config.max_queries, queries.n_points());
@@ -104,7 +129,7 @@ impl Planner<'_> {
                 Problem::too_large(Slug::ProblemTooLarge, "queries", limit, Some(required)).at("/queries")
             );
         }
-        let (expected, found) = (default.cloud.dimension(), queries.dimension());
+        let (expected, found) = (default.0.dimension(), queries.dimension());
         if expected != found {
             return Err(Problem::dimension_mismatch("/queries", expected, found));
         }
@@ -212,6 +237,33 @@ impl Planner<'_> {
     }
 }
 
+/// Where the fit of a request stands.
+fn place_of(fit: &Fit) -> Place {
+    Place {
+        points: if fit.cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
+        regularization: if fit.noise_variances.is_some() { "/noise_variances" } else { "/alpha" },
+        ..Place::REQUEST
+    }
+}
+
+/// Where the fit of the surface stands: what `geometry` leaves out, in the request.
+fn place_of_surface(geometry: &Geometry, request: Place) -> Place {
+    Place {
+        points: match &geometry.cloud {
+            None => request.points,
+            Some(cloud) if cloud.id.is_some() => "/geometry/cloud/id",
+            Some(_) => "/geometry/cloud/points",
+        },
+        kernel: if geometry.kernel.is_some() { "/geometry/kernel" } else { request.kernel },
+        regularization: match (&geometry.noise_variances, geometry.alpha) {
+            (Some(_), _) => "/geometry/noise_variances",
+            (None, Some(_)) => "/geometry/alpha",
+            (None, None) => request.regularization,
+        },
+        ..request
+    }
+}
+
 /// 404 for an id that names no cloud of this owner.
 pub fn unknown_cloud(id: &str) -> Problem {
     let shown: String = id.chars().take(64).collect();
@@ -240,14 +292,13 @@ impl Chosen {
         let regularization = match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
                 let detail = "noise_variances stands instead of alpha; give one of them";
-                return Err(Problem::invalid_request(place.pointer("/noise_variances"), detail));
+                return Err(Problem::invalid_request(place.regularization, detail));
             }
             (alpha, None) => Regularization::uniform(alpha.unwrap_or(default_alpha)).map_err(refuse)?,
             (None, Some(variances)) => {
                 let (expected, found) = (stored.cloud.n_points(), variances.len());
                 if expected != found {
-                    let pointer = place.pointer("/noise_variances");
-                    return Err(Problem::length_mismatch(pointer, expected, found));
+                    return Err(Problem::length_mismatch(place.regularization, expected, found));
                 }
                 Regularization::per_point(variances).map_err(refuse)?
             }
@@ -282,7 +333,7 @@ impl Kernel {
         for (name, owner, is_given) in of_others {
             if is_given && self.family != owner {
                 let detail = format!("{name} is a parameter of another family");
-                return Err(Problem::invalid_request(place.pointer(&format!("/kernel/{name}")), detail));
+                return Err(Problem::invalid_request(format!("{}/{name}", place.kernel), detail));
             }
         }
         match self.family {
@@ -296,7 +347,7 @@ impl Kernel {
                     return Ok(Family::Matern { order: order as u8 });
                 }
                 let detail = format!("nu must be one of 0.5, 1.5, ..., 8.5, found {nu}");
-                Err(Problem::invalid_request(place.pointer("/kernel/nu"), detail))
+                Err(Problem::invalid_request(format!("{}/nu", place.kernel), detail))
             }
             KernelFamily::Wendland => {
                 let smoothness = match self.smoothness.unwrap_or(4) {
@@ -305,7 +356,7 @@ impl Kernel {
                     6 => WendlandSmoothness::C6,
                     other => {
                         let detail = format!("smoothness must be 2, 4 or 6, found {other}");
-                        return Err(Problem::invalid_request(place.pointer("/kernel/smoothness"), detail));
+                        return Err(Problem::invalid_request(format!("{}/smoothness", place.kernel), detail));
                     }
                 };
                 Ok(Family::Wendland { smoothness })
@@ -314,13 +365,13 @@ impl Kernel {
     }
 }
 
-impl From<&NumericalKernel> for Kernel {
+impl From<&NumericalKernel> for KernelUsed {
     /// Every number used, so that a client can pin them.
     fn from(kernel: &NumericalKernel) -> Self {
         let mut full = Self {
             family: KernelFamily::Gauss,
-            length_scale: Some(kernel.length_scale()),
-            variance: Some(kernel.variance()),
+            length_scale: kernel.length_scale(),
+            variance: kernel.variance(),
             epsilon: None,
             nu: None,
             smoothness: None,
@@ -361,7 +412,13 @@ fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Probl
             0 => "at least one point with one coordinate is needed".to_owned(),
             _ => error.to_string(),
         };
-        Problem::of_field(slug, pointer, detail)
+        let at = match error {
+            NumericsError::CoordinateTooLarge { point, coordinate } => {
+                format!("{pointer}/{point}/{coordinate}")
+            }
+            _ => pointer.to_owned(),
+        };
+        Problem::of_field(slug, at, detail)
     })
 }
 

@@ -86,7 +86,7 @@ pub struct Fitted {
 impl Fitted {
     /// A refusal of the numerics, with pointers into this fit.
     pub fn refused(&self, error: NumericsError) -> Problem {
-        Problem::from_numerics(error, self.plan.place)
+        self.plan.refused(error)
     }
 
     /// Finds the weights of values that were solved before, or solves.

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use axum::extract::{Request, State};
@@ -16,7 +17,8 @@ use crate::app::App;
 /// Names the request, writes problem documents that need that name, and logs one line.
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
-pub async fn name_and_log(request: Request, next: Next) -> Response {
+pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let _counted = Counted::new(app);
     let began = Instant::now();
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
@@ -29,6 +31,22 @@ pub async fn name_and_log(request: Request, next: Next) -> Response {
     let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
     tracing::info!(request_id, %method, path, status, duration_ms, cache, "{method} {path} {status}");
     response
+}
+
+/// A request under way, also if its client leaves.
+struct Counted(Arc<App>);
+
+impl Counted {
+    fn new(app: Arc<App>) -> Self {
+        app.n_requests.fetch_add(1, Ordering::Relaxed);
+        Self(app)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.n_requests.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// A client's own id, if it is short and harmless in logs and headers.

@@ -21,6 +21,7 @@ use axum::Router;
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::get;
+use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 use utoipa::OpenApi;
@@ -45,12 +46,15 @@ pub fn router(app: Arc<App>) -> Router {
         move || async move { ([(header::CONTENT_TYPE, "application/json")], document.to_string()) };
     v1.merge(probes)
         .route("/openapi.json", get(serve_document))
-        .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
+        .merge(
+            SwaggerUi::new("/docs")
+                .config(utoipa_swagger_ui::Config::from("/openapi.json").validator_url("none")),
+        )
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(CatchPanicLayer::custom(middleware::recover))
-        .layer(cors(&app.config.cors_origins))
-        .layer(from_fn(middleware::name_and_log))
+        .layer(option_layer(cors(&app.config.cors_origins)))
+        .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
         .with_state(app)
 }
 
@@ -90,15 +94,24 @@ fn to_json(document: &utoipa::openapi::OpenApi) -> String {
     document.to_pretty_json().map(|json| json + "\n").unwrap_or_default()
 }
 
-/// No origin unless configured.
-fn cors(origins: &[String]) -> CorsLayer {
+/// Nothing unless origins are configured: then OPTIONS is a method like any other that no path has.
+fn cors(origins: &[String]) -> Option<CorsLayer> {
+    if origins.iter().all(|origin| origin.trim().is_empty()) {
+        return None;
+    }
     let exposed = ["x-request-id", "server-timing", "cache-status", "location", "retry-after", "etag"];
     let layer = CorsLayer::new()
         .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
-        .allow_headers([header::AUTHORIZATION, header::CONTENT_TYPE, HeaderName::from_static("x-request-id")])
+        .allow_headers([
+            header::AUTHORIZATION,
+            header::CONTENT_TYPE,
+            header::IF_NONE_MATCH,
+            HeaderName::from_static("x-request-id"),
+        ])
         .expose_headers(exposed.map(HeaderName::from_static));
     if origins.iter().any(|origin| origin == "*") {
-        return layer.allow_origin(AllowOrigin::any());
+        return Some(layer.allow_origin(AllowOrigin::any()));
     }
-    layer.allow_origin(AllowOrigin::list(origins.iter().filter_map(|o| HeaderValue::from_str(o.trim()).ok())))
+    let origins = origins.iter().filter_map(|origin| HeaderValue::from_str(origin.trim()).ok());
+    Some(layer.allow_origin(AllowOrigin::list(origins)))
 }

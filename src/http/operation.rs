@@ -66,6 +66,7 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let plan = app.compute.run(0.0, prepare).await?.0?;
     let mut report = Report { parse: began.elapsed(), ..Report::default() };
 
+    let _memory = app.compute.reserve(n_bytes_missing(&app, &plan)).await?;
     let main = report.fitted(&app, plan.main).await?;
     let surface = match plan.surface {
         Some(surface) if surface.key != main.plan.key => Some(report.fitted(&app, surface).await?),
@@ -84,6 +85,14 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     report.add(times);
     report.encode = encode;
     Ok(report.respond(body))
+}
+
+/// Bytes of the factorizations that are not in the cache.
+fn n_bytes_missing<W>(app: &App, plan: &Plan<W>) -> usize {
+    let surface = plan.surface.as_ref().filter(|surface| surface.key != plan.main.key);
+    let fits = [Some(&plan.main), surface];
+    let missing = fits.into_iter().flatten().filter(|fit| !app.factors.contains(fit.key));
+    missing.filter_map(|fit| GramFactor::n_bytes_needed(fit.fitted.n_points())).fold(0, usize::saturating_add)
 }
 
 /// The encoder's only objection is a number that JSON does not have.
@@ -107,7 +116,7 @@ impl Report {
         let factorization = || factorize(app.clone(), plan.clone());
         let found = app.factors.get_or_factorize(plan.key, factorization).await;
         let (stored, outcome) = found.map_err(|failure| match failure {
-            FactorFailure::Refused(error) => Problem::from_numerics(error, plan.place),
+            FactorFailure::Refused(error) => plan.refused(error),
             FactorFailure::Broken(problem) => problem,
         })?;
         // With two factors the answer is a hit only if both are: the outcomes are ordered by cost.

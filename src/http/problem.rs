@@ -80,19 +80,26 @@ pub struct ProblemDocument<'a> {
     required: Option<u64>,
 }
 
-/// Which fit of a request an error belongs to: the prefix of its pointers.
+/// Where the parts of a fit stand in the request: what `geometry` leaves out stands elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    Request,
-    Geometry,
+pub struct Place {
+    /// The points of the cloud, or its id.
+    pub points: &'static str,
+    pub kernel: &'static str,
+    /// `alpha` or `noise_variances`.
+    pub regularization: &'static str,
+    /// The queries, or the points that stand for them.
+    pub queries: &'static str,
 }
 
 impl Place {
-    pub fn pointer(self, rest: &str) -> String {
-        match self {
-            Self::Request => rest.to_owned(),
-            Self::Geometry => format!("/geometry{rest}"),
-        }
+    /// The fields of the request itself, the cloud as points.
+    pub const REQUEST: Place =
+        Place { points: "/cloud/points", kernel: "/kernel", regularization: "/alpha", queries: "/queries" };
+
+    /// One entry of a list; an id has none.
+    fn entry(list: &str, index: usize) -> String {
+        if list.ends_with("/id") { list.to_owned() } else { format!("{list}/{index}") }
     }
 }
 
@@ -155,32 +162,33 @@ impl Problem {
     pub fn from_numerics(error: NumericsError, place: Place) -> Self {
         use NumericsError as E;
         let detail = error.to_string();
-        let at = |slug, rest: &str| Self::of_field(slug, place.pointer(rest), detail.clone());
+        let at = |slug, pointer: &str| Self::of_field(slug, pointer, detail.clone());
         match error {
-            E::EmptyCloud | E::ZeroDimension => at(Slug::InvalidCloud, "/cloud/points"),
-            E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &format!("/cloud/points/{point}")),
-            E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
-                at(Slug::InvalidCloud, &format!("/cloud/points/{point}/{coordinate}"))
+            E::EmptyCloud | E::ZeroDimension | E::DimensionTooSmall { .. } => {
+                at(Slug::InvalidCloud, place.points)
             }
-            E::DimensionTooSmall { .. } => at(Slug::InvalidCloud, "/cloud/points"),
-            E::DimensionMismatch { .. } => at(Slug::DimensionMismatch, "/queries"),
+            E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &Place::entry(place.points, point)),
+            E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
+                at(Slug::InvalidCloud, &format!("{}/{coordinate}", Place::entry(place.points, point)))
+            }
+            E::DimensionMismatch { .. } => at(Slug::DimensionMismatch, place.queries),
             E::LengthMismatch { .. } => at(Slug::LengthMismatch, "/values"),
             E::InvalidKernelParameter { parameter, .. } => {
-                at(Slug::InvalidRequest, &format!("/kernel/{parameter}"))
+                at(Slug::InvalidRequest, &format!("{}/{parameter}", place.kernel))
             }
-            E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, "/alpha"),
+            E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, place.regularization),
             E::InvalidRegularization { point: Some(point), .. } => {
-                at(Slug::InvalidRequest, &format!("/noise_variances/{point}"))
+                at(Slug::InvalidRequest, &Place::entry(place.regularization, point))
             }
             E::KernelNotPositiveDefinite { .. } => {
                 let remedy = format!("{detail}; choose another family");
-                Self::of_field(Slug::KernelNotPositiveDefinite, place.pointer("/kernel/family"), remedy)
+                Self::of_field(Slug::KernelNotPositiveDefinite, format!("{}/family", place.kernel), remedy)
             }
             E::KernelNotSmooth { query, .. } => {
                 let remedy = format!(
                     "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, or query elsewhere"
                 );
-                Self::of_field(Slug::KernelNotSmooth, format!("/queries/{query}"), remedy)
+                Self::of_field(Slug::KernelNotSmooth, Place::entry(place.queries, query), remedy)
             }
             E::DuplicatePoints { points } => {
                 let remedy = format!(
@@ -190,7 +198,7 @@ impl Problem {
                 let mut problem = Self::new(Slug::DuplicatePoints, remedy);
                 for point in points.iter().take(10) {
                     problem.members.errors.push(FieldError {
-                        pointer: place.pointer(&format!("/cloud/points/{point}")),
+                        pointer: Place::entry(place.points, *point),
                         detail: "coincides with another point".to_owned(),
                     });
                 }
@@ -201,16 +209,15 @@ impl Problem {
                 // Rounded up: the remedy must work when it is typed in.
                 let enough = 1.01 * minimum_alpha;
                 let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
-                let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.pointer("/alpha"), remedy);
+                let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.regularization, remedy);
                 problem.members.minimum_alpha = Some(minimum_alpha);
                 if let NotDefinite::NeedsCholesky { point } = reason {
                     problem.members.point_indices = vec![point];
                 }
                 problem
             }
-            E::Overflow { query } => {
-                let remedy = format!("{detail}; scale the values or the length scale");
-                Self::of_field(Slug::InvalidRequest, format!("/queries/{query}"), remedy)
+            E::Overflow { .. } => {
+                Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
             // Whoever cancelled is gone and reads nothing; the deadline has its own answer.
@@ -266,10 +273,13 @@ mod tests {
     #[test]
     fn pointers_lead_into_the_fit_that_failed() {
         let error = NumericsError::RaggedPoints { point: 17, expected: 3, found: 2 };
-        let problem = Problem::from_numerics(error.clone(), Place::Request);
+        let problem = Problem::from_numerics(error.clone(), Place::REQUEST);
         assert_eq!(problem.members.errors[0].pointer, "/cloud/points/17");
-        let problem = Problem::from_numerics(error, Place::Geometry);
+        let elsewhere = Place { points: "/geometry/cloud/points", ..Place::REQUEST };
+        let problem = Problem::from_numerics(error.clone(), elsewhere);
         assert_eq!(problem.members.errors[0].pointer, "/geometry/cloud/points/17");
+        let by_id = Place { points: "/cloud/id", ..Place::REQUEST };
+        assert_eq!(Problem::from_numerics(error, by_id).members.errors[0].pointer, "/cloud/id");
     }
 
     #[test]

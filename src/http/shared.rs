@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::array::finite;
-use super::body::{Points, present, present_object};
+use super::body::{Points, present, present_object, present_word, word};
 
 /// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
 #[derive(Debug, Default, Deserialize, ToSchema)]
@@ -36,30 +36,54 @@ pub enum KernelFamily {
 }
 
 /// A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kernel {
     /// The family, which determines φ.
+    #[serde(deserialize_with = "word")]
     pub family: KernelFamily,
     /// The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
-    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub length_scale: Option<f64>,
     /// The factor of φ, unit of the values squared; 1 if absent.
-    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub variance: Option<f64>,
     /// laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
-    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub epsilon: Option<f64>,
     /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
-    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.5, maximum = 8.5)]
     pub nu: Option<f64>,
     /// wendland: 2, 4 or 6 times differentiable; 4 if absent.
-    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 2, maximum = 6)]
+    pub smoothness: Option<u8>,
+}
+
+/// The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct KernelUsed {
+    /// The family, which determines φ.
+    pub family: KernelFamily,
+    /// The length scale ℓ, in the unit of the coordinates.
+    pub length_scale: f64,
+    /// The factor of φ, unit of the values squared.
+    pub variance: f64,
+    /// laplace: φ = exp(−√(r² + epsilon)).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub epsilon: Option<f64>,
+    /// matern: the smoothness ν.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub nu: Option<f64>,
+    /// wendland: how often differentiable.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub smoothness: Option<u8>,
 }
 
@@ -97,11 +121,14 @@ pub enum SurfaceChoice {
 }
 
 /// The function whose level surface was used at a query.
+#[expect(dead_code, reason = "listed in full for clients; the offset model answers the other")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceUsed {
     /// The interpolant of the constant 1.
     Signature,
+    /// Reserved for the interpolant of signed distances on two offset layers.
+    Offset,
 }
 
 /// Which way normals point.
@@ -138,11 +165,11 @@ pub struct Geometry {
     #[schema(nullable = false, min_items = 1)]
     pub noise_variances: Option<Vec<f64>>,
     /// How its linear system is solved.
-    #[serde(default, deserialize_with = "present")]
+    #[serde(default, deserialize_with = "present_word")]
     #[schema(nullable = false)]
     pub solver: Option<SolverChoice>,
     /// Which function's level surface is meant.
-    #[serde(default, deserialize_with = "present")]
+    #[serde(default, deserialize_with = "present_word")]
     #[schema(nullable = false)]
     pub surface: Option<SurfaceChoice>,
 }
@@ -185,11 +212,11 @@ macro_rules! request {
             #[schema(nullable = false, min_items = 1)]
             pub noise_variances: Option<Vec<f64>>,
             /// How the linear system is solved.
-            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[serde(default, deserialize_with = "crate::http::body::present_word")]
             #[schema(nullable = false)]
             pub solver: Option<$crate::http::shared::SolverChoice>,
             /// What to do with points that coincide when alpha is 0.
-            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[serde(default, deserialize_with = "crate::http::body::present_word")]
             #[schema(nullable = false)]
             pub duplicates: Option<$crate::http::shared::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
@@ -220,6 +247,14 @@ pub enum FactorizationUsed {
     Cholesky,
     /// Rank-revealing pivoted Cholesky and least squares on its pivots, where Cholesky fails in float64.
     PivotedCholesky,
+    /// Reserved for a symmetric indefinite factorization.
+    BunchKaufman,
+    /// Reserved for LU with partial pivoting.
+    PartialPivotingLu,
+    /// Reserved for iterative solvers.
+    ConjugateGradients,
+    /// Reserved for local patches.
+    Local,
 }
 
 /// The solver that was used.
@@ -228,6 +263,12 @@ pub enum FactorizationUsed {
 pub enum SolverUsed {
     /// A factorization of the full matrix.
     Dense,
+    /// Reserved for a low-rank factorization.
+    Landmark,
+    /// Reserved for preconditioned conjugate gradients.
+    Iterative,
+    /// Reserved for local patches.
+    Local,
 }
 
 /// What a warning is about.
@@ -242,6 +283,18 @@ pub enum WarningCode {
     DuplicatesMerged,
     /// Variances that came out negative within rounding are served as 0.
     VarianceClamped,
+    /// Reserved: the offset model served where the signature function could not.
+    OffsetModelUsed,
+    /// Reserved: signs of normals were made consistent.
+    OrientationRepaired,
+    /// Reserved: the cloud is open, so that outward has no meaning.
+    OpenCloud,
+    /// Reserved: the kernel's cusp is seen at the points of the cloud.
+    KernelTooRough,
+    /// Reserved: curvatures differ from those of a quadric through the neighbours.
+    DisagreesWithNeighbours,
+    /// Reserved: queries lie far from the cloud.
+    FarFromCloud,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.
@@ -265,7 +318,7 @@ pub struct Diagnostics {
     /// Coordinates of each point, d.
     pub dimension: usize,
     /// The kernel used, in full.
-    pub kernel: Kernel,
+    pub kernel: KernelUsed,
     /// What was added to the diagonal; absent with `noise_variances`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -299,11 +352,20 @@ pub struct Diagnostics {
 }
 
 /// Why a query is degenerate.
+#[expect(dead_code, reason = "listed in full for clients; later checks answer the rest")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DegenerateReason {
     /// The gradient of the signature function vanishes, so that there is no normal: the entry is null.
     VanishingGradient,
+    /// Reserved: the sampling does not resolve the surface here; the number is served.
+    UnderResolved,
+    /// Reserved: the kernel's cusp is seen here; the number is served.
+    KernelTooRough,
+    /// Reserved: the query lies far from the cloud; the number is served.
+    FarFromCloud,
+    /// Reserved: the offset model would cost more than is admitted; the entry is null.
+    UnaffordableRescue,
 }
 
 /// A query where geometry has no meaning.

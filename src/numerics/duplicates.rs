@@ -93,6 +93,11 @@ impl Merge {
         self.group_of.len() - self.group_sizes.len()
     }
 
+    /// The first point of a group.
+    pub fn first_point(&self, group: usize) -> usize {
+        self.group_of.iter().position(|&g| g == group).unwrap_or(group)
+    }
+
     /// Means over the groups, `[n] → [n′]`.
     pub fn mean(&self, values: &[f64]) -> Vec<f64> {
         let mut means = vec![0.0; self.group_sizes.len()];
@@ -132,6 +137,7 @@ mod tests {
         let (merged, merge) = Merge::duplicates_of(&cloud()).unwrap();
         assert_eq!(merged.coordinates(), [5.0, 1.0, 2.0]);
         assert_eq!((merge.n_points(), merge.n_merged()), (6, 3));
+        assert_eq!([0, 1, 2].map(|group| merge.first_point(group)), [0, 1, 3]);
         assert_eq!(merge.mean(&[3.0, 1.0, 6.0, 7.0, 3.0, 9.0]), [6.0, 2.0, 7.0]);
         assert_eq!(merge.spread(&[3.0, 4.0, 5.0]), [1.0, 2.0, 1.0, 5.0, 2.0, 1.0]);
         assert_eq!(Merge::duplicates_of(&merged), None);

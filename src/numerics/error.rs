@@ -49,9 +49,9 @@ pub enum NumericsError {
 /// Why no honest answer exists without more regularization.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotDefinite {
-    #[error("the fallback leaves a relative residual of {relative_residual:.1e}")]
+    #[error("the solve leaves a relative residual of {relative_residual:.1e}")]
     Residual { relative_residual: f64 },
-    #[error("the fallback leaves a backward error of {backward_error:.1e}")]
+    #[error("the solve leaves a backward error of {backward_error:.1e}")]
     BackwardError { backward_error: f64 },
     #[error("Cholesky fails at point {point}, and what was asked for needs its factor")]
     NeedsCholesky { point: usize },

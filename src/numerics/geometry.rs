@@ -100,8 +100,11 @@ impl Geometry {
         let criterion = VanishingGradient { signature, neighbours, jets: &jets };
         let is_degenerate: Vec<bool> = (0..m)
             .into_par_iter()
-            .map(|query| criterion.holds(query, queries.point(query), gradient_norms[query]))
-            .collect();
+            .map(|query| {
+                observer.checkpoint()?;
+                Ok(criterion.holds(query, queries.point(query), gradient_norms[query]))
+            })
+            .collect::<Result<_, NumericsError>>()?;
         let mut normals = vec![0.0; m * d];
         let mut degenerate = Vec::new();
         for query in 0..m {
@@ -167,7 +170,10 @@ impl Geometry {
     /// Eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space (errata.md, 3).
     ///
     /// Sphere of radius r, outward: all +1/r.
-    pub fn curvatures(&self) -> Curvatures {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn curvatures(&self, observer: &dyn Observer) -> Result<Curvatures, NumericsError> {
         let (d, m) = (self.dimension(), self.n_queries());
         let k = d - 1;
         let mut curvatures = Curvatures {
@@ -176,23 +182,37 @@ impl Geometry {
             mean: vec![0.0; m],
             gaussian: vec![0.0; m],
         };
-        for query in (0..m).filter(|&query| !self.is_degenerate[query]) {
-            let basis = tangent_basis(self.normal(query));
-            let shape = self.shape_operator(query, &basis);
-            let (values, vectors) = symmetric_eigen(&shape, k);
-            curvatures.mean[query] = values.iter().sum::<f64>() / k as f64;
-            curvatures.gaussian[query] = values.iter().product();
-            curvatures.principal[query * k..][..k].copy_from_slice(&values);
-            for (slot, vector) in curvatures.directions[query * k * d..].chunks_exact_mut(d).zip(&vectors) {
-                for (basis_vector, &coefficient) in basis.iter().zip(vector) {
-                    for (x, b) in slot.iter_mut().zip(basis_vector) {
-                        *x += coefficient * b;
-                    }
-                }
-                make_largest_positive(slot);
-            }
-        }
         curvatures
+            .principal
+            .par_chunks_mut(k)
+            .zip(curvatures.directions.par_chunks_mut(k * d))
+            .zip(curvatures.mean.par_iter_mut().zip(&mut curvatures.gaussian))
+            .enumerate()
+            .filter(|(query, _)| !self.is_degenerate[*query])
+            .try_for_each(|(query, ((principal, directions), (mean, gaussian)))| {
+                observer.checkpoint()?;
+                self.principal_frame(query, principal, directions);
+                *mean = principal.iter().sum::<f64>() / k as f64;
+                *gaussian = principal.iter().product();
+                Ok(())
+            })?;
+        Ok(curvatures)
+    }
+
+    /// Writes principal curvatures `[d−1]` and directions `[d−1, d]` at one query.
+    fn principal_frame(&self, query: usize, principal: &mut [f64], directions: &mut [f64]) {
+        let d = self.dimension();
+        let basis = tangent_basis(self.normal(query));
+        let (values, vectors) = symmetric_eigen(&self.shape_operator(query, &basis), d - 1);
+        principal.copy_from_slice(&values);
+        for (slot, vector) in directions.chunks_exact_mut(d).zip(&vectors) {
+            for (basis_vector, &coefficient) in basis.iter().zip(vector) {
+                for (x, b) in slot.iter_mut().zip(basis_vector) {
+                    *x += coefficient * b;
+                }
+            }
+            make_largest_positive(slot);
+        }
     }
 
     /// S in a basis of the tangent space, `[d−1, d−1]`.
@@ -301,7 +321,7 @@ mod tests {
         // The interpolation error of Laplace ε = 1 on 256 points is about 1e-5 in the curvatures (errata.md).
         let cloud = fibonacci_sphere(256);
         let geometry = geometry(&cloud, 1.0, &cloud, Orientation::Outward);
-        let curvatures = geometry.curvatures();
+        let curvatures = geometry.curvatures(&Unobserved).unwrap();
         assert!(geometry.degenerate().is_empty());
         for query in 0..256 {
             assert!(dot(geometry.normal(query), cloud.point(query)) > 1.0 - 1e-6);
@@ -317,7 +337,7 @@ mod tests {
         let stretched: Vec<f64> = cloud.points().flat_map(|x| [2.0 * x[0], x[1], 0.7 * x[2]]).collect();
         let cloud = Cloud::new(stretched, 3).unwrap();
         let geometry = geometry(&cloud, 1.0, &cloud, Orientation::Outward);
-        let curvatures = geometry.curvatures();
+        let curvatures = geometry.curvatures(&Unobserved).unwrap();
         for query in 0..200 {
             let directions: Vec<&[f64]> = curvatures.directions[query * 6..][..6].chunks(3).collect();
             assert!(dot(directions[0], directions[1]).abs() < 1e-14);
@@ -332,8 +352,8 @@ mod tests {
     #[test]
     fn the_gradient_orientation_is_the_opposite_of_outward() {
         let cloud = circle(40);
-        let outward = geometry(&cloud, 1.0, &cloud, Orientation::Outward).curvatures();
-        let gradient = geometry(&cloud, 1.0, &cloud, Orientation::Gradient).curvatures();
+        let outward = geometry(&cloud, 1.0, &cloud, Orientation::Outward).curvatures(&Unobserved).unwrap();
+        let gradient = geometry(&cloud, 1.0, &cloud, Orientation::Gradient).curvatures(&Unobserved).unwrap();
         for query in 0..40 {
             assert!((outward.principal[query] - 1.0).abs() < 1e-6);
             assert_eq!(outward.principal[query], -gradient.principal[query]);

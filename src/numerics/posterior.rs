@@ -26,6 +26,15 @@ pub struct Variances {
     pub clamped: Vec<usize>,
 }
 
+/// Covariance of the latent function with the queries where rounding was clamped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariance {
+    /// Symmetric `[m, m]`, unit V².
+    pub latent: Vec<f64>,
+    /// Queries whose variance, on the diagonal, came out negative within rounding and is served as 0.
+    pub clamped: Vec<usize>,
+}
+
 /// Posterior variance of the latent function (no noise added) at queries `[m, d]`.
 ///
 /// A negative result is clamped only within `τ(q) = 4ε(k₀ + ‖K + αI‖₁|w|²)`, w = (K+αI)⁻¹k(X, q), and reported.
@@ -61,16 +70,16 @@ pub fn variances(
     Ok(variances)
 }
 
-/// Posterior covariance of the latent function, `k(Q, Q) − VᵀV` with V = L⁻¹k(X, Q): symmetric `[m, m]`, unit V².
+/// Posterior covariance of the latent function, `k(Q, Q) − VᵀV` with V = L⁻¹k(X, Q). Its diagonal is clamped as
+/// [`variances`] are.
 ///
 /// # Errors
-/// [`NumericsError::DimensionMismatch`], [`NumericsError::NotPositiveDefinite`] without a Cholesky factor,
-/// [`NumericsError::Cancelled`].
+/// Those of [`variances`].
 pub fn covariance(
     factor: &GramFactor,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Covariance, NumericsError> {
     let (n, m) = (factor.n_points(), queries.n_points());
     factor.cloud().check_same_dimension(queries)?;
     let mut v = vec![0.0; n * m];
@@ -95,7 +104,17 @@ pub fn covariance(
             covariance[j * m + i] = covariance[i * m + j];
         }
     }
-    Ok(covariance)
+    let nodes = Nodes::of(factor.cloud());
+    let mut clamped = Vec::new();
+    for query in 0..m {
+        let variance = &mut covariance[query * (m + 1)];
+        if variance.is_nan() || *variance < 0.0 {
+            check_is_rounding(factor, &nodes, query, queries.point(query), *variance, observer)?;
+            clamped.push(query);
+            *variance = 0.0;
+        }
+    }
+    Ok(Covariance { latent: covariance, clamped })
 }
 
 /// `−½ YᵀΛ − ½ ln det(K + αI) − ½ n ln 2π` (Rasmussen and Williams 2006, eq. 2.30).
@@ -173,7 +192,7 @@ mod tests {
         let expected = [2.0 - 4.0 / 2.5, 2.0 - k * k / 2.5];
         let found = variances(&factor, &queries, &Unobserved).unwrap();
         assert!(found.latent.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-15));
-        let covariance = covariance(&factor, &queries, &Unobserved).unwrap();
+        let covariance = covariance(&factor, &queries, &Unobserved).unwrap().latent;
         assert!((covariance[1] - (k - 2.0 * k / 2.5)).abs() < 1e-15);
         let solution = Solution::of(&factor, &[3.0], &Unobserved).unwrap();
         let likelihood = log_marginal_likelihood(&factor, &solution, &[3.0]).unwrap();
@@ -190,7 +209,7 @@ mod tests {
         for family in all_families() {
             let factor = factor(&cloud, family, 1e-4);
             let variances = variances(&factor, &queries, &Unobserved).unwrap().latent;
-            let covariance = covariance(&factor, &queries, &Unobserved).unwrap();
+            let covariance = covariance(&factor, &queries, &Unobserved).unwrap().latent;
             let k0 = factor.kernel().at_zero();
             for (query, &variance) in variances.iter().enumerate() {
                 assert!((variance - covariance[query * 301]).abs() < 1e-13 * k0, "{family:?}");
@@ -218,5 +237,8 @@ mod tests {
         assert!(found.latent.iter().all(|&v| (0.0..1e-9).contains(&v)));
         assert!(!found.clamped.is_empty());
         assert!(found.clamped.iter().all(|&query| found.latent[query] == 0.0));
+        let covariance = covariance(&factor, &cloud, &Unobserved).unwrap();
+        assert!(!covariance.clamped.is_empty());
+        assert!((0..150).all(|query| covariance.latent[query * 151] >= 0.0));
     }
 }

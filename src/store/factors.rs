@@ -113,6 +113,11 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         Ok((stored, outcome))
     }
 
+    /// Whether a factorization is kept.
+    pub fn contains(&self, key: FactorKey) -> bool {
+        self.factors.contains_key(&key)
+    }
+
     /// The weights of values solved before.
     pub fn solution(&self, key: FactorKey, values: ValuesKey) -> Option<Arc<Solution>> {
         self.solutions.get(&(key, values))

@@ -16,6 +16,9 @@ fn assert_close(case: &str, what: &str, found: &Value, expected: &Value, sign: f
 fn compare(case: &str, what: &str, found: &Value, expected: &Value, sign: f64, tolerance: f64) {
     match (found, expected) {
         (Value::Null, _) => assert!(may_be_null(case), "{case}: {what} is null"),
+        (Value::Array(entries), _) if !entries.is_empty() && entries.iter().all(Value::is_null) => {
+            panic!("{case}: all of {what} is null")
+        }
         (Value::Array(found), Value::Array(expected)) => {
             assert_eq!(found.len(), expected.len(), "{case}: {what}");
             for (found, expected) in found.iter().zip(expected) {

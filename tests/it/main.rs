@@ -1,6 +1,18 @@
 //! The service over real sockets.
 
+mod access;
 mod cache;
+mod clouds;
+mod fits;
 mod golden;
+mod limits;
+mod memory;
 mod openapi;
+mod pages;
+mod problems;
+mod process;
+mod protocol;
+mod refusals;
+mod routes;
 mod support;
+mod unsolvable;

@@ -147,7 +147,7 @@ fn the_posterior_and_its_likelihood_are_those_of_a_direct_computation() {
         let prior = cross_gram(&queries, &kernel, &queries);
         let expected: Vec<f64> =
             (0..81).map(|at| prior[at] - dot(&whitened[at / 9], &whitened[at % 9])).collect();
-        let error = distance(&covariance(&factor, &queries, &Unobserved).unwrap(), &expected);
+        let error = distance(&covariance(&factor, &queries, &Unobserved).unwrap().latent, &expected);
         assert!(error <= tolerance * kernel.at_zero(), "{family:?}: covariance off by {error:e}");
     }
 }
@@ -157,7 +157,7 @@ fn covariances_are_symmetric_and_positive_semidefinite_with_the_variances_on_the
     let (cloud, queries) = (sphere(50), scattered(20, 3, 7));
     for family in families() {
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
-        let found = covariance(&factor, &queries, &Unobserved).unwrap();
+        let found = covariance(&factor, &queries, &Unobserved).unwrap().latent;
         let mut lifted = found.clone();
         // Rounding of k₀ − |L⁻¹k|², by n ε cond, may cost the smallest eigenvalues their sign.
         let tolerance = rounding(&factor) * factor.kernel().at_zero();

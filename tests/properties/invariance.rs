@@ -91,7 +91,7 @@ struct Answers {
 fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha: f64) -> Answers {
     let factor = factorize(cloud, kernel, alpha);
     let (u, geometry) = (fit(&factor, values), geometry(&factor, queries));
-    let curvatures = geometry.curvatures();
+    let curvatures = geometry.curvatures(&Unobserved).unwrap();
     let fields = vec![
         ("values", u.at(queries, JetOrder::Value, &Unobserved).unwrap().values()),
         ("variances", variances(&factor, queries, &Unobserved).unwrap().latent),

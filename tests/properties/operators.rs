@@ -157,7 +157,7 @@ fn the_shape_operator_is_the_derivative_of_the_normals() {
     for family in families() {
         let factor = factorize(&cloud, kernel(family, 1.5), 1e-4);
         let here = geometry(&factor, &queries);
-        let curvatures = here.curvatures();
+        let curvatures = here.curvatures(&Unobserved).unwrap();
         let slopes: Vec<Vec<f64>> = (0..3)
             .map(|axis| {
                 let above = geometry(&factor, &shifted(&queries, axis, h));
@@ -200,9 +200,9 @@ fn turning_the_normals_around_negates_curvatures_and_keeps_the_laplacian() {
         });
         let negated: Vec<f64> = inward.normals().iter().map(|x| -x).collect();
         assert!(outward.normals() == negated, "{family:?}: normals");
-        let negated: Vec<f64> = inward.curvatures().mean.iter().map(|x| -x).collect();
-        let mean = outward.curvatures().mean;
-        let scale = 8.0 * EPS * largest(outward.curvatures().principal);
+        let negated: Vec<f64> = inward.curvatures(&Unobserved).unwrap().mean.iter().map(|x| -x).collect();
+        let mean = outward.curvatures(&Unobserved).unwrap().mean;
+        let scale = 8.0 * EPS * largest(outward.curvatures(&Unobserved).unwrap().principal);
         assert!(distance(&mean, &negated) <= scale, "{family:?}: mean curvatures");
         let u = fit(&factor, &values);
         assert!(

@@ -1,6 +1,8 @@
 //! `/v1/clouds`: registered clouds, named by their content.
 
+use std::fmt;
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use axum::Extension;
 use axum::extract::{Path, RawQuery, Request, State};
@@ -152,7 +154,7 @@ pub async fn create_cloud(
     tag = "clouds",
     params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
     responses(
-        (status = 200, description = "The cloud", body = Cloud, headers(("ETag" = String, description = "The id in quotes"))),
+        (status = 200, description = "The cloud", body = Cloud, headers(("ETag" = String, description = "The id in quotes, weak"))),
         (status = 304, description = "The client has it already"),
         LookUpProblems
     ),
@@ -165,7 +167,7 @@ pub async fn get_cloud(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let stored = find(&app, owner, &cloud_id)?;
-    let etag = format!("\"{}\"", stored.id);
+    let etag = etag_of(&stored);
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
@@ -193,7 +195,7 @@ pub async fn check_cloud(
     Path(cloud_id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let etag = format!("\"{}\"", find(&app, owner, &cloud_id)?.id);
+    let etag = etag_of(find(&app, owner, &cloud_id)?.as_ref());
     let status = if is_known(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
     let json = HeaderValue::from_static("application/json");
     let mut response = (status, [(header::ETAG, etag)]).into_response();
@@ -236,7 +238,7 @@ pub async fn delete_cloud(
     tag = "clouds",
     params(
         ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000),
-        ("cursor" = Option<String>, Query, description = "`next` of the page before", pattern = "^[0-9a-f]{64}$")
+        ("cursor" = Option<String>, Query, description = "`next` of the page before")
     ),
     responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems),
     security((), ("bearer" = []))
@@ -253,25 +255,44 @@ pub async fn list_clouds(
         let clouds = shared.clouds.list(owner);
         let start = match page.after {
             None => 0,
-            Some(id) => match clouds.iter().position(|stored| stored.id == id) {
-                Some(position) => position + 1,
-                None => {
-                    return Err(Problem::invalid_request("/cursor", "this cursor has expired; list again"));
-                }
-            },
+            Some(last) => clouds.partition_point(|stored| Cursor::of(stored) <= last),
         };
         let shown = &clouds[start..clouds.len().min(start.saturating_add(page.limit))];
         let is_last = start + shown.len() == clouds.len();
-        let next = shown.last().filter(|_| !is_last).map(|stored| stored.id.to_string());
-        Ok(CloudList { clouds: shown.iter().map(|stored| Cloud::from(stored.as_ref())).collect(), next })
+        let next = shown.last().filter(|_| !is_last).map(|stored| Cursor::of(stored).to_string());
+        CloudList { clouds: shown.iter().map(|stored| Cloud::from(stored.as_ref())).collect(), next }
     };
-    app.compute.run(0.0, job).await?.0.map(axum::Json)
+    Ok(axum::Json(app.compute.run(0.0, job).await?.0))
 }
 
 struct Page {
     limit: usize,
-    /// The last cloud of the page before. Opaque to clients.
-    after: Option<CloudId>,
+    after: Option<Cursor>,
+}
+
+/// The place of the last cloud of a page in the order of the list: it holds when that cloud is gone. Opaque to clients.
+#[derive(PartialEq, PartialOrd)]
+struct Cursor {
+    nanoseconds: u128,
+    id: CloudId,
+}
+
+impl Cursor {
+    fn of(stored: &StoredCloud) -> Self {
+        let since_epoch = stored.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        Self { nanoseconds: since_epoch.as_nanos(), id: stored.id }
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let (nanoseconds, id) = text.split_once('-')?;
+        Some(Self { nanoseconds: u128::from_str_radix(nanoseconds, 16).ok()?, id: CloudId::parse(id)? })
+    }
+}
+
+impl fmt::Display for Cursor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:x}-{}", self.nanoseconds, self.id)
+    }
 }
 
 impl Page {
@@ -287,8 +308,8 @@ impl Page {
                         return Err(Problem::invalid_request("/limit", detail));
                     }
                 },
-                "cursor" => match CloudId::parse(value) {
-                    Some(id) => page.after = Some(id),
+                "cursor" => match Cursor::parse(value) {
+                    Some(cursor) => page.after = Some(cursor),
                     None => return Err(Problem::invalid_request("/cursor", "this is no cursor of a page")),
                 },
                 _ => {
@@ -301,6 +322,11 @@ impl Page {
     }
 }
 
+/// Weak: a cloud that was deleted and posted again has the same points, but another `created_at`.
+fn etag_of(stored: &StoredCloud) -> String {
+    format!("W/\"{}\"", stored.id)
+}
+
 fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<StoredCloud>, Problem> {
     let found = CloudId::parse(cloud_id).and_then(|id| app.clouds.get(owner, id));
     found.ok_or_else(|| unknown_cloud(cloud_id))
@@ -308,6 +334,8 @@ fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<StoredCloud>, Pro
 
 /// RFC 9110, section 13.1.2: a list of tags, weak or strong, or `*`.
 fn is_known(headers: &HeaderMap, etag: &str) -> bool {
-    let tags = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok()).unwrap_or("");
-    tags.split(',').map(str::trim).any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
+    let opaque = |tag: &str| tag.strip_prefix("W/").unwrap_or(tag).to_owned();
+    let lines = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());
+    let mut tags = lines.flat_map(|line| line.split(',')).map(str::trim);
+    tags.any(|tag| tag == "*" || opaque(tag) == opaque(etag))
 }

@@ -95,9 +95,9 @@ impl Operation for InterpolationRequest {
         if derivatives > 2 {
             return Err(Problem::invalid_request("/derivatives", "derivatives must be 0, 1 or 2"));
         }
-        let main = planner.fit(self.take_fit(), Purpose::Values)?;
+        let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
         planner.check_values(&self.values, &main)?;
-        let queries = planner.queries(self.queries, &main.stored)?;
+        let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
         let per_query = [1, 1 + d, 1 + d + d * d][usize::from(derivatives)];
         planner.check_answer(m.checked_mul(per_query))?;

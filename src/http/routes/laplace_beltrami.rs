@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use super::surface::check_is_surface;
 use crate::app::App;
 use crate::http::array::Array;
-use crate::http::body::{Points, present, present_object};
+use crate::http::body::{Points, present, present_object, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::{Fits, degenerate, per_query};
@@ -64,7 +64,7 @@ request! {
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
         /// How the matrix is written; `dense` if absent.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub format: Option<MatrixFormat>,
     }
@@ -239,10 +239,10 @@ pub fn plan_applied(
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<AppliedWork>, Problem> {
     check_surface_choice(&geometry);
-    let (main, surface) = planner.fits(fit, geometry)?;
+    let (mut main, mut surface) = planner.fits(fit, geometry)?;
     check_is_surface(&main.stored.cloud)?;
     planner.check_values(&values, &main)?;
-    let queries = planner.queries(queries, &surface.stored)?;
+    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let m = queries.n_points();
     planner.check_answer(m.checked_mul(numbers_per_query(queries.dimension())))?;
     let n = (main.fitted.n_points() + surface.fitted.n_points()) as f64;
@@ -262,9 +262,9 @@ pub fn plan_matrix(
     rows_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<MatrixWork>, Problem> {
     check_surface_choice(&geometry);
-    let (main, surface) = planner.fits(fit, geometry)?;
+    let (mut main, mut surface) = planner.fits(fit, geometry)?;
     check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &surface.stored)?;
+    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let n = main.stored.cloud.n_points();
     let n_rows = queries.n_points().checked_mul(rows_per_query(queries.dimension()));
     planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?;

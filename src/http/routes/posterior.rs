@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 use crate::app::App;
 use crate::http::array::{Array, finite_if_present};
-use crate::http::body::{Points, present};
+use crate::http::body::{Points, present, present_words};
 use crate::http::compute::JobObserver;
 use crate::http::fit::{FitPlan, Planner};
 use crate::http::fitted::Fits;
@@ -21,7 +21,7 @@ use crate::http::shared::{Diagnostics, Warning, WarningCode, request};
 use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::jets::JetOrder;
-use crate::numerics::posterior::{Variances, covariance, log_marginal_likelihood, variances};
+use crate::numerics::posterior::{covariance, log_marginal_likelihood, variances};
 use crate::numerics::regularization::Regularization;
 use crate::store::Owner;
 
@@ -52,7 +52,7 @@ request! {
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// What is wanted beside the mean; nothing if absent.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
     }
@@ -127,9 +127,9 @@ impl Operation for PosteriorRequest {
     type Answer = PosteriorResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let main = planner.fit(self.take_fit(), Purpose::Values)?;
+        let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
         planner.check_values(&self.values, &main)?;
-        let queries = planner.queries(self.queries, &main.stored)?;
+        let queries = planner.queries(self.queries, &mut [&mut main])?;
         let work = Work { values: self.values, queries, include: self.include.unwrap_or_default() };
         check_observation_noise(&work, &main)?;
         let (n, m, d) = (main.fitted.n_points(), work.queries.n_points(), work.queries.dimension());
@@ -159,13 +159,12 @@ impl Operation for PosteriorRequest {
             false => None,
             true => Some(variances(factor, queries, observer).map_err(refused)?),
         };
-        if let Some(latent) = &latent {
-            warn_of_clamping(latent, &mut diagnostics);
-        }
         let covariance = match work.wants(Q::Covariance) {
             false => None,
             true => Some(covariance(factor, queries, observer).map_err(refused)?),
         };
+        let clamped = latent.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
+        warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
         let log_marginal_likelihood = match work.wants(Q::LogMarginalLikelihood) {
             false => None,
             true => {
@@ -182,7 +181,7 @@ impl Operation for PosteriorRequest {
             means: Array::new(jets.values(), &[m]),
             variances: of_latent(Q::Variance, 0.0),
             observation_variances: of_latent(Q::ObservationVariance, alpha),
-            covariance: covariance.map(|covariance| Array::new(covariance, &[m, m])),
+            covariance: covariance.map(|covariance| Array::new(covariance.latent, &[m, m])),
             gradients: work.wants(Q::Gradients).then(|| {
                 Array::new((0..m).flat_map(|query| jets.gradient(query).to_vec()).collect(), &[m, d])
             }),
@@ -205,9 +204,9 @@ fn check_observation_noise(work: &Work, plan: &FitPlan) -> Result<(), Problem> {
     }
 }
 
-fn warn_of_clamping(variances: &Variances, diagnostics: &mut Diagnostics) {
-    let Some(first) = variances.clamped.first() else { return };
-    let count = variances.clamped.len();
+fn warn_of_clamping(clamped: &[usize], diagnostics: &mut Diagnostics) {
+    let Some(first) = clamped.first() else { return };
+    let count = clamped.len();
     diagnostics.warnings.push(Warning {
         code: WarningCode::VarianceClamped,
         detail: format!(

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 
 use crate::app::App;
 use crate::http::array::Array;
-use crate::http::body::{Points, present};
+use crate::http::body::{Points, present, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::{Fits, degenerate, per_query};
@@ -33,11 +33,11 @@ request! {
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Which function's level surface is meant.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
         /// Which way normals point; `outward` if absent.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
     }
@@ -51,11 +51,11 @@ request! {
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
         /// Which function's level surface is meant.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
         /// Which way normals point, and with them the sign of curvatures; `outward` if absent.
-        #[serde(default, deserialize_with = "present")]
+        #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
     }
@@ -198,7 +198,7 @@ impl Operation for CurvaturesRequest {
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<CurvaturesResponse, Problem> {
         let (geometry, signature) = fits.geometry(&work.queries, work.orientation, observer)?;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
-        let curvatures = geometry.curvatures();
+        let curvatures = geometry.curvatures(observer).map_err(|error| fits.surface().refused(error))?;
         Ok(CurvaturesResponse {
             principal_curvatures: per_query(&geometry, curvatures.principal, &[m, d - 1]),
             principal_directions: per_query(&geometry, curvatures.directions, &[m, d - 1, d]),
@@ -222,12 +222,13 @@ fn plan(
     purpose: Purpose,
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<Work>, Problem> {
-    let main = planner.fit(fit, purpose)?;
+    let mut main = planner.fit(fit, purpose)?;
     check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &main.stored)?;
+    let queries = planner.queries(queries, &mut [&mut main])?;
     let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
     planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
-    let flops = 60.0 * (n as f64) * (m + n) as f64;
+    // The sums over the points, and some thirty operations per entry of each shape operator.
+    let flops = 60.0 * (n as f64) * (m + n) as f64 + 30.0 * m as f64 * (d as f64).powi(3);
     Ok(Plan {
         main,
         surface: None,

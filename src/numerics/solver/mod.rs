@@ -50,7 +50,7 @@ enum Factorization {
 }
 
 impl GramFactor {
-    /// Bytes a dense factorization of n points needs at its peak, checked.
+    /// Bytes a Cholesky factorization of n points needs at its peak, checked; the fallback may need several times that.
     pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
         n_points.checked_mul(Cholesky::stride_for(n_points))?.checked_mul(size_of::<f64>())
     }

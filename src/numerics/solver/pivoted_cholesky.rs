@@ -3,6 +3,7 @@
 
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, MatMut, MatRef};
+use rayon::prelude::*;
 
 use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
@@ -14,6 +15,9 @@ use crate::numerics::regularization::Regularization;
 
 /// Pivots below this multiple of ε k₀ are rounding (numerics.md, Fit 2).
 const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;
+
+/// Rows of the new column that one task updates: they stay in the L1 cache while all earlier columns pass by.
+const ROWS_PER_TASK: usize = 1024;
 
 /// `K ≈ LLᵀ` with r columns, and the map from values to weights on the r pivots Z.
 ///
@@ -123,12 +127,14 @@ fn pivoted_columns(
         let Some(pivot) = remaining.iter().position(|&d| d == largest && d > tolerance) else { break };
         let at_pivot = Cloud::new(cloud.point(pivot).to_vec(), cloud.dimension())?;
         fill_cross_gram(&nodes, kernel, &at_pivot, &mut column, observer)?;
-        for previous in columns.chunks_exact(n) {
-            let factor = previous[pivot];
-            for (entry, &l) in column.iter_mut().zip(previous) {
-                *entry -= factor * l;
+        column.par_chunks_mut(ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
+            for previous in columns.chunks_exact(n) {
+                let factor = previous[pivot];
+                for (entry, &l) in rows.iter_mut().zip(&previous[task * ROWS_PER_TASK..]) {
+                    *entry -= factor * l;
+                }
             }
-        }
+        });
         let scale = 1.0 / largest.sqrt();
         for (point, entry) in column.iter_mut().enumerate() {
             *entry *= scale;

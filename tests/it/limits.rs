@@ -1,0 +1,169 @@
+//! Limits of size, time, place and access: each has its problem, and the server goes on.
+
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+use crate::routes::{ROUTES, route_of};
+use crate::support::{Server, fibonacci_sphere};
+
+/// A request that takes seconds on any machine.
+fn slow_request() -> Value {
+    let points = fibonacci_sphere(12_000);
+    json!({
+        "cloud": {"points": points},
+        "kernel": {"family": "matern", "length_scale": 0.3},
+        "alpha": 1e-6,
+        "queries": points[..1],
+    })
+}
+
+#[tokio::test]
+async fn bodies_beyond_the_limit_are_refused_when_announced() {
+    let server = Server::with_flags(&["--max-body-bytes", "4000"]).await;
+    for route in &ROUTES {
+        let good = route.request().to_string();
+        let fits = format!("{good}{}", " ".repeat(4000 - good.len()));
+        let body = format!("{good}{}", " ".repeat(4001 - good.len()));
+        let problem = server.post_text(route.path, body).await.expect_problem(413, "body-too-large");
+        assert_eq!((&problem["limit"], &problem["required"]), (&json!(4000), &json!(4001)));
+        server.post_text(route.path, fits).await.expect_ok();
+    }
+    // More than sockets buffer: the client is still sending when the server knows.
+    let body = " ".repeat(20 << 20);
+    let problem = server.post_text("/v1/clouds", body).await.expect_problem(413, "body-too-large");
+    assert_eq!(problem["required"], 20 << 20);
+}
+
+#[tokio::test]
+async fn bodies_beyond_the_limit_are_refused_when_streamed() {
+    let server = Server::with_flags(&["--max-body-bytes", "4000"]).await;
+    let mut stream = TcpStream::connect(server.address).await.unwrap();
+    let head = "POST /v1/interpolation HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\n\
+                Connection: close\r\nTransfer-Encoding: chunked\r\n\r\n";
+    stream.write_all(head.as_bytes()).await.unwrap();
+    let chunk = format!("3e8\r\n{}\r\n", " ".repeat(1000));
+    for _ in 0..200 {
+        stream.write_all(chunk.as_bytes()).await.unwrap();
+    }
+    stream.write_all(b"0\r\n\r\n").await.unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    assert!(answer.starts_with("HTTP/1.1 413 "), "{answer}");
+    let document: Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+    assert_eq!((&document["type"], &document["limit"]), (&json!("/problems/body-too-large"), &json!(4000)));
+    let route = route_of("/v1/interpolation");
+    server.post(route.path, &route.request()).await.expect_ok();
+}
+
+#[tokio::test]
+async fn a_body_that_breaks_off_leaves_the_server_as_it_was() {
+    let server = Server::with_flags(&["--threads", "1", "--max-queue", "0"]).await;
+    for _ in 0..3 {
+        let mut stream = TcpStream::connect(server.address).await.unwrap();
+        let head = "POST /v1/interpolation HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\n\
+                    Content-Length: 1000\r\n\r\n{\"cloud\"";
+        stream.write_all(head.as_bytes()).await.unwrap();
+        stream.shutdown().await.unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).await.unwrap();
+    }
+    let route = route_of("/v1/interpolation");
+    server.post(route.path, &route.request()).await.expect_ok();
+}
+
+#[tokio::test]
+async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
+    let server =
+        Server::with_flags(&["--max-points", "20", "--max-dimension", "3", "--max-queries", "5"]).await;
+    let refuses = async |path: &str, body: Value, pointer: &str, limit: u64, required: u64| {
+        let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
+        assert_eq!(problem["errors"][0]["pointer"], pointer);
+        assert_eq!((&problem["limit"], &problem["required"]), (&json!(limit), &json!(required)), "{path}");
+    };
+    for route in &ROUTES {
+        let many = route.with("/cloud/points", &json!(fibonacci_sphere(21)));
+        refuses(route.path, many, "/cloud/points", 20, 21).await;
+        let wide = route.with("/cloud/points", &json!([[1, 2, 3, 4], [5, 6, 7, 8]]));
+        refuses(route.path, wide, "/cloud/points", 3, 4).await;
+        let queries = route.with("/queries", &json!(fibonacci_sphere(6)));
+        refuses(route.path, queries, "/queries", 5, 6).await;
+        if route.has_geometry {
+            let surface = json!({"cloud": {"points": fibonacci_sphere(21)}});
+            refuses(route.path, route.with("/geometry", &surface), "/geometry/cloud/points", 20, 21).await;
+        }
+        let mut good = route.request();
+        good["queries"] = json!(fibonacci_sphere(5));
+        server.post(route.path, &good).await.expect_ok();
+    }
+    refuses("/v1/clouds", json!({"points": fibonacci_sphere(21)}), "/points", 20, 21).await;
+}
+
+#[tokio::test]
+async fn answers_beyond_the_limit_are_refused_before_they_are_computed() {
+    let server = Server::with_flags(&["--max-response-bytes", "5000"]).await;
+    // 20 points and 20 queries: 25 bytes for each number.
+    for (path, member, value, required) in [
+        ("/v1/laplace-beltrami/matrix", "alpha", json!(1e-8), 25 * 20 * 20),
+        ("/v1/surface-gradient/matrix", "alpha", json!(1e-8), 25 * 3 * 20 * 20),
+        ("/v1/posterior", "include", json!(["covariance"]), 25 * 20 * 20),
+        ("/v1/interpolation", "derivatives", json!(2), 25 * 20 * 13),
+        ("/v1/curvatures", "alpha", json!(1e-8), 25 * 20 * 15),
+    ] {
+        let mut body = route_of(path).with(&format!("/{member}"), &value);
+        let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
+        assert_eq!(problem["limit"], 5000);
+        let found = problem["required"].as_u64().unwrap();
+        assert!((required..=2 * required).contains(&found), "{path}: {found} against {required}");
+        body["queries"] = json!([[0.5, 0.5, 2.0]]);
+        let answer = server.post(path, &body).await;
+        assert_eq!(answer.status, 200, "{path}: {}", answer.text);
+    }
+}
+
+#[tokio::test]
+async fn an_answer_that_takes_too_long_is_given_up_and_others_go_on() {
+    let server = Server::with_flags(&["--deadline-seconds", "0.7"]).await;
+    let small = route_of("/v1/curvatures").request();
+    for _ in 0..2 {
+        let problem =
+            server.post("/v1/curvatures", &slow_request()).await.expect_problem(504, "deadline-exceeded");
+        assert!(problem["detail"].as_str().unwrap().contains("0.7"));
+        server.post("/v1/curvatures", &small).await.expect_ok();
+        server.get("/health/ready").await.expect_ok();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_queue_turns_requests_away_until_there_is_room() {
+    for max_queue in [0, 1] {
+        let server = Server::with_flags(&["--threads", "1", "--max-queue", &max_queue.to_string()]).await;
+        let body = slow_request().to_string();
+        let slow = (0..1 + max_queue).map(|_| {
+            let request = server.client.post(server.url("/v1/curvatures"));
+            tokio::spawn(request.header("content-type", "application/json").body(body.clone()).send())
+        });
+        let slow: Vec<_> = slow.collect();
+        while server.get("/health/ready").await.status == 200 {}
+        for route in &ROUTES {
+            let answer = server.post(route.path, &route.request()).await;
+            answer.expect_problem(503, "overloaded");
+            let seconds: u64 = answer.header("retry-after").parse().unwrap();
+            assert!((1..=600).contains(&seconds));
+        }
+        let ready = server.get("/health/ready").await;
+        ready.expect_problem(503, "overloaded");
+        assert!(!ready.header("retry-after").is_empty());
+        for path in ["/health/live", "/version", "/v1/kernels", "/openapi.json"] {
+            server.get(path).await.expect_ok();
+        }
+        // Clients that leave give their places back.
+        for request in slow {
+            request.abort();
+        }
+        while server.get("/health/ready").await.status != 200 {}
+        for route in &ROUTES {
+            server.post(route.path, &route.request()).await.expect_ok();
+        }
+    }
+}

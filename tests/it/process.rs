@@ -1,0 +1,261 @@
+//! The binary itself: settings, readiness, logs, and how it ends.
+
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::support::fibonacci_sphere;
+
+/// The binary, serving on a port of its own; killed when dropped.
+pub struct Process {
+    child: Child,
+    address: String,
+    lines: Arc<Mutex<Vec<String>>>,
+    reader: Option<JoinHandle<()>>,
+}
+
+/// The binary without the settings of whoever runs the tests.
+fn gramian() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gramian"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("GRAMIAN_") || name == "RUST_LOG") {
+        command.env_remove(name);
+    }
+    command
+}
+
+impl Process {
+    pub fn start(flags: &[&str]) -> Self {
+        Self::of(gramian().args(["--bind", "127.0.0.1:0"]).args(flags))
+    }
+
+    fn of(command: &mut Command) -> Self {
+        let mut child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+        let mut stderr = BufReader::new(child.stderr.take().unwrap());
+        let (mut first, mut address) = (Vec::new(), None);
+        while address.is_none() {
+            let mut line = String::new();
+            assert!(stderr.read_line(&mut line).unwrap() > 0, "ended before it listened: {first:?}");
+            let entry: Value = serde_json::from_str(&line).unwrap_or_else(|_| panic!("no JSON: {line}"));
+            address = entry["fields"]["address"].as_str().map(str::to_owned);
+            first.push(line);
+        }
+        let lines = Arc::new(Mutex::new(first));
+        let sink = lines.clone();
+        let reader = std::thread::spawn(move || {
+            for line in stderr.lines() {
+                sink.lock().unwrap().push(line.unwrap());
+            }
+        });
+        Self { child, address: address.unwrap(), lines, reader: Some(reader) }
+    }
+
+    pub fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+
+    /// The most memory it ever had.
+    pub fn peak_resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
+        let kibibytes: u64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+        kibibytes << 10
+    }
+
+    fn terminate(&self) {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    }
+
+    /// Waits for its end; answers with its status and everything it logged.
+    fn finish(mut self) -> (ExitStatus, Vec<String>) {
+        let status = self.child.wait().unwrap();
+        self.reader.take().unwrap().join().unwrap();
+        let lines = std::mem::take(&mut *self.lines.lock().unwrap());
+        (status, lines)
+    }
+
+    fn health(&self) -> ExitStatus {
+        gramian().arg("health").env("GRAMIAN_BIND", &self.address).stderr(Stdio::null()).status().unwrap()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Both fail if it has ended, which is as well.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+async fn get(process: &Process, path: &str) -> (u16, Value) {
+    let response = reqwest::get(process.url(path)).await.unwrap();
+    (response.status().as_u16(), response.json().await.unwrap())
+}
+
+fn spawn_post(process: &Process, path: &str, body: &Value) -> tokio::task::JoinHandle<(u16, Value)> {
+    let request = reqwest::Client::new().post(process.url(path)).json(body);
+    tokio::spawn(async move {
+        let response = request.send().await.unwrap();
+        (response.status().as_u16(), response.json().await.unwrap())
+    })
+}
+
+fn curvatures(n: usize) -> Value {
+    let points = fibonacci_sphere(n);
+    let kernel = json!({"family": "matern", "length_scale": 0.3});
+    json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6, "queries": points[..1]})
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_probe_of_the_container_says_whether_the_server_is_ready() {
+    let process = Process::start(&["--threads", "1", "--max-queue", "0"]);
+    assert_eq!(process.health().code(), Some(0));
+    let slow = spawn_post(&process, "/v1/curvatures", &curvatures(12_000));
+    while get(&process, "/health/ready").await.0 == 200 {}
+    assert!(!process.health().success());
+    slow.abort();
+    while get(&process, "/health/ready").await.0 != 200 {}
+    assert_eq!(process.health().code(), Some(0));
+    let address = process.address.clone();
+    process.terminate();
+    assert_eq!(process.finish().0.code(), Some(0));
+    // Nothing listens any more.
+    let health = gramian().args(["--bind", &address, "health"]).output().unwrap();
+    assert!(health.status.code().is_some_and(|code| code != 0));
+    assert!(!health.stderr.is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_under_way_is_finished_before_the_process_ends() {
+    let process = Process::start(&[]);
+    let slow = spawn_post(&process, "/v1/curvatures", &curvatures(5000));
+    // It is under way once its cloud is registered.
+    while get(&process, "/v1/clouds").await.1["clouds"][0].is_null() {}
+    process.terminate();
+    let (status, answer) = slow.await.unwrap();
+    assert_eq!(status, 200);
+    assert!((answer["mean_curvatures"][0].as_f64().unwrap() - 1.0).abs() < 0.05, "{answer}");
+    let (status, lines) = process.finish();
+    assert_eq!(status.code(), Some(0));
+    let position = |text: &str| lines.iter().position(|line| line.contains(text)).unwrap();
+    assert!(position("draining") < position("POST /v1/curvatures 200"), "{lines:#?}");
+}
+
+#[tokio::test]
+async fn a_client_that_never_finishes_its_request_does_not_hold_the_process() {
+    for stalled in [
+        "GET /health/live HT",
+        "POST /v1/normals HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{",
+    ] {
+        let mut process = Process::start(&["--deadline-seconds", "1"]);
+        let mut connection = std::net::TcpStream::connect(&process.address).unwrap();
+        connection.write_all(stalled.as_bytes()).unwrap();
+        // Connections are accepted in order: the stalled one is there once this one is answered.
+        assert_eq!(get(&process, "/health/live").await.0, 200);
+        process.terminate();
+        let began = Instant::now();
+        while process.child.try_wait().unwrap().is_none() {
+            assert!(began.elapsed() < Duration::from_secs(10), "still running after {stalled:?}");
+            std::thread::yield_now();
+        }
+        assert_eq!(process.finish().0.code(), Some(0));
+    }
+}
+
+#[tokio::test]
+async fn the_log_names_requests_and_never_shows_what_they_carry() {
+    let process = Process::of(
+        gramian().args(["--bind", "127.0.0.1:0", "--api-keys", "secret-key"]).env("RUST_LOG", "trace"),
+    );
+    let mut body = curvatures(20);
+    body["cloud"]["points"][7] = json!([0.123456789, 0.987654321, 0.555444333]);
+    let mut bad = body.clone();
+    bad["cloud"]["points"][9] = json!([0.123456789, 0.987654321, "0.555444333"]);
+    let mut twins = body.clone();
+    twins["cloud"]["points"][8] = twins["cloud"]["points"][7].clone();
+    twins["alpha"] = json!(0);
+    for (body, id, status) in [(body, "good-1", 200), (bad, "bad-1", 422), (twins, "twins-1", 422)] {
+        let request = reqwest::Client::new().post(process.url("/v1/curvatures?q=0.123456789")).json(&body);
+        let request = request.header("x-request-id", id).bearer_auth("secret-key");
+        assert_eq!(request.send().await.unwrap().status(), status);
+    }
+    process.terminate();
+    let lines = process.finish().1;
+    let text = lines.join("\n");
+    for hidden in ["123456789", "987654321", "555444333", "secret-key"] {
+        assert!(!text.contains(hidden), "{hidden} in {text}");
+    }
+    for (id, status) in [("good-1", 200), ("bad-1", 422), ("twins-1", 422)] {
+        let line = lines.iter().find(|line| line.contains(id)).unwrap();
+        let fields = serde_json::from_str::<Value>(line).unwrap()["fields"].clone();
+        assert_eq!((&fields["request_id"], &fields["status"]), (&json!(id), &json!(status)));
+        assert_eq!((&fields["method"], &fields["path"]), (&json!("POST"), &json!("/v1/curvatures")));
+        assert!(fields["duration_ms"].as_f64().unwrap() > 0.0);
+    }
+}
+
+#[tokio::test]
+async fn every_setting_has_a_variable_and_a_flag_which_wins() {
+    let help = gramian().arg("--help").env("GRAMIAN_API_KEYS", "secret-key").output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    for name in [
+        "BIND",
+        "THREADS",
+        "CACHE_BYTES",
+        "CLOUD_BYTES",
+        "MAX_POINTS",
+        "MAX_QUERIES",
+        "MAX_DIMENSION",
+        "MAX_BODY_BYTES",
+        "MAX_RESPONSE_BYTES",
+        "MAX_QUEUE",
+        "DEADLINE_SECONDS",
+        "API_KEYS",
+        "CORS_ORIGINS",
+    ] {
+        let flag = format!("--{} ", name.to_lowercase().replace('_', "-"));
+        assert!(help.contains(&format!("GRAMIAN_{name}")) && help.contains(&flag), "{name}: {help}");
+    }
+    assert!(!help.contains("secret-key"));
+
+    let settings = [
+        ("BIND", "127.0.0.1:0"),
+        ("THREADS", "2"),
+        ("MAX_POINTS", "5"),
+        ("API_KEYS", "one,two"),
+        ("CORS_ORIGINS", "https://one.example"),
+    ];
+    let mut command = gramian();
+    command.envs(settings.map(|(name, value)| (format!("GRAMIAN_{name}"), value)));
+    for (flags, threads) in [(&[][..], 2), (&["--threads", "1"], 1)] {
+        let process = Process::of(command.args(flags));
+        assert_eq!(get(&process, "/version").await.1["threads"], threads);
+        assert_eq!(get(&process, "/v1/kernels").await.0, 401);
+        let request = reqwest::Client::new().post(process.url("/v1/curvatures")).bearer_auth("two");
+        let request = request.header("origin", "https://one.example").json(&curvatures(6));
+        let response = request.send().await.unwrap();
+        assert_eq!(response.headers()["access-control-allow-origin"], "https://one.example");
+        assert_eq!(response.status(), 413);
+        assert_eq!(response.json::<Value>().await.unwrap()["limit"], 5);
+    }
+}
+
+#[test]
+fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
+    for (name, value) in [
+        ("BIND", "nowhere"),
+        ("THREADS", "-1"),
+        ("MAX_POINTS", "many"),
+        ("DEADLINE_SECONDS", "0"),
+        ("DEADLINE_SECONDS", "NaN"),
+    ] {
+        let output = gramian().env(format!("GRAMIAN_{name}"), value).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}={value}");
+        let flag = format!("--{}", name.to_lowercase().replace('_', "-"));
+        assert!(String::from_utf8(output.stderr).unwrap().contains(&flag), "{name}={value}");
+    }
+}

@@ -1,0 +1,136 @@
+//! What HTTP itself asks for: paths, methods, media types, request ids.
+
+use serde_json::json;
+
+use crate::routes::ROUTES;
+use crate::support::Server;
+
+#[tokio::test]
+async fn unknown_paths_are_problems_too() {
+    let server = Server::start().await;
+    for path in
+        ["/nowhere", "/v1", "/v1/", "/v1/nowhere", "/v2/interpolation", "/v1/interpolation/", "/problems/no"]
+    {
+        server.get(path).await.expect_problem(404, "not-found");
+        if path != "/problems/no" {
+            server.post(path, &json!({})).await.expect_problem(404, "not-found");
+        }
+    }
+    server.get("/v1/clouds/nonsense").await.expect_problem(404, "unknown-cloud");
+    server.get("/health/ready").await.expect_ok();
+}
+
+#[tokio::test]
+async fn a_wrong_method_is_answered_with_the_right_ones() {
+    let server = Server::start().await;
+    let id = "0".repeat(64);
+    let allowed = async |method: reqwest::Method, path: &str| {
+        let answer = server.send(server.client.request(method, server.url(path))).await;
+        answer.expect_problem(405, "method-not-allowed");
+        let mut methods: Vec<_> = answer.header("allow").split(',').map(|m| m.trim().to_owned()).collect();
+        methods.sort();
+        methods.join(" ")
+    };
+    for route in &ROUTES {
+        for method in [reqwest::Method::GET, reqwest::Method::PUT, reqwest::Method::DELETE] {
+            assert_eq!(allowed(method, route.path).await, "POST", "{}", route.path);
+        }
+        server.post(route.path, &route.request()).await.expect_ok();
+    }
+    assert_eq!(allowed(reqwest::Method::PUT, "/v1/clouds").await, "GET HEAD POST");
+    assert_eq!(allowed(reqwest::Method::POST, &format!("/v1/clouds/{id}")).await, "DELETE GET HEAD");
+    for path in
+        ["/v1/kernels", "/health/live", "/health/ready", "/version", "/openapi.json", "/problems/internal"]
+    {
+        assert_eq!(allowed(reqwest::Method::POST, path).await, "GET HEAD", "{path}");
+    }
+}
+
+#[tokio::test]
+async fn answers_come_as_json_or_not_at_all() {
+    let server = Server::start().await;
+    let clouds = ("/v1/clouds", json!({"points": [[1, 2]]}));
+    for (path, body) in ROUTES.iter().map(|route| (route.path, route.request())).chain([clouds]) {
+        let send = async |accept: &str| {
+            let request = server.client.post(server.url(path)).json(&body).header("accept", accept);
+            server.send(request).await
+        };
+        for accept in ["text/html", "application/x-npy", "application/json;q=0", "image/*, text/*;q=0.5"] {
+            let problem = send(accept).await.expect_problem(406, "not-acceptable");
+            assert!(problem["detail"].as_str().unwrap().contains("application/json"));
+        }
+        for accept in ["application/json", "*/*", "text/html, */*;q=0.1", "Application/*"] {
+            assert!([200, 201].contains(&send(accept).await.status), "{path} {accept}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn bodies_come_as_plain_json_and_are_announced_so() {
+    let server = Server::start().await;
+    let clouds = ("/v1/clouds", json!({"points": [[1, 2]]}));
+    for (path, body) in ROUTES.iter().map(|route| (route.path, route.request())).chain([clouds]) {
+        let body = body.to_string();
+        let send = async |headers: &[(&str, &str)]| {
+            let mut request = server.client.post(server.url(path)).body(body.clone());
+            for (name, value) in headers {
+                request = request.header(*name, *value);
+            }
+            server.send(request).await
+        };
+        for refused in [
+            &[][..],
+            &[("content-type", "")],
+            &[("content-type", "text/plain")],
+            &[("content-type", "application/x-npy")],
+            &[("content-type", "application/problem+json")],
+            &[("content-type", "application/json"), ("content-encoding", "gzip")],
+            &[("content-type", "application/json"), ("content-encoding", "zstd")],
+        ] {
+            send(refused).await.expect_problem(415, "unsupported-media-type");
+        }
+        for accepted in [
+            &[("content-type", "application/json")][..],
+            &[("content-type", "Application/JSON; charset=utf-8")],
+            &[("content-type", "application/json"), ("content-encoding", "identity")],
+        ] {
+            assert!([200, 201].contains(&send(accepted).await.status), "{path} {accepted:?}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_answer_names_its_request() {
+    let server = Server::start().await;
+    let id = "0".repeat(64);
+    let cloud = format!("/v1/clouds/{id}");
+    let mut seen = std::collections::HashSet::new();
+    for path in [
+        "/health/live",
+        "/health/ready",
+        "/version",
+        "/openapi.json",
+        "/docs/",
+        "/v1/kernels",
+        "/v1/clouds",
+        &cloud,
+        "/no",
+    ] {
+        let ask = |id: &str| server.client.get(server.url(path)).header("x-request-id", id);
+        let own = server.get(path).await;
+        assert!(seen.insert(own.header("x-request-id").to_owned()), "{path}");
+        assert!(own.header("x-request-id").len() >= 16, "{path}");
+        assert_eq!(server.send(ask("client-7.a_b")).await.header("x-request-id"), "client-7.a_b", "{path}");
+        for unsafe_id in ["a b", "{\"x\":1}", &"x".repeat(1000), ""] {
+            let replaced = server.send(ask(unsafe_id)).await.header("x-request-id").to_owned();
+            assert!(replaced != unsafe_id && !replaced.is_empty(), "{path} {unsafe_id}");
+        }
+    }
+    for route in &ROUTES {
+        let request = server.client.post(server.url(route.path)).header("x-request-id", "mine");
+        let answer = server.send(request.json(&json!({}))).await;
+        assert_eq!(answer.expect_problem(422, "invalid-request")["instance"], "mine");
+        let request = server.client.post(server.url(route.path)).header("x-request-id", "mine");
+        assert_eq!(server.send(request.json(&route.request())).await.header("x-request-id"), "mine");
+    }
+}
