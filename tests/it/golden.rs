@@ -16,9 +16,6 @@ fn assert_close(case: &str, what: &str, found: &Value, expected: &Value, sign: f
 fn compare(case: &str, what: &str, found: &Value, expected: &Value, sign: f64, tolerance: f64) {
     match (found, expected) {
         (Value::Null, _) => assert!(may_be_null(case), "{case}: {what} is null"),
-        (Value::Array(entries), _) if !entries.is_empty() && entries.iter().all(Value::is_null) => {
-            panic!("{case}: all of {what} is null")
-        }
         (Value::Array(found), Value::Array(expected)) => {
             assert_eq!(found.len(), expected.len(), "{case}: {what}");
             for (found, expected) in found.iter().zip(expected) {
@@ -33,7 +30,8 @@ fn compare(case: &str, what: &str, found: &Value, expected: &Value, sign: f64, t
     }
 }
 
-/// Matérn ½ has no resolved gradient at some queries (criterion T2): null is the right answer there.
+/// With Matérn ½ no query has a resolved gradient: |∇u| is 0.3, 0.2 and 0.7 of the threshold of criterion T2, in every other
+/// case at least 1.8 times it. Null is the right answer there, and only there.
 fn may_be_null(case: &str) -> bool {
     case.contains("\"nu\":0.5")
 }
@@ -86,6 +84,8 @@ impl Case<'_> {
             // The reference has ν = −∇u/|∇u| in every case.
             let sign = if orientation == "gradient" { -1.0 } else { 1.0 };
             let found = self.post("/v1/curvatures", json!({"orientation": orientation})).await;
+            let n_degenerate = found["degenerate"].as_array().unwrap().len();
+            assert_eq!(n_degenerate, if may_be_null(&self.name) { 3 } else { 0 }, "{}", self.name);
             let check = |what, found: &Value, expected: &str, sign| {
                 assert_close(&self.name, what, found, &self.case[expected], sign);
             };
