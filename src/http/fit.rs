@@ -4,17 +4,14 @@ use std::sync::Arc;
 
 use super::body::Points;
 use super::problem::{Place, Problem};
-use super::shared::{
-    CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, KernelFamily, KernelUsed, SolverChoice,
-};
+use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use super::slug::Slug;
 use crate::app::App;
 use crate::numerics::cloud::Cloud;
-use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit, length_scale_for};
+use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
 use crate::numerics::duplicates::Merge;
 use crate::numerics::error::{NotDefinite, NumericsError};
-use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
-use crate::numerics::neighbours::Neighbours;
+use crate::numerics::kernel::Kernel as NumericalKernel;
 use crate::numerics::regularization::Regularization;
 use crate::numerics::solver::GramFactor;
 use crate::store::Owner;
@@ -304,99 +301,6 @@ impl Chosen {
             }
         };
         Ok((kernel, regularization))
-    }
-}
-
-impl Kernel {
-    /// Fills in what is absent and checks the rest.
-    fn resolve<'a>(
-        &self,
-        cloud: &Cloud,
-        neighbours: impl FnOnce() -> &'a Neighbours,
-        place: Place,
-    ) -> Result<NumericalKernel, Problem> {
-        let family = self.resolve_family(place)?;
-        let length_scale = match self.length_scale {
-            Some(length_scale) => length_scale,
-            None => length_scale_for(cloud, neighbours(), family),
-        };
-        NumericalKernel::new(family, length_scale, self.variance.unwrap_or(1.0))
-            .map_err(|error| Problem::from_numerics(error, place))
-    }
-
-    fn resolve_family(&self, place: Place) -> Result<Family, Problem> {
-        let of_others = [
-            ("epsilon", KernelFamily::Laplace, self.epsilon.is_some()),
-            ("nu", KernelFamily::Matern, self.nu.is_some()),
-            ("smoothness", KernelFamily::Wendland, self.smoothness.is_some()),
-        ];
-        for (name, owner, is_given) in of_others {
-            if is_given && self.family != owner {
-                let detail = format!("{name} is a parameter of another family");
-                return Err(Problem::invalid_request(format!("{}/{name}", place.kernel), detail));
-            }
-        }
-        match self.family {
-            KernelFamily::Gauss => Ok(Family::Gauss),
-            KernelFamily::Laplace => Ok(Family::Laplace { epsilon: self.epsilon.unwrap_or(0.0) }),
-            KernelFamily::InverseMultiquadric => Ok(Family::InverseMultiquadric),
-            KernelFamily::Matern => {
-                let nu = self.nu.unwrap_or(2.5);
-                let order = nu - 0.5;
-                if (0.0..=8.0).contains(&order) && order.fract() == 0.0 {
-                    return Ok(Family::Matern { order: order as u8 });
-                }
-                let detail = format!("nu must be one of 0.5, 1.5, ..., 8.5, found {nu}");
-                Err(Problem::invalid_request(format!("{}/nu", place.kernel), detail))
-            }
-            KernelFamily::Wendland => {
-                let smoothness = match self.smoothness.unwrap_or(4) {
-                    2 => WendlandSmoothness::C2,
-                    4 => WendlandSmoothness::C4,
-                    6 => WendlandSmoothness::C6,
-                    other => {
-                        let detail = format!("smoothness must be 2, 4 or 6, found {other}");
-                        return Err(Problem::invalid_request(format!("{}/smoothness", place.kernel), detail));
-                    }
-                };
-                Ok(Family::Wendland { smoothness })
-            }
-        }
-    }
-}
-
-impl From<&NumericalKernel> for KernelUsed {
-    /// Every number used, so that a client can pin them.
-    fn from(kernel: &NumericalKernel) -> Self {
-        let mut full = Self {
-            family: KernelFamily::Gauss,
-            length_scale: kernel.length_scale(),
-            variance: kernel.variance(),
-            epsilon: None,
-            nu: None,
-            smoothness: None,
-        };
-        match kernel.family() {
-            Family::Gauss => full.family = KernelFamily::Gauss,
-            Family::InverseMultiquadric => full.family = KernelFamily::InverseMultiquadric,
-            Family::Laplace { epsilon } => {
-                full.family = KernelFamily::Laplace;
-                full.epsilon = Some(epsilon);
-            }
-            Family::Matern { order } => {
-                full.family = KernelFamily::Matern;
-                full.nu = Some(f64::from(order) + 0.5);
-            }
-            Family::Wendland { smoothness } => {
-                full.family = KernelFamily::Wendland;
-                full.smoothness = Some(match smoothness {
-                    WendlandSmoothness::C2 => 2,
-                    WendlandSmoothness::C4 => 4,
-                    WendlandSmoothness::C6 => 6,
-                });
-            }
-        }
-        full
     }
 }
 

@@ -6,6 +6,7 @@ mod body;
 pub mod compute;
 mod fit;
 mod fitted;
+mod kernel;
 mod middleware;
 pub mod openapi;
 pub mod operation;

@@ -1,4 +1,4 @@
-//! `POST /v1/laplace-beltrami` and `POST /v1/laplace-beltrami/matrix`, and what they share with the surface gradient.
+//! `POST /v1/laplace-beltrami` and `POST /v1/laplace-beltrami/matrix`.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::surface::check_is_surface;
+use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::app::App;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object, present_word};
@@ -18,11 +18,7 @@ use crate::http::fitted::{Fits, degenerate, per_query};
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
-use crate::http::shared::{
-    Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, SurfaceChoice, request,
-};
-use crate::numerics::cloud::Cloud;
-use crate::numerics::interpolant::Interpolant;
+use crate::http::shared::{Degenerate, Diagnostics, Geometry, OrientationChoice, request};
 use crate::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix};
 use crate::store::Owner;
 
@@ -191,89 +187,4 @@ impl Operation for LaplaceBeltramiMatrixRequest {
             diagnostics,
         })
     }
-}
-
-/// A checked request to apply an operator to values.
-pub struct AppliedWork {
-    pub values: Vec<f64>,
-    pub queries: Arc<Cloud>,
-}
-
-/// A checked request for an operator as a matrix.
-pub struct MatrixWork {
-    pub queries: Arc<Cloud>,
-}
-
-impl MatrixWork {
-    /// Without values, the quality of the main fit is that of Y = 1.
-    ///
-    /// # Errors
-    /// Those of the solve.
-    pub fn diagnostics(
-        &self,
-        fits: &Fits,
-        signature: &Interpolant,
-        observer: &JobObserver,
-    ) -> Result<Diagnostics, Problem> {
-        let m = self.queries.n_points();
-        let constant = match &fits.surface {
-            None => signature.clone(),
-            Some(_) => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
-        };
-        let mut diagnostics = fits.main.diagnostics(&constant.solution, m);
-        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
-        Ok(diagnostics)
-    }
-}
-
-/// Plans an operator applied to values, with so many numbers of answer per query.
-///
-/// # Errors
-/// A [`Problem`] with a pointer to the field.
-pub fn plan_applied(
-    planner: &Planner<'_>,
-    fit: Fit,
-    geometry: Option<Geometry>,
-    values: Vec<f64>,
-    queries: Option<Points>,
-    numbers_per_query: impl Fn(usize) -> usize,
-) -> Result<Plan<AppliedWork>, Problem> {
-    check_surface_choice(&geometry);
-    let (mut main, mut surface) = planner.fits(fit, geometry)?;
-    check_is_surface(&main.stored.cloud)?;
-    planner.check_values(&values, &main)?;
-    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
-    let m = queries.n_points();
-    planner.check_answer(m.checked_mul(numbers_per_query(queries.dimension())))?;
-    let n = (main.fitted.n_points() + surface.fitted.n_points()) as f64;
-    let flops = 60.0 * n * (n + m as f64);
-    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries }, flops })
-}
-
-/// Plans an operator as a matrix, with so many rows per query.
-///
-/// # Errors
-/// A [`Problem`] with a pointer to the field.
-pub fn plan_matrix(
-    planner: &Planner<'_>,
-    fit: Fit,
-    geometry: Option<Geometry>,
-    queries: Option<Points>,
-    rows_per_query: impl Fn(usize) -> usize,
-) -> Result<Plan<MatrixWork>, Problem> {
-    check_surface_choice(&geometry);
-    let (mut main, mut surface) = planner.fits(fit, geometry)?;
-    check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
-    let n = main.stored.cloud.n_points();
-    let n_rows = queries.n_points().checked_mul(rows_per_query(queries.dimension()));
-    planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?;
-    let flops = 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64;
-    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries }, flops })
-}
-
-/// Every choice means the signature function.
-fn check_surface_choice(geometry: &Option<Geometry>) {
-    let chosen = geometry.as_ref().and_then(|geometry| geometry.surface).unwrap_or_default();
-    let (SurfaceChoice::Auto | SurfaceChoice::Signature) = chosen;
 }

@@ -4,6 +4,7 @@ pub mod clouds;
 pub mod interpolation;
 pub mod kernels;
 pub mod laplace_beltrami;
+pub mod operators;
 pub mod posterior;
 pub mod process;
 pub mod surface;

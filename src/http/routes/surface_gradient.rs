@@ -8,7 +8,7 @@ use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::laplace_beltrami::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::app::App;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object};

@@ -33,7 +33,7 @@ impl Cholesky {
         if stride.is_multiple_of(512) { stride + 8 } else { stride }
     }
 
-    /// A buffer of zeros; its pages are mapped as they are written, so the upper triangle costs no memory.
+    /// A buffer of zeros; its pages are mapped as they are written, so that with small pages the upper triangle costs nothing.
     pub(super) fn allocate(n: usize) -> Self {
         let stride = Self::stride_for(n);
         Self { buffer: vec![0.0; n * stride], n, stride }
