@@ -87,11 +87,11 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     Ok(report.respond(body))
 }
 
-/// Bytes of the factorizations that are not in the cache.
+/// Bytes of the factorizations that this request would begin.
 fn n_bytes_missing<W>(app: &App, plan: &Plan<W>) -> usize {
     let surface = plan.surface.as_ref().filter(|surface| surface.key != plan.main.key);
     let fits = [Some(&plan.main), surface];
-    let missing = fits.into_iter().flatten().filter(|fit| !app.factors.contains(fit.key));
+    let missing = fits.into_iter().flatten().filter(|fit| app.factors.is_missing(fit.key));
     missing.filter_map(|fit| GramFactor::n_bytes_needed(fit.fitted.n_points())).fold(0, usize::saturating_add)
 }
 

@@ -70,7 +70,8 @@ pub fn laplace_beltrami(
 /// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of degenerate queries are zero.
 ///
 /// # Errors
-/// Those of [`operator_matrix`].
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
 pub fn surface_gradient_matrices(
     geometry: &Geometry,
     factor: &Arc<GramFactor>,
@@ -83,7 +84,8 @@ pub fn surface_gradient_matrices(
 /// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of degenerate queries are zero. Not symmetric in general.
 ///
 /// # Errors
-/// Those of [`operator_matrix`].
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
 pub fn laplace_beltrami_matrix(
     geometry: &Geometry,
     factor: &Arc<GramFactor>,

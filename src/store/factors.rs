@@ -113,9 +113,9 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         Ok((stored, outcome))
     }
 
-    /// Whether a factorization is kept.
-    pub fn contains(&self, key: FactorKey) -> bool {
-        self.factors.contains_key(&key)
+    /// Whether a factorization is neither kept nor being computed: asking for it would begin a new one.
+    pub fn is_missing(&self, key: FactorKey) -> bool {
+        !self.factors.contains_key(&key) && !self.flights.is_under_way(&key)
     }
 
     /// The weights of values solved before.

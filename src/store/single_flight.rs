@@ -35,6 +35,12 @@ where
         Self { flights: Arc::default() }
     }
 
+    /// Whether a flight of `key` is under way.
+    pub(super) fn is_under_way(&self, key: &K) -> bool {
+        let flights = self.flights.lock().unwrap_or_else(PoisonError::into_inner);
+        flights.get(key).is_some_and(|weak| weak.upgrade().is_some())
+    }
+
     /// Joins the flight of `key`, or begins it with `compute`.
     pub(super) async fn join<F>(&self, key: K, compute: impl FnOnce() -> F) -> (Boarding, Outcome<V, E>)
     where
@@ -89,6 +95,7 @@ mod tests {
         }
         let mut waiter = Box::pin(flights.join(1, || async { Err("a second computation") }));
         assert!(futures_util::poll!(&mut waiter).is_pending());
+        assert!(flights.is_under_way(&1) && !flights.is_under_way(&2));
         beginner.abort();
         assert!(beginner.await.is_err());
         release.send(()).unwrap();
