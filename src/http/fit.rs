@@ -1,5 +1,6 @@
 //! From the shared objects of a request to validated inputs of the numerics.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::body::Points;
@@ -35,6 +36,17 @@ pub struct FitPlan {
 }
 
 impl FitPlan {
+    /// The client's normals at the points that are factorized: means over merged duplicates.
+    pub fn fitted_normals(&self) -> Option<Cow<'_, Cloud>> {
+        let normals = self.stored.normals.as_ref()?;
+        let Some(merge) = &self.merge else { return Some(Cow::Borrowed(normals)) };
+        let d = normals.dimension();
+        let component = |c: usize| normals.points().map(|normal| normal[c]).collect::<Vec<f64>>();
+        let means: Vec<Vec<f64>> = (0..d).map(|c| merge.mean(&component(c))).collect();
+        let interleaved = (0..self.fitted.n_points()).flat_map(|point| means.iter().map(move |m| m[point]));
+        Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
+    }
+
     /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
     pub fn refused(&self, mut error: NumericsError) -> Problem {
         use NumericsError::{KernelNotSmooth, NotPositiveDefinite};

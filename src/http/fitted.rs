@@ -8,16 +8,18 @@ use super::compute::JobObserver;
 use super::fit::FitPlan;
 use super::problem::Problem;
 use super::shared::{
-    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, OrientationChoice, SolverUsed, Warning,
+    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, SurfaceUsed, Warning,
     WarningCode,
 };
 use crate::app::App;
 use crate::numerics::cloud::Cloud;
+use crate::numerics::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::error::NumericsError;
-use crate::numerics::geometry::{Degeneracy, DegeneracyReason, Geometry, Orientation};
+use crate::numerics::geometry::{Geometry, GeometryRequest};
 use crate::numerics::interpolant::Interpolant;
 use crate::numerics::regularization::Regularization;
 use crate::numerics::solver::{Method, Solution};
+use crate::numerics::surface::Surface;
 use crate::store::factors::StoredFactor;
 use crate::store::key::ValuesKey;
 
@@ -46,35 +48,28 @@ impl Fits {
         self.main.interpolant(&self.app, values, observer)
     }
 
-    /// The signature function of the surface.
-    ///
-    /// # Errors
-    /// Those of [`Solution::of`] as a [`Problem`].
-    pub fn signature(&self, observer: &JobObserver) -> Result<Interpolant, Problem> {
-        let surface = self.surface();
-        surface.interpolant(&self.app, &vec![1.0; surface.plan.stored.cloud.n_points()], observer)
-    }
-
-    /// The geometry of the surface at queries, with its signature function.
+    /// The geometry of the surface at queries.
     ///
     /// # Errors
     /// Those of [`Geometry::of`] as a [`Problem`].
     pub fn geometry(
         &self,
         queries: &Cloud,
-        orientation: OrientationChoice,
+        request: &GeometryRequest,
         observer: &JobObserver,
-    ) -> Result<(Geometry, Interpolant), Problem> {
-        let surface = self.surface();
-        let signature = self.signature(observer)?;
-        let orientation = match orientation {
-            OrientationChoice::Outward => Orientation::Outward,
-            OrientationChoice::Gradient => Orientation::Gradient,
-        };
-        let geometry = Geometry::of(&signature, surface.stored.neighbours(), queries, orientation, observer)
-            .map_err(|error| surface.refused(error))?;
-        Ok((geometry, signature))
+    ) -> Result<SurfaceGeometry, Problem> {
+        let fitted = self.surface();
+        let surface = fitted.surface(&self.app, observer)?;
+        let geometry =
+            Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
+        Ok(SurfaceGeometry { surface, geometry })
     }
+}
+
+/// A surface with its geometry at the queries of a request.
+pub struct SurfaceGeometry {
+    pub surface: Arc<Surface>,
+    pub geometry: Geometry,
 }
 
 /// A fit with its factorization.
@@ -100,6 +95,16 @@ impl Fitted {
             Interpolant::fit(factor, &self.merged(values), observer).map_err(|error| self.refused(error))?;
         app.factors.keep_solution(self.plan.key, key, interpolant.solution.clone());
         Ok(interpolant)
+    }
+
+    /// The surface of the signature function, with the client's normals if there are any.
+    fn surface(&self, app: &App, observer: &JobObserver) -> Result<Arc<Surface>, Problem> {
+        self.stored.surface(|| {
+            let ones = vec![1.0; self.plan.stored.cloud.n_points()];
+            let signature = self.interpolant(app, &ones, observer)?;
+            let given = self.plan.fitted_normals();
+            Surface::of(signature, given.as_deref(), observer).map_err(|error| self.refused(error))
+        })
     }
 
     /// Values at the points that are factorized: means over merged duplicates.
@@ -169,19 +174,73 @@ impl Fitted {
     }
 }
 
-/// The degenerate queries of an answer.
-pub fn degenerate(geometry: &Geometry) -> Vec<Degenerate> {
-    let entry = |d: &Degeneracy| Degenerate {
-        query: d.query,
-        reason: match d.reason {
-            DegeneracyReason::VanishingGradient => DegenerateReason::VanishingGradient,
-        },
-        gradient_norm: d.gradient_norm,
-    };
-    geometry.degenerate().iter().map(entry).collect()
+impl SurfaceGeometry {
+    /// The queries without answer or with a flag.
+    pub fn degenerate(&self) -> Vec<Degenerate> {
+        let entry = |d: &Degeneracy| Degenerate {
+            query: d.query,
+            reason: match d.reason {
+                DegeneracyReason::VanishingGradient => DegenerateReason::VanishingGradient,
+                DegeneracyReason::UnaffordableRescue => DegenerateReason::UnaffordableRescue,
+                DegeneracyReason::KernelTooRough => DegenerateReason::KernelTooRough,
+                DegeneracyReason::FarFromCloud => DegenerateReason::FarFromCloud,
+                DegeneracyReason::UnderResolved => DegenerateReason::UnderResolved,
+            },
+            gradient_norm: d.gradient_norm,
+        };
+        self.geometry.degenerate().iter().map(entry).collect()
+    }
+
+    /// Numbers per query, null where there is no answer.
+    pub fn per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
+        Array::new(data, shape).with_nulls(0, self.geometry.is_null())
+    }
+
+    /// The function that serves each query.
+    pub fn surfaces(&self) -> Vec<SurfaceUsed> {
+        let used =
+            |query| if self.geometry.is_offset(query) { SurfaceUsed::Offset } else { SurfaceUsed::Signature };
+        (0..self.geometry.n_queries()).map(used).collect()
+    }
+
+    /// What the answer says of the fit of this surface.
+    pub fn diagnostics(&self, fits: &Fits) -> Diagnostics {
+        let solution = &self.surface.signature().solution;
+        let mut diagnostics = fits.surface().diagnostics(solution, self.geometry.n_queries());
+        diagnostics.warnings.extend(self.warnings());
+        diagnostics
+    }
+
+    /// What was changed, and what the flags of single queries amount to.
+    fn warnings(&self) -> Vec<Warning> {
+        let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
+        let flagged =
+            |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
+        let n_offset = (0..m).filter(|&query| self.geometry.is_offset(query)).count();
+        let orientation = self.surface.orientation();
+        let counted = [
+            (n_offset, WarningCode::OffsetModelUsed, "queries are served by the offset model"),
+            (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, KERNEL_TOO_ROUGH),
+            (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, DISAGREES),
+            (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
+        ];
+        let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
+        let mut warnings: Vec<Warning> = counted
+            .map(|(count, code, what)| Warning { code, detail: format!("{count} of {m} {what}") })
+            .collect();
+        if orientation.n_flipped > 0 {
+            let detail = format!("the gradient pointed inward at {} of {n} points", orientation.n_flipped);
+            warnings.push(Warning { code: WarningCode::OrientationRepaired, detail });
+        }
+        if orientation.is_open && !orientation.is_given {
+            warnings.push(Warning { code: WarningCode::OpenCloud, detail: OPEN_CLOUD.to_owned() });
+        }
+        warnings
+    }
 }
 
-/// Numbers per query, null at the degenerate ones.
-pub fn per_query(geometry: &Geometry, data: Vec<f64>, shape: &[usize]) -> Array {
-    Array::new(data, shape).with_nulls(0, geometry.is_degenerate())
-}
+const KERNEL_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
+const DISAGREES: &str = "queries have curvatures that their neighbours do not confirm; see degenerate";
+const FAR: &str = "queries are farther from the cloud than three spacings";
+const OPEN_CLOUD: &str =
+    "the cloud has a rim, so that outward has no meaning; the side is that of most gradients";

@@ -113,21 +113,22 @@ pub enum DuplicatePolicy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceChoice {
-    /// The service chooses.
+    /// `signature`, and `offset` where its gradient vanishes.
     #[default]
     Auto,
     /// The interpolant of the constant 1.
     Signature,
+    /// An interpolant of signed distances on two offset layers, fitted to the points near each query.
+    Offset,
 }
 
 /// The function whose level surface was used at a query.
-#[expect(dead_code, reason = "listed in full for clients; the offset model answers the other")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceUsed {
     /// The interpolant of the constant 1.
     Signature,
-    /// Reserved for the interpolant of signed distances on two offset layers.
+    /// The interpolant of signed distances on two offset layers.
     Offset,
 }
 
@@ -283,17 +284,17 @@ pub enum WarningCode {
     DuplicatesMerged,
     /// Variances that came out negative within rounding are served as 0.
     VarianceClamped,
-    /// Reserved: the offset model served where the signature function could not.
+    /// The offset model served where the signature function could not.
     OffsetModelUsed,
-    /// Reserved: signs of normals were made consistent.
+    /// Signs of normals were made consistent.
     OrientationRepaired,
-    /// Reserved: the cloud is open, so that outward has no meaning.
+    /// The cloud is open, so that outward has no meaning.
     OpenCloud,
-    /// Reserved: the kernel's cusp is seen at the points of the cloud.
+    /// The kernel's cusp is seen at the points of the cloud.
     KernelTooRough,
-    /// Reserved: curvatures differ from those of a quadric through the neighbours.
+    /// Curvatures are not confirmed by the points around the query.
     DisagreesWithNeighbours,
-    /// Reserved: queries lie far from the cloud.
+    /// Queries lie far from the cloud.
     FarFromCloud,
 }
 
@@ -352,23 +353,22 @@ pub struct Diagnostics {
 }
 
 /// Why a query is degenerate.
-#[expect(dead_code, reason = "listed in full for clients; later checks answer the rest")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DegenerateReason {
     /// The gradient of the signature function vanishes, so that there is no normal: the entry is null.
     VanishingGradient,
-    /// Reserved: the sampling does not resolve the surface here; the number is served.
+    /// The sampling does not resolve the surface here; the number is served.
     UnderResolved,
-    /// Reserved: the kernel's cusp is seen here; the number is served.
+    /// The kernel's cusp is seen here; the number is served.
     KernelTooRough,
-    /// Reserved: the query lies far from the cloud; the number is served.
+    /// The query lies far from the cloud; the number is served.
     FarFromCloud,
-    /// Reserved: the offset model would cost more than is admitted; the entry is null.
+    /// The offset model would cost more than is admitted; the entry is null.
     UnaffordableRescue,
 }
 
-/// A query where geometry has no meaning.
+/// A query where geometry has no meaning, or less accuracy than it seems.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Degenerate {
     /// The position of the query.

@@ -117,11 +117,12 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::numerics::geometry::{Geometry, Orientation};
+    use crate::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
     use crate::numerics::interpolant::Interpolant;
     use crate::numerics::observer::Unobserved;
     use crate::numerics::regularization::Regularization;
     use crate::numerics::solver::GramFactor;
+    use crate::numerics::surface::Surface;
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     #[test]
@@ -144,8 +145,10 @@ mod tests {
             let alpha = Regularization::uniform(alpha).unwrap();
             let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
             let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
-            let geometry =
-                Geometry::of(&signature, &neighbours, &cloud, Orientation::Outward, &Unobserved).unwrap();
+            let surface = Surface::of(signature, None, &Unobserved).unwrap();
+            let model = SurfaceModel::Signature;
+            let request = GeometryRequest { model, checks_curvatures: false, ..GeometryRequest::CURVATURES };
+            let geometry = Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap();
             assert!(geometry.degenerate().is_empty(), "{n} points");
             for query in 0..n {
                 let cosine: f64 =

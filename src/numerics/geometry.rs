@@ -1,70 +1,87 @@
-//! Normals, shape operator and curvatures of the level surfaces of the signature function.
+//! Normals, shape operator and curvatures of a surface at queries.
 
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::eigen::symmetric_eigen;
+use super::degeneracy::{Degeneracy, DegeneracyReason};
 use super::error::NumericsError;
-use super::interpolant::Interpolant;
-use super::jets::{JetOrder, Jets};
-use super::neighbours::Neighbours;
+use super::examination::Examination;
 use super::observer::Observer;
+use super::shape::principal_curvatures;
+use super::surface::Surface;
+use super::vector::{dot, norm};
 
 /// Which way normals point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orientation {
-    /// ν = −∇u/|∇u|: out of closed surfaces while u > 1 inside (errata.md, 2).
+    /// Out of closed surfaces: ν = −∇u/|∇u| (errata.md, 2), with signs repaired where neighbours contradict it.
     Outward,
-    /// ν = +∇u/|∇u|.
+    /// ν = +∇u/|∇u|, whatever its sign.
     Gradient,
 }
 
-impl Orientation {
-    fn sign(self) -> f64 {
-        match self {
-            Self::Outward => -1.0,
-            Self::Gradient => 1.0,
-        }
+/// Which function's level surface is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SurfaceModel {
+    /// The signature function, and the offset model where its gradient vanishes.
+    Auto,
+    Signature,
+    Offset,
+}
+
+/// What is asked of a geometry.
+#[derive(Debug, Clone, Copy)]
+pub struct GeometryRequest {
+    pub orientation: Orientation,
+    pub model: SurfaceModel,
+    /// Whether second derivatives are served: they are checked against the neighbours and the cusp of the kernel.
+    pub checks_curvatures: bool,
+    /// Queries at which the offset model may be asked; beyond them the answer is null.
+    pub max_offsets: usize,
+}
+
+impl GeometryRequest {
+    /// Everything on: outward curvatures, checked, with all the work that they take.
+    pub const CURVATURES: Self = Self {
+        orientation: Orientation::Outward,
+        model: SurfaceModel::Auto,
+        checks_curvatures: true,
+        max_offsets: usize::MAX,
+    };
+}
+
+/// What is known of the surface at one query.
+pub(crate) struct Answer {
+    /// ∇u of the function that serves the query, `[d]`.
+    pub gradient: Vec<f64>,
+    /// Its Hessian, `[d, d]`.
+    pub hessian: Vec<f64>,
+    /// ν against ∇u: +1 or −1.
+    pub sign: f64,
+    pub is_offset: bool,
+    pub reason: Option<DegeneracyReason>,
+}
+
+impl Answer {
+    fn is_null(&self) -> bool {
+        self.reason.is_some_and(DegeneracyReason::is_null)
     }
 }
 
-/// Why a query has no normal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DegeneracyReason {
-    /// |∇u| is rounding (T1), or too small against the Hessian at the scale of the sampling (T2).
-    VanishingGradient,
-}
-
-/// A query at which geometry has no meaning.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Degeneracy {
-    pub query: usize,
-    pub reason: DegeneracyReason,
-    /// |∇u|, unit 1/L.
-    pub gradient_norm: f64,
-}
-
-/// T1: multiple of the rounding bound under which a gradient is rounding (numerics.md, Geometry).
-const ROUNDING_FACTOR: f64 = 64.0;
-/// T2: fraction of `h_q ‖D²u‖_F` under which the direction of ∇u turns within the sampling distance.
-const SCALE_FACTOR: f64 = 0.05;
-/// T2: neighbours that define the sampling distance h_q.
-const SPACING_NEIGHBOURS: usize = 4;
-
 /// First and second order geometry of the surface at m queries, d ≥ 2.
 ///
-/// At degenerate queries normals are zero and meaningless: ask [`Geometry::is_degenerate`] first.
+/// Where a query has no answer its normal is zero and meaningless: ask [`Geometry::is_null`] first.
 pub struct Geometry {
-    jets: Jets,
-    sign: f64,
+    answers: Vec<Answer>,
+    levels: Vec<f64>,
     gradient_norms: Vec<f64>,
     /// `[m, d]`, norm 1.
     normals: Vec<f64>,
+    is_null: Vec<bool>,
     degenerate: Vec<Degeneracy>,
-    is_degenerate: Vec<bool>,
 }
 
-/// Curvatures at m queries, in the order of the queries; entries of degenerate queries are zero and meaningless.
+/// Curvatures at m queries, in the order of the queries; entries of null queries are zero and meaningless.
 pub struct Curvatures {
     /// `[m, d−1]`, ascending by value, 1/L.
     pub principal: Vec<f64>,
@@ -77,75 +94,67 @@ pub struct Curvatures {
 }
 
 impl Geometry {
-    /// Evaluates the signature function at the queries, `neighbours` being those of its cloud.
-    ///
-    /// `ν = σ∇u/|∇u|`; a query is degenerate where T1 or T2 of numerics.md holds.
+    /// The geometry of a surface at queries: that of the level surface of its function through each query.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionTooSmall`] for d = 1; those of [`Interpolant::at`].
+    /// Those of [`super::interpolant::Interpolant::at`].
     pub fn of(
-        signature: &Interpolant,
-        neighbours: &Neighbours,
+        surface: &Surface,
         queries: &Cloud,
-        orientation: Orientation,
+        request: &GeometryRequest,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let (d, m) = (queries.dimension(), queries.n_points());
-        if signature.factor.cloud().dimension() < 2 {
-            return Err(NumericsError::DimensionTooSmall { found: signature.factor.cloud().dimension() });
-        }
-        let jets = signature.at(queries, JetOrder::HessianWithMagnitudes, observer)?;
-        let sign = orientation.sign();
-        let gradient_norms: Vec<f64> = (0..m).map(|query| norm(jets.gradient(query))).collect();
-        let criterion = VanishingGradient { signature, neighbours, jets: &jets };
-        let is_degenerate: Vec<bool> = (0..m)
-            .into_par_iter()
-            .map(|query| {
-                observer.checkpoint()?;
-                Ok(criterion.holds(query, queries.point(query), gradient_norms[query]))
-            })
-            .collect::<Result<_, NumericsError>>()?;
-        let mut normals = vec![0.0; m * d];
+        let d = queries.dimension();
+        let examination = Examination::of(surface, queries, request, observer)?;
+        let answers = examination.answers(observer)?;
+        let gradient_norms: Vec<f64> = answers.iter().map(|answer| norm(&answer.gradient)).collect();
+        let mut normals = vec![0.0; answers.len() * d];
         let mut degenerate = Vec::new();
-        for query in 0..m {
+        for (query, (answer, normal)) in answers.iter().zip(normals.chunks_exact_mut(d)).enumerate() {
             let gradient_norm = gradient_norms[query];
-            if is_degenerate[query] {
-                let reason = DegeneracyReason::VanishingGradient;
+            if let Some(reason) = answer.reason {
                 degenerate.push(Degeneracy { query, reason, gradient_norm });
-                continue;
             }
-            for (slot, g) in normals[query * d..].iter_mut().zip(jets.gradient(query)) {
+            if !answer.is_null() {
                 // Adding 0 turns −0 into 0.
-                *slot = sign * g / gradient_norm + 0.0;
+                let unit = answer.gradient.iter().map(|g| answer.sign * g / gradient_norm + 0.0);
+                normal.iter_mut().zip(unit).for_each(|(slot, c)| *slot = c);
             }
         }
-        Ok(Self { jets, sign, gradient_norms, normals, degenerate, is_degenerate })
+        let is_null = answers.iter().map(Answer::is_null).collect();
+        let levels = examination.into_levels();
+        Ok(Self { answers, levels, gradient_norms, normals, is_null, degenerate })
     }
 
     pub fn n_queries(&self) -> usize {
-        self.gradient_norms.len()
+        self.answers.len()
     }
 
     pub fn dimension(&self) -> usize {
-        self.jets.dimension()
+        self.normals.len() / self.answers.len()
     }
 
-    /// Whether each query is degenerate, `[m]`.
-    pub fn is_degenerate(&self) -> &[bool] {
-        &self.is_degenerate
+    /// Whether each query has no answer, `[m]`.
+    pub fn is_null(&self) -> &[bool] {
+        &self.is_null
     }
 
-    /// The degenerate queries with their reasons, ascending.
+    /// The queries without answer or with a flag, ascending.
     pub fn degenerate(&self) -> &[Degeneracy] {
         &self.degenerate
     }
 
-    /// u at the queries, `[m]`: 1 on the surface at α = 0.
-    pub fn levels(&self) -> Vec<f64> {
-        self.jets.values()
+    /// Whether a query is served by the offset model.
+    pub fn is_offset(&self, query: usize) -> bool {
+        self.answers[query].is_offset
     }
 
-    /// |∇u|, `[m]`, 1/L.
+    /// u at the queries, `[m]`: 1 on the surface at α = 0.
+    pub fn levels(&self) -> &[f64] {
+        &self.levels
+    }
+
+    /// |∇u| of the function that serves each query, `[m]`: 1/L for the signature function, about 1 for the offset model.
     pub fn gradient_norms(&self) -> &[f64] {
         &self.gradient_norms
     }
@@ -163,8 +172,8 @@ impl Geometry {
 
     /// `tr(Dν) = σ(tr D²u − νᵀD²uν)/|∇u|` at a query: the sum of the principal curvatures, 1/L.
     pub fn trace_of_shape_operator(&self, query: usize) -> f64 {
-        let (hessian, normal) = (self.jets.hessian(query), self.normal(query));
-        self.sign * tangential_trace(&hessian, normal) / self.gradient_norms[query]
+        let answer = &self.answers[query];
+        answer.sign * tangential_trace(&answer.hessian, self.normal(query)) / self.gradient_norms[query]
     }
 
     /// Eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space (errata.md, 3).
@@ -188,72 +197,18 @@ impl Geometry {
             .zip(curvatures.directions.par_chunks_mut(k * d))
             .zip(curvatures.mean.par_iter_mut().zip(&mut curvatures.gaussian))
             .enumerate()
-            .filter(|(query, _)| !self.is_degenerate[*query])
+            .filter(|(query, _)| !self.is_null[*query])
             .try_for_each(|(query, ((principal, directions), (mean, gaussian)))| {
                 observer.checkpoint()?;
-                self.principal_frame(query, principal, directions);
-                *mean = principal.iter().sum::<f64>() / k as f64;
-                *gaussian = principal.iter().product();
+                let answer = &self.answers[query];
+                let (values, vectors) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
+                principal.copy_from_slice(&values);
+                directions.chunks_exact_mut(d).zip(&vectors).for_each(|(slot, v)| slot.copy_from_slice(v));
+                *mean = values.iter().sum::<f64>() / k as f64;
+                *gaussian = values.iter().product();
                 Ok(())
             })?;
         Ok(curvatures)
-    }
-
-    /// Writes principal curvatures `[d−1]` and directions `[d−1, d]` at one query.
-    fn principal_frame(&self, query: usize, principal: &mut [f64], directions: &mut [f64]) {
-        let d = self.dimension();
-        let basis = tangent_basis(self.normal(query));
-        let (values, vectors) = symmetric_eigen(&self.shape_operator(query, &basis), d - 1);
-        principal.copy_from_slice(&values);
-        for (slot, vector) in directions.chunks_exact_mut(d).zip(&vectors) {
-            for (basis_vector, &coefficient) in basis.iter().zip(vector) {
-                for (x, b) in slot.iter_mut().zip(basis_vector) {
-                    *x += coefficient * b;
-                }
-            }
-            make_largest_positive(slot);
-        }
-    }
-
-    /// S in a basis of the tangent space, `[d−1, d−1]`.
-    fn shape_operator(&self, query: usize, basis: &[Vec<f64>]) -> Vec<f64> {
-        let (hessian, d) = (self.jets.hessian(query), self.dimension());
-        let scale = self.sign / self.gradient_norms[query];
-        let image = |v: &[f64]| (0..d).map(|i| dot(&hessian[i * d..][..d], v)).collect::<Vec<f64>>();
-        let images: Vec<Vec<f64>> = basis.iter().map(|v| image(v)).collect();
-        basis.iter().flat_map(|a| images.iter().map(move |b| scale * dot(a, b))).collect()
-    }
-}
-
-/// Criteria T1 and T2 of numerics.md.
-struct VanishingGradient<'a> {
-    signature: &'a Interpolant,
-    neighbours: &'a Neighbours,
-    jets: &'a Jets,
-}
-
-impl VanishingGradient<'_> {
-    fn holds(&self, query: usize, x: &[f64], gradient_norm: f64) -> bool {
-        self.is_rounding(query, gradient_norm) || self.turns_within_spacing(query, x, gradient_norm)
-    }
-
-    /// T1: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
-    fn is_rounding(&self, query: usize, gradient_norm: f64) -> bool {
-        let length_scale = self.signature.factor.kernel().length_scale();
-        let (value, slope) = self.jets.magnitudes(query);
-        let rounding = f64::EPSILON * (length_scale * slope + value) + self.signature.solution.residual_max;
-        length_scale * gradient_norm <= ROUNDING_FACTOR * rounding
-    }
-
-    /// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`, h_q the mean distance to the 4 neighbours of the nearest point.
-    fn turns_within_spacing(&self, query: usize, x: &[f64], gradient_norm: f64) -> bool {
-        let cloud = self.signature.factor.cloud();
-        let nearest = self.neighbours.nearest(cloud, x, 1);
-        let spacing = nearest
-            .first()
-            .and_then(|found| self.neighbours.mean_spacing(cloud, found.point, SPACING_NEIGHBOURS))
-            .unwrap_or(0.0);
-        gradient_norm < SCALE_FACTOR * spacing * norm(&self.jets.hessian(query))
     }
 }
 
@@ -265,42 +220,12 @@ pub(crate) fn tangential_trace(hessian: &[f64], normal: &[f64]) -> f64 {
     trace - normal_part
 }
 
-/// An orthonormal basis of ν's complement: the other columns of the Householder reflection that maps ν to ±e₁.
-fn tangent_basis(normal: &[f64]) -> Vec<Vec<f64>> {
-    let d = normal.len();
-    let sign = if normal[0] < 0.0 { -1.0 } else { 1.0 };
-    let mut w = normal.to_vec();
-    w[0] += sign;
-    // |w|² = 2(1 + |ν₁|) for a unit ν: no cancellation by the choice of sign.
-    let factor = 1.0 / (1.0 + normal[0].abs());
-    (1..d)
-        .map(|axis| (0..d).map(|i| f64::from(u8::from(i == axis)) - factor * w[i] * w[axis]).collect())
-        .collect()
-}
-
-/// Flips a vector so that its component of largest magnitude is positive; the first of several.
-fn make_largest_positive(v: &mut [f64]) {
-    let largest = v.iter().fold(0.0, |a: f64, &b| if b.abs() > a.abs() { b } else { a });
-    if largest < 0.0 {
-        for x in v {
-            *x = -*x;
-        }
-    }
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn norm(v: &[f64]) -> f64 {
-    dot(v, v).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::numerics::interpolant::Interpolant;
     use crate::numerics::kernel::{Family, Kernel};
     use crate::numerics::observer::Unobserved;
     use crate::numerics::regularization::Regularization;
@@ -313,7 +238,9 @@ mod tests {
         let alpha = Regularization::Uniform(0.0);
         let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
         let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
-        Geometry::of(&signature, &Neighbours::of(&cloud), queries, orientation, &Unobserved).unwrap()
+        let surface = Surface::of(signature, None, &Unobserved).unwrap();
+        let request = GeometryRequest { orientation, ..GeometryRequest::CURVATURES };
+        Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
     }
 
     #[test]
@@ -365,21 +292,8 @@ mod tests {
         let cloud = fibonacci_sphere(100);
         let queries = Cloud::new(vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3).unwrap();
         let geometry = geometry(&cloud, 1.0, &queries, Orientation::Outward);
-        assert_eq!(geometry.is_degenerate(), [true, false]);
+        assert_eq!(geometry.is_null(), [true, false]);
         assert_eq!(geometry.degenerate()[0].query, 0);
         assert_eq!(geometry.degenerate()[0].gradient_norm, geometry.gradient_norms()[0]);
-    }
-
-    #[test]
-    fn tangent_bases_are_orthonormal_for_every_normal() {
-        for normal in [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [-0.48, 0.6, 0.64]] {
-            let basis = tangent_basis(&normal);
-            for (i, a) in basis.iter().enumerate() {
-                assert!(dot(a, &normal).abs() < 1e-15);
-                for (j, b) in basis.iter().enumerate() {
-                    assert!((dot(a, b) - f64::from(u8::from(i == j))).abs() < 1e-15);
-                }
-            }
-        }
     }
 }

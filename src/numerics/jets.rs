@@ -15,6 +15,7 @@ use super::simd::{BLOCK, Block, LANES, Lanes, add_products, multiply, sum_lanes}
 const QUERIES_PER_TASK: usize = 8;
 
 /// `u(x) = Σ_j λ_j k(x, x_j)` with its derivatives up to an order, at m queries.
+#[derive(Clone)]
 pub struct Jets {
     packed: Vec<f64>,
     layout: Layout,

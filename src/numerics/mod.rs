@@ -5,6 +5,7 @@
 
 pub mod cloud;
 pub mod defaults;
+pub mod degeneracy;
 pub mod duplicates;
 pub mod error;
 pub mod geometry;
@@ -17,13 +18,22 @@ pub mod operators;
 pub mod posterior;
 pub mod regularization;
 pub mod solver;
+pub mod surface;
 
 mod eigen;
+mod examination;
 mod gram;
 mod nodes;
+mod offset;
+mod orientation;
+mod patch;
+mod rescue;
+mod resolution;
+mod shape;
 mod simd;
 #[cfg(test)]
 mod testing;
+mod vector;
 
 /// The instruction set that the kernel loops run on, chosen at run time.
 pub fn instruction_set() -> &'static str {

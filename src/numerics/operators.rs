@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::error::NumericsError;
-use super::geometry::{Geometry, dot, tangential_trace};
+use super::geometry::{Geometry, tangential_trace};
 use super::interpolant::Interpolant;
 use super::jets::{JetOrder, check_smooth_at};
 use super::kernel::Kernel;
@@ -20,8 +20,9 @@ use super::nodes::Nodes;
 use super::observer::{Observer, Stage};
 use super::simd::{BLOCK, Block, fma};
 use super::solver::GramFactor;
+use super::vector::dot;
 
-/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at degenerate queries.
+/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
 ///
 /// # Errors
 /// Those of [`Interpolant::at`].
@@ -44,7 +45,7 @@ pub fn surface_gradient(
     Ok(gradients)
 }
 
-/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at degenerate queries.
+/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at null queries.
 ///
 /// Minus before the last term: errata.md, 1. On the unit circle Δ cos θ = −cos θ. Independent of the orientation of ν.
 ///
@@ -67,7 +68,7 @@ pub fn laplace_beltrami(
     Ok(values)
 }
 
-/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of degenerate queries are zero.
+/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of null queries are zero.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
@@ -81,7 +82,7 @@ pub fn surface_gradient_matrices(
     operator_matrix(geometry, factor, queries, Operator::SurfaceGradient, observer)
 }
 
-/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of degenerate queries are zero. Not symmetric in general.
+/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
@@ -134,7 +135,7 @@ fn operator_matrix(
     matrix.par_chunks_mut(n).enumerate().try_for_each(|(index, row)| {
         observer.checkpoint()?;
         let (component, query) = (index / m, index % m);
-        if !geometry.is_degenerate()[query] {
+        if !geometry.is_null()[query] {
             let x = queries.point(query);
             arch.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
         }
@@ -157,7 +158,7 @@ fn operator_matrix(
 const ROWS_PER_SOLVE: usize = 1024;
 
 fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
-    (0..geometry.n_queries()).filter(|&query| !geometry.is_degenerate()[query])
+    (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query])
 }
 
 /// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:

@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::error::{NotDefinite, NumericsError};
-use super::geometry::dot;
 use super::gram::{fill_cross_gram, fill_lower_gram};
 use super::nodes::Nodes;
 use super::observer::{Observer, Stage};
 use super::regularization::Regularization;
 use super::solver::{GramFactor, Solution, parallelism};
+use super::vector::dot;
 
 /// Queries whose columns `L⁻¹k(X, q)` are held at once: bounds the memory to n × 256 numbers and keeps solves in
 /// matrix products.

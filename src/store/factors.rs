@@ -8,32 +8,40 @@ use moka::sync::Cache;
 use super::key::{CloudId, FactorKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
 use super::{Owner, bounded_cache};
-use crate::numerics::neighbours::Neighbours;
 use crate::numerics::solver::{GramFactor, Solution};
+use crate::numerics::surface::Surface;
 
 /// The share of the cache that weights may take: they are n numbers beside the n² of a factor.
 const WEIGHTS_SHARE: u64 = 16;
 
-/// A factorization with the search tree of its cloud and the time it took.
+/// A factorization with the surface of its cloud, once that was asked for, and the time it took.
 pub struct StoredFactor {
     pub factor: Arc<GramFactor>,
     pub gram_time: Duration,
     pub factor_time: Duration,
-    neighbours: OnceLock<Neighbours>,
+    surface: OnceLock<Arc<Surface>>,
 }
 
 impl StoredFactor {
     pub fn new(factor: GramFactor, gram_time: Duration, factor_time: Duration) -> Self {
-        Self { factor: Arc::new(factor), gram_time, factor_time, neighbours: OnceLock::new() }
+        Self { factor: Arc::new(factor), gram_time, factor_time, surface: OnceLock::new() }
     }
 
-    /// Neighbours in the factorized cloud, which lacks the duplicates that were merged.
-    pub fn neighbours(&self) -> &Neighbours {
-        self.neighbours.get_or_init(|| Neighbours::of(self.factor.cloud()))
+    /// The surface of the signature function, made at most once unless two ask at the same moment.
+    ///
+    /// # Errors
+    /// Those of `make`; they are not kept.
+    pub fn surface<E>(&self, make: impl FnOnce() -> Result<Surface, E>) -> Result<Arc<Surface>, E> {
+        if let Some(found) = self.surface.get() {
+            return Ok(found.clone());
+        }
+        let made = Arc::new(make()?);
+        Ok(self.surface.get_or_init(|| made).clone())
     }
 
     fn n_bytes(&self) -> usize {
-        self.factor.n_bytes() + 16 * self.factor.n_points() + size_of::<Self>()
+        let (n, d) = (self.factor.n_points(), self.factor.cloud().dimension());
+        self.factor.n_bytes() + Surface::n_bytes_needed(n, d) + size_of::<Self>()
     }
 }
 
@@ -179,8 +187,8 @@ mod tests {
 
     #[tokio::test]
     async fn the_bytes_of_all_factors_stay_within_the_budget() {
-        // 100 points take 100 · 104 · 8 bytes = 81 KiB; the budget holds two, not three.
-        let store = FactorStore::<&str>::new(200 << 10);
+        // 100 points take 100 · 104 · 8 bytes = 81 KiB, and up to 20 KiB for their surface; the budget holds two, not three.
+        let store = FactorStore::<&str>::new(240 << 10);
         for alpha in [1.0, 2.0, 3.0] {
             store.get_or_factorize(key(alpha), || factorize(100)).await.map(|_| ()).unwrap();
         }

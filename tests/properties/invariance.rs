@@ -104,7 +104,7 @@ fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha
         ("laplacian", laplace_beltrami(&geometry, &u, queries, &Unobserved).unwrap()),
         ("matrix", laplace_beltrami_matrix(&geometry, &factor, queries, &Unobserved).unwrap()),
     ];
-    Answers { rounding: rounding(&factor), degenerate: geometry.is_degenerate().to_vec(), fields }
+    Answers { rounding: rounding(&factor), degenerate: geometry.is_null().to_vec(), fields }
 }
 
 /// `Σ κ_i d_i d_iᵀ`, `[m, d, d]`: unlike the directions it has no sign to choose and no umbilics.

@@ -4,14 +4,14 @@
 use std::sync::Arc;
 
 use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, Orientation};
+use gramian::numerics::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::jets::JetOrder;
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
-use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface::Surface;
 
 use crate::support::{
     EPS, circle, distance, dot, factorize, families, families_without_kink, fit, geometry, kernel, largest,
@@ -106,7 +106,7 @@ fn with_two_kernels_the_laplacian_of_a_constant_tends_to_zero() {
 /// values.
 fn coordinate_error(factor: &Arc<GramFactor>, queries: &Cloud) -> f64 {
     let (cloud, geometry) = (factor.cloud(), geometry(factor, queries));
-    assert!(geometry.degenerate().is_empty());
+    assert!(geometry.is_null().iter().all(|is_null| !is_null));
     let error = |axis: usize| {
         let values: Vec<f64> = cloud.points().map(|x| x[axis]).collect();
         let found = laplacian(&geometry, &fit(factor, &values), queries);
@@ -166,7 +166,7 @@ fn the_shape_operator_is_the_derivative_of_the_normals() {
                 pairs.map(|(a, b)| (a - b) / (2.0 * h)).collect()
             })
             .collect();
-        for query in (0..queries.n_points()).filter(|&query| !here.is_degenerate()[query]) {
+        for query in (0..queries.n_points()).filter(|&query| !here.is_null()[query]) {
             // Dν v = Σ_axis v_axis ∂_axis ν.
             let along = |v: &[f64], c: usize| (0..3).map(|axis| v[axis] * slopes[axis][query * 3 + c]).sum();
             let divergence: f64 = (0..3).map(|axis| slopes[axis][query * 3 + axis]).sum();
@@ -196,7 +196,10 @@ fn turning_the_normals_around_negates_curvatures_and_keeps_the_laplacian() {
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
         let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
         let [outward, inward] = [Orientation::Outward, Orientation::Gradient].map(|orientation| {
-            Geometry::of(&signature, &Neighbours::of(&cloud), &queries, orientation, &Unobserved).unwrap()
+            let surface = Surface::of(signature.clone(), None, &Unobserved).unwrap();
+            let model = SurfaceModel::Signature;
+            let request = GeometryRequest { orientation, model, ..GeometryRequest::CURVATURES };
+            Geometry::of(&surface, &queries, &request, &Unobserved).unwrap()
         });
         let negated: Vec<f64> = inward.normals().iter().map(|x| -x).collect();
         assert!(outward.normals() == negated, "{family:?}: normals");

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, Orientation};
+use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::jets::{JetOrder, Jets};
 use gramian::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
-use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface::Surface;
 
 pub const EPS: f64 = f64::EPSILON;
 
@@ -55,11 +55,12 @@ pub fn fit(factor: &Arc<GramFactor>, values: &[f64]) -> Interpolant {
     Interpolant::fit(factor.clone(), values, &Unobserved).unwrap()
 }
 
-/// Geometry of the signature function of the factor's cloud, outward normals.
+/// Geometry of the signature function of the factor's cloud alone, outward normals.
 pub fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> Geometry {
     let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
-    let neighbours = Neighbours::of(factor.cloud());
-    Geometry::of(&signature, &neighbours, queries, Orientation::Outward, &Unobserved).unwrap()
+    let surface = Surface::of(signature, None, &Unobserved).unwrap();
+    let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
+    Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
 }
 
 /// `k(q_i, x_j)`, `[m, n]`, by evaluating each kernel translate at the queries.

@@ -14,11 +14,11 @@ use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
-use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::fitted::Fits;
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Degenerate, Diagnostics, Geometry, OrientationChoice, request};
+use crate::http::shared::{Degenerate, Diagnostics, Geometry, request};
 use crate::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix};
 use crate::store::Owner;
 
@@ -72,7 +72,7 @@ pub struct LaplaceBeltramiResponse {
     /// Δu at each query, unit of the values per length squared; null where there is no normal.
     #[schema(value_type = Vec<Option<f64>>)]
     values: Array,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -85,7 +85,7 @@ pub struct LaplaceBeltramiMatrixResponse {
     /// in general.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     matrix: Array,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -146,16 +146,17 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
         let interpolant = fits.interpolant(&work.values, observer)?;
-        let values = laplace_beltrami(&geometry, &interpolant, &work.queries, observer)
+        let values = laplace_beltrami(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let m = geometry.n_queries();
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
-        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         Ok(LaplaceBeltramiResponse {
-            values: per_query(&geometry, values, &[m]),
-            degenerate: degenerate(&geometry),
+            values: surface.per_query(values, &[m]),
+            degenerate: surface.degenerate(),
             diagnostics,
         })
     }
@@ -176,14 +177,15 @@ impl Operation for LaplaceBeltramiMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
-        let matrix = laplace_beltrami_matrix(&geometry, &fits.main.stored.factor, &work.queries, observer)
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
+        let matrix = laplace_beltrami_matrix(geometry, &fits.main.stored.factor, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
-        let diagnostics = work.diagnostics(fits, &signature, observer)?;
+        let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(LaplaceBeltramiMatrixResponse {
-            matrix: per_query(&geometry, fits.main.unmerge(matrix), &shape),
-            degenerate: degenerate(&geometry),
+            matrix: surface.per_query(fits.main.unmerge(matrix), &shape),
+            degenerate: surface.degenerate(),
             diagnostics,
         })
     }

@@ -2,26 +2,28 @@
 
 use std::sync::Arc;
 
-use super::surface::check_is_surface;
+use super::surface::{check_is_surface, geometry_request};
 use crate::http::body::Points;
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
-use crate::http::fitted::Fits;
+use crate::http::fitted::{Fits, SurfaceGeometry};
 use crate::http::operation::Plan;
 use crate::http::problem::Problem;
-use crate::http::shared::{Diagnostics, Fit, Geometry, SurfaceChoice};
+use crate::http::shared::{Diagnostics, Fit, Geometry};
 use crate::numerics::cloud::Cloud;
-use crate::numerics::interpolant::Interpolant;
+use crate::numerics::geometry::GeometryRequest;
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {
     pub values: Vec<f64>,
     pub queries: Arc<Cloud>,
+    pub request: GeometryRequest,
 }
 
 /// A checked request for an operator as a matrix.
 pub struct MatrixWork {
     pub queries: Arc<Cloud>,
+    pub request: GeometryRequest,
 }
 
 impl MatrixWork {
@@ -32,16 +34,16 @@ impl MatrixWork {
     pub fn diagnostics(
         &self,
         fits: &Fits,
-        signature: &Interpolant,
+        surface: &SurfaceGeometry,
         observer: &JobObserver,
     ) -> Result<Diagnostics, Problem> {
         let m = self.queries.n_points();
         let constant = match &fits.surface {
-            None => signature.clone(),
+            None => surface.surface.signature().clone(),
             Some(_) => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
         };
         let mut diagnostics = fits.main.diagnostics(&constant.solution, m);
-        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         Ok(diagnostics)
     }
 }
@@ -58,7 +60,7 @@ pub fn plan_applied(
     queries: Option<Points>,
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<AppliedWork>, Problem> {
-    check_surface_choice(&geometry);
+    let request = operator_request(&geometry);
     let (mut main, mut surface) = planner.fits(fit, geometry)?;
     check_is_surface(&main.stored.cloud)?;
     planner.check_values(&values, &main)?;
@@ -67,7 +69,7 @@ pub fn plan_applied(
     planner.check_answer(m.checked_mul(numbers_per_query(queries.dimension())))?;
     let n = (main.fitted.n_points() + surface.fitted.n_points()) as f64;
     let flops = 60.0 * n * (n + m as f64);
-    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries }, flops })
+    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, flops })
 }
 
 /// Plans an operator as a matrix, with so many rows per query.
@@ -81,7 +83,7 @@ pub fn plan_matrix(
     queries: Option<Points>,
     rows_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<MatrixWork>, Problem> {
-    check_surface_choice(&geometry);
+    let request = operator_request(&geometry);
     let (mut main, mut surface) = planner.fits(fit, geometry)?;
     check_is_surface(&main.stored.cloud)?;
     let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
@@ -89,11 +91,10 @@ pub fn plan_matrix(
     let n_rows = queries.n_points().checked_mul(rows_per_query(queries.dimension()));
     planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?;
     let flops = 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64;
-    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries }, flops })
+    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, flops })
 }
 
-/// Every choice means the signature function.
-fn check_surface_choice(geometry: &Option<Geometry>) {
-    let chosen = geometry.as_ref().and_then(|geometry| geometry.surface).unwrap_or_default();
-    let (SurfaceChoice::Auto | SurfaceChoice::Signature) = chosen;
+/// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
+fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
+    geometry_request(geometry.as_ref().and_then(|geometry| geometry.surface), None, true)
 }

@@ -13,7 +13,7 @@ use crate::http::array::Array;
 use crate::http::body::{Points, present, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
-use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::fitted::Fits;
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
@@ -23,10 +23,11 @@ use crate::http::shared::{
 use crate::http::slug::Slug;
 use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::Purpose;
+use crate::numerics::geometry::{GeometryRequest, Orientation, SurfaceModel};
 use crate::store::Owner;
 
 request! {
-    /// A cloud that samples a closed hypersurface, and where its normals are wanted.
+    /// A cloud that samples a hypersurface, and where its normals are wanted.
     pub struct NormalsRequest {
         /// Where answers are wanted; the points of the cloud if absent.
         #[serde(default, deserialize_with = "present")]
@@ -44,7 +45,7 @@ request! {
 }
 
 request! {
-    /// A cloud that samples a closed hypersurface, and where its curvatures are wanted.
+    /// A cloud that samples a hypersurface, and where its curvatures are wanted.
     pub struct CurvaturesRequest {
         /// Where answers are wanted; the points of the cloud if absent.
         #[serde(default, deserialize_with = "present")]
@@ -64,10 +65,10 @@ request! {
 /// Unit normals of the surface at the queries.
 #[derive(Serialize, ToSchema)]
 pub struct NormalsResponse {
-    /// The normal at each query, of length 1; null where the gradient vanishes.
+    /// The normal at each query, of length 1; null where there is none.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     normals: Array,
-    /// |∇u| at each query, 1/length.
+    /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
     #[schema(value_type = Vec<f64>)]
     gradient_norms: Array,
     /// u at each query: 1 on the surface, above it inside a closed one.
@@ -75,7 +76,7 @@ pub struct NormalsResponse {
     levels: Array,
     /// The function whose level surface was used at each query.
     surfaces: Vec<SurfaceUsed>,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -84,7 +85,7 @@ pub struct NormalsResponse {
 /// Curvatures of the surface at the queries.
 #[derive(Serialize, ToSchema)]
 pub struct CurvaturesResponse {
-    /// The d − 1 principal curvatures at each query, ascending, 1/length; null where the gradient vanishes.
+    /// The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     principal_curvatures: Array,
     /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
@@ -99,7 +100,7 @@ pub struct CurvaturesResponse {
     /// The normal at each query, of length 1.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     normals: Array,
-    /// |∇u| at each query, 1/length.
+    /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
     #[schema(value_type = Vec<f64>)]
     gradient_norms: Array,
     /// u at each query: 1 on the surface, above it inside a closed one.
@@ -107,7 +108,7 @@ pub struct CurvaturesResponse {
     levels: Array,
     /// The function whose level surface was used at each query.
     surfaces: Vec<SurfaceUsed>,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -158,7 +159,7 @@ pub async fn compute_curvatures(
 /// A checked request of either kind.
 pub struct Work {
     queries: Arc<Cloud>,
-    orientation: OrientationChoice,
+    request: GeometryRequest,
 }
 
 impl Operation for NormalsRequest {
@@ -166,21 +167,22 @@ impl Operation for NormalsRequest {
     type Answer = NormalsResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let (SurfaceChoice::Auto | SurfaceChoice::Signature) = self.surface.unwrap_or_default();
         let fit = self.take_fit();
-        plan(planner, fit, self.queries, self.orientation, Purpose::Normals, |d| d + 2)
+        let request = geometry_request(self.surface, self.orientation, false);
+        plan(planner, fit, self.queries, request, Purpose::Normals, |d| d + 2)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<NormalsResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, work.orientation, observer)?;
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         Ok(NormalsResponse {
-            normals: per_query(&geometry, geometry.normals().to_vec(), &[m, d]),
+            normals: surface.per_query(geometry.normals().to_vec(), &[m, d]),
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
-            levels: Array::new(geometry.levels(), &[m]),
-            surfaces: vec![SurfaceUsed::Signature; m],
-            degenerate: degenerate(&geometry),
-            diagnostics: fits.surface().diagnostics(&signature.solution, m),
+            levels: Array::new(geometry.levels().to_vec(), &[m]),
+            surfaces: surface.surfaces(),
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits),
         })
     }
 }
@@ -190,26 +192,27 @@ impl Operation for CurvaturesRequest {
     type Answer = CurvaturesResponse;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let (SurfaceChoice::Auto | SurfaceChoice::Signature) = self.surface.unwrap_or_default();
         let fit = self.take_fit();
-        plan(planner, fit, self.queries, self.orientation, Purpose::Curvatures, |d| d * d + d + 3)
+        let request = geometry_request(self.surface, self.orientation, true);
+        plan(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + d + 3)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<CurvaturesResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, work.orientation, observer)?;
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         let curvatures = geometry.curvatures(observer).map_err(|error| fits.surface().refused(error))?;
         Ok(CurvaturesResponse {
-            principal_curvatures: per_query(&geometry, curvatures.principal, &[m, d - 1]),
-            principal_directions: per_query(&geometry, curvatures.directions, &[m, d - 1, d]),
-            mean_curvatures: per_query(&geometry, curvatures.mean, &[m]),
-            gaussian_curvatures: per_query(&geometry, curvatures.gaussian, &[m]),
-            normals: per_query(&geometry, geometry.normals().to_vec(), &[m, d]),
+            principal_curvatures: surface.per_query(curvatures.principal, &[m, d - 1]),
+            principal_directions: surface.per_query(curvatures.directions, &[m, d - 1, d]),
+            mean_curvatures: surface.per_query(curvatures.mean, &[m]),
+            gaussian_curvatures: surface.per_query(curvatures.gaussian, &[m]),
+            normals: surface.per_query(geometry.normals().to_vec(), &[m, d]),
             gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
-            levels: Array::new(geometry.levels(), &[m]),
-            surfaces: vec![SurfaceUsed::Signature; m],
-            degenerate: degenerate(&geometry),
-            diagnostics: fits.surface().diagnostics(&signature.solution, m),
+            levels: Array::new(geometry.levels().to_vec(), &[m]),
+            surfaces: surface.surfaces(),
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits),
         })
     }
 }
@@ -218,7 +221,7 @@ fn plan(
     planner: &Planner<'_>,
     fit: Fit,
     queries: Option<Points>,
-    orientation: Option<OrientationChoice>,
+    request: GeometryRequest,
     purpose: Purpose,
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<Work>, Problem> {
@@ -229,12 +232,31 @@ fn plan(
     planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
     // The sums over the points, and some thirty operations per entry of each shape operator.
     let flops = 60.0 * (n as f64) * (m + n) as f64 + 30.0 * m as f64 * (d as f64).powi(3);
-    Ok(Plan {
-        main,
-        surface: None,
-        work: Work { queries, orientation: orientation.unwrap_or_default() },
-        flops,
-    })
+    Ok(Plan { main, surface: None, work: Work { queries, request }, flops })
+}
+
+/// Queries at which the offset model may be asked in one request: each costs about as much as a factorization of 130 points.
+const MAX_OFFSETS: usize = 100_000;
+
+/// What a request asks of the geometry of its surface.
+pub(super) fn geometry_request(
+    surface: Option<SurfaceChoice>,
+    orientation: Option<OrientationChoice>,
+    checks_curvatures: bool,
+) -> GeometryRequest {
+    GeometryRequest {
+        orientation: match orientation.unwrap_or_default() {
+            OrientationChoice::Outward => Orientation::Outward,
+            OrientationChoice::Gradient => Orientation::Gradient,
+        },
+        model: match surface.unwrap_or_default() {
+            SurfaceChoice::Auto => SurfaceModel::Auto,
+            SurfaceChoice::Signature => SurfaceModel::Signature,
+            SurfaceChoice::Offset => SurfaceModel::Offset,
+        },
+        checks_curvatures,
+        max_offsets: MAX_OFFSETS,
+    }
 }
 
 /// Refuses geometry in dimension 1 before anything is computed.

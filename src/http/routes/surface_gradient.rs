@@ -14,11 +14,11 @@ use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
-use crate::http::fitted::{Fits, degenerate, per_query};
+use crate::http::fitted::Fits;
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Degenerate, Diagnostics, Geometry, OrientationChoice, request};
+use crate::http::shared::{Degenerate, Diagnostics, Geometry, request};
 use crate::numerics::operators::{surface_gradient, surface_gradient_matrices};
 use crate::store::Owner;
 
@@ -59,7 +59,7 @@ pub struct SurfaceGradientResponse {
     /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     gradients: Array,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -72,7 +72,7 @@ pub struct SurfaceGradientMatrixResponse {
     /// is no normal.
     #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
     matrices: Array,
-    /// The queries where geometry has no meaning.
+    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
     /// How the answer came about.
     diagnostics: Diagnostics,
@@ -132,16 +132,17 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
         let interpolant = fits.interpolant(&work.values, observer)?;
-        let gradients = surface_gradient(&geometry, &interpolant, &work.queries, observer)
+        let gradients = surface_gradient(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
-        diagnostics.geometry = Some(Box::new(fits.surface().diagnostics(&signature.solution, m)));
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         Ok(SurfaceGradientResponse {
-            gradients: per_query(&geometry, gradients, &[m, d]),
-            degenerate: degenerate(&geometry),
+            gradients: surface.per_query(gradients, &[m, d]),
+            degenerate: surface.degenerate(),
             diagnostics,
         })
     }
@@ -161,15 +162,15 @@ impl Operation for SurfaceGradientMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
-        let (geometry, signature) = fits.geometry(&work.queries, OrientationChoice::Outward, observer)?;
-        let matrices =
-            surface_gradient_matrices(&geometry, &fits.main.stored.factor, &work.queries, observer)
-                .map_err(|error| fits.main.refused(error))?;
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
+        let matrices = surface_gradient_matrices(geometry, &fits.main.stored.factor, &work.queries, observer)
+            .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
-        let diagnostics = work.diagnostics(fits, &signature, observer)?;
+        let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(SurfaceGradientMatrixResponse {
-            matrices: Array::new(fits.main.unmerge(matrices), &shape).with_nulls(1, geometry.is_degenerate()),
-            degenerate: degenerate(&geometry),
+            matrices: Array::new(fits.main.unmerge(matrices), &shape).with_nulls(1, geometry.is_null()),
+            degenerate: surface.degenerate(),
             diagnostics,
         })
     }

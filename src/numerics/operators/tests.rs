@@ -1,10 +1,10 @@
 use super::*;
-use crate::numerics::geometry::Orientation;
+use crate::numerics::geometry::{GeometryRequest, SurfaceModel};
 use crate::numerics::kernel::tests::all_families;
 use crate::numerics::kernel::{Family, Kernel};
-use crate::numerics::neighbours::Neighbours;
 use crate::numerics::observer::Unobserved;
 use crate::numerics::regularization::Regularization;
+use crate::numerics::surface::Surface;
 use crate::numerics::testing::{circle, fibonacci_sphere};
 
 fn factor(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Arc<GramFactor> {
@@ -15,8 +15,9 @@ fn factor(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Arc<G
 
 fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> Geometry {
     let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
-    let neighbours = Neighbours::of(factor.cloud());
-    Geometry::of(&signature, &neighbours, queries, Orientation::Outward, &Unobserved).unwrap()
+    let surface = Surface::of(signature, None, &Unobserved).unwrap();
+    let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
+    Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
 }
 
 fn largest(errors: impl Iterator<Item = f64>) -> f64 {

@@ -1,0 +1,55 @@
+//! Prints how many wrong curvatures are flagged, and how many right ones: the tables of docs/degeneracy.md.
+
+#[path = "../tests/degeneracy/shapes.rs"]
+mod shapes;
+#[path = "../tests/degeneracy/sweep.rs"]
+mod sweep;
+
+use gramian::numerics::geometry::SurfaceModel;
+use rayon::prelude::*;
+use sweep::{Tally, cases};
+
+fn main() {
+    for (name, model) in [("signature", SurfaceModel::Signature), ("auto", SurfaceModel::Auto)] {
+        for scale in [0.4, 1.0] {
+            println!("\n{name}, length scale {scale}\n");
+            let cases = cases();
+            let tallies: Vec<Tally> = cases.par_iter().map(|case| case.run(model, scale)).collect();
+            let group = |label: String, keep: &dyn Fn(&sweep::Case) -> bool| {
+                let total = cases.iter().zip(&tallies).filter(|(case, _)| keep(case)).map(|(_, t)| *t);
+                print_row(&label, total.fold(Tally::default(), Tally::add));
+            };
+            println!(
+                "| | queries | null | flagged | of them right to 10 % | offset | unflagged | > 10 % | > 50 % | worst |"
+            );
+            println!("|---|---|---|---|---|---|---|---|---|---|");
+            for shape in shapes::SHAPES {
+                group(format!("{shape:?}").to_lowercase(), &|case| case.shape == shape);
+            }
+            for kernel in sweep::KERNELS {
+                group(kernel.0.to_owned(), &|case| case.kernel.0 == kernel.0);
+            }
+            for n in sweep::SIZES {
+                group(format!("n = {n}, regular"), &|case| case.n_points == n && !case.is_random);
+                group(format!("n = {n}, random"), &|case| case.n_points == n && case.is_random);
+            }
+            group("all".to_owned(), &|_| true);
+        }
+    }
+}
+
+fn print_row(label: &str, t: Tally) {
+    println!(
+        "| {label} | {} | {} | {} | {} | {} | {} | {} ({:.1} %) | {} | {:.2} |",
+        t.queries,
+        t.null,
+        t.flagged,
+        t.false_alarms,
+        t.offset,
+        t.unflagged(),
+        t.missed_10,
+        100.0 * t.missed_10 as f64 / t.unflagged().max(1) as f64,
+        t.missed_50,
+        t.worst
+    );
+}

@@ -1,0 +1,178 @@
+//! The examination of a surface at queries: which function serves each of them, and what is wrong there.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+use super::cloud::Cloud;
+use super::degeneracy::{DegeneracyReason, is_far};
+use super::error::NumericsError;
+use super::geometry::{Answer, GeometryRequest, Orientation, SurfaceModel};
+use super::jets::{JetOrder, Jets};
+use super::neighbours::Neighbour;
+use super::observer::Observer;
+use super::patch::{LocalFit, n_quadric_neighbours};
+use super::rescue::rescue;
+use super::resolution::is_resolved;
+use super::shape::principal_curvatures;
+use super::surface::Surface;
+use super::vector::norm;
+
+/// Distance from the local fit, in spacings, up to which a query counts as on the surface: there the gradient must be normal
+/// to it.
+const ON_SURFACE_SPACINGS: f64 = 0.5;
+
+/// A surface, queries, and the signature function there.
+pub(crate) struct Examination<'a> {
+    surface: &'a Surface,
+    queries: &'a Cloud,
+    request: &'a GeometryRequest,
+    jets: Cow<'a, Jets>,
+    are_points: bool,
+}
+
+/// A query with what surrounds it.
+struct Site<'a> {
+    x: &'a [f64],
+    nearest: Neighbour,
+    spacing: f64,
+    fit: Option<Cow<'a, LocalFit>>,
+}
+
+impl<'a> Examination<'a> {
+    /// Evaluates the signature function at the queries, to the order that the model needs.
+    ///
+    /// # Errors
+    /// Those of [`super::interpolant::Interpolant::at`].
+    pub(crate) fn of(
+        surface: &'a Surface,
+        queries: &'a Cloud,
+        request: &'a GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let are_points = queries == surface.cloud();
+        let order = match request.model {
+            SurfaceModel::Offset => JetOrder::Value,
+            SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::HessianWithMagnitudes,
+        };
+        let jets = match surface.jets_at_points() {
+            Some(jets) if are_points => Cow::Borrowed(jets),
+            Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
+        };
+        Ok(Self { surface, queries, request, jets, are_points })
+    }
+
+    /// u at the queries, `[m]`.
+    pub(crate) fn into_levels(self) -> Vec<f64> {
+        self.jets.values()
+    }
+
+    /// Everything that is known at each query.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn answers(&self, observer: &dyn Observer) -> Result<Vec<Answer>, NumericsError> {
+        let m = self.queries.n_points();
+        let needs_offset = |query| {
+            observer.checkpoint()?;
+            Ok(match self.request.model {
+                SurfaceModel::Signature => false,
+                SurfaceModel::Offset => true,
+                SurfaceModel::Auto => self.vanishes(query, &self.site(query)),
+            })
+        };
+        let needs_offset: Vec<bool> =
+            (0..m).into_par_iter().map(needs_offset).collect::<Result<_, NumericsError>>()?;
+        let last_affordable =
+            (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
+        let answer = |query: usize| {
+            observer.checkpoint()?;
+            let site = self.site(query);
+            let mut answer = match needs_offset[query] {
+                true if query >= last_affordable => self.null(query, DegeneracyReason::UnaffordableRescue),
+                true => self.of_offset(query, &site),
+                false => self.of_signature(query, &site),
+            };
+            answer.reason = answer.reason.or_else(|| self.flag(&answer, &site));
+            Ok(answer)
+        };
+        (0..m).into_par_iter().map(answer).collect()
+    }
+
+    fn site(&self, query: usize) -> Site<'a> {
+        let (surface, cloud) = (self.surface, self.surface.cloud());
+        let x = self.queries.point(query);
+        if self.are_points {
+            let nearest = Neighbour { point: query, squared_distance: 0.0 };
+            let fit = surface.fit(query).map(Cow::Borrowed);
+            return Site { x, nearest, spacing: surface.spacing(query), fit };
+        }
+        let found = surface.neighbours().nearest(cloud, x, 1);
+        let nearest = found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 });
+        let count = n_quadric_neighbours(cloud.dimension());
+        let fit = LocalFit::around(cloud, surface.neighbours(), x, count).map(Cow::Owned);
+        Site { x, nearest, spacing: surface.spacing(nearest.point), fit }
+    }
+
+    fn vanishes(&self, query: usize, site: &Site<'_>) -> bool {
+        let fit = site.fit.as_deref().filter(|fit| fit.height.abs() <= ON_SURFACE_SPACINGS * site.spacing);
+        self.surface.vanishes(&self.jets, query, site.spacing, fit)
+    }
+
+    fn of_signature(&self, query: usize, site: &Site<'_>) -> Answer {
+        if self.request.model == SurfaceModel::Signature && self.vanishes(query, site) {
+            return self.null(query, DegeneracyReason::VanishingGradient);
+        }
+        let gradient = self.jets.gradient(query).to_vec();
+        let sign = match self.request.orientation {
+            Orientation::Gradient => 1.0,
+            Orientation::Outward => self.surface.outward_sign(site.x, &gradient),
+        };
+        Answer { gradient, hessian: self.jets.hessian(query), sign, is_offset: false, reason: None }
+    }
+
+    /// The offset model, whose gradient points outward.
+    fn of_offset(&self, query: usize, site: &Site<'_>) -> Answer {
+        let Some(jet) = rescue(self.surface, site.x) else {
+            return self.null(query, DegeneracyReason::VanishingGradient);
+        };
+        let sign = match self.request.orientation {
+            Orientation::Gradient => -1.0,
+            Orientation::Outward => 1.0,
+        };
+        Answer { gradient: jet.gradient, hessian: jet.hessian, sign, is_offset: true, reason: None }
+    }
+
+    fn null(&self, query: usize, reason: DegeneracyReason) -> Answer {
+        let d = self.queries.dimension();
+        let (gradient, hessian) = match self.request.model {
+            SurfaceModel::Offset => (vec![0.0; d], vec![0.0; d * d]),
+            SurfaceModel::Auto | SurfaceModel::Signature => {
+                (self.jets.gradient(query).to_vec(), self.jets.hessian(query))
+            }
+        };
+        Answer { gradient, hessian, sign: 1.0, is_offset: false, reason: Some(reason) }
+    }
+
+    /// What makes an answer doubtful.
+    fn flag(&self, answer: &Answer, site: &Site<'_>) -> Option<DegeneracyReason> {
+        if is_far(site.nearest.squared_distance, site.spacing) {
+            return Some(DegeneracyReason::FarFromCloud);
+        }
+        if !self.request.checks_curvatures {
+            return None;
+        }
+        if !answer.is_offset && self.surface.is_too_rough() {
+            return Some(DegeneracyReason::KernelTooRough);
+        }
+        (!self.is_resolved(answer, site)).then_some(DegeneracyReason::UnderResolved)
+    }
+
+    fn is_resolved(&self, answer: &Answer, site: &Site<'_>) -> bool {
+        let length = norm(&answer.gradient);
+        let normal: Vec<f64> = answer.gradient.iter().map(|g| answer.sign * g / length).collect();
+        let (curvatures, _) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
+        let fit = site.fit.as_deref();
+        is_resolved(self.surface, site.x, site.spacing, &normal, &curvatures, fit, answer.is_offset)
+    }
+}

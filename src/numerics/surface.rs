@@ -1,0 +1,257 @@
+//! The surface that a cloud samples: its signature function, and what its points say about it by themselves.
+
+use rayon::prelude::*;
+
+use super::cloud::Cloud;
+use super::defaults::median;
+use super::degeneracy::{is_rounding, is_too_rough, turns_within_spacing};
+use super::error::NumericsError;
+use super::interpolant::Interpolant;
+use super::jets::{JetOrder, Jets};
+use super::neighbours::Neighbours;
+use super::observer::Observer;
+use super::orientation::{Directions, consistent_signs};
+use super::patch::{LocalFit, n_quadric_neighbours};
+use super::vector::{dot, norm};
+
+/// Neighbours that define the sampling distance.
+const SPACING_NEIGHBOURS: usize = 4;
+
+/// Cosine between ∇u and the normal of a reliable local fit below which ∇u is not normal to the surface at all.
+const OBLIQUE: f64 = 0.5;
+
+/// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the points.
+const DIFFERENCE_STEP: f64 = 0.25;
+
+/// A signature function with local fits and consistently oriented normals at the points, d ≥ 2.
+///
+/// Made once per factorization: it costs one evaluation at all points, and a quadric through the neighbours of each.
+pub struct Surface {
+    signature: Interpolant,
+    neighbours: Neighbours,
+    /// At the points; absent for kernels with a kink there.
+    jets: Option<Jets>,
+    spacings: Vec<f64>,
+    fits: Vec<Option<LocalFit>>,
+    /// Outward unit normals at the points, `[n, d]`; zero where nothing is known.
+    normals: Vec<f64>,
+    orientation: SurfaceOrientation,
+    is_too_rough: bool,
+    radius: f64,
+}
+
+/// How the signs of normals were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SurfaceOrientation {
+    /// Points whose gradient pointed inward.
+    pub n_flipped: usize,
+    /// Whether part of the surface has a rim, so that outward has no meaning there.
+    pub is_open: bool,
+    /// Whether the signs are those of normals that came with the cloud.
+    pub is_given: bool,
+}
+
+impl Surface {
+    /// Examines the surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn of(
+        signature: Interpolant,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let factor = signature.factor.clone();
+        let cloud = factor.cloud();
+        if cloud.dimension() < 2 {
+            return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
+        }
+        let neighbours = Neighbours::of(cloud);
+        let spacing = |point| neighbours.mean_spacing(cloud, point, SPACING_NEIGHBOURS).unwrap_or(0.0);
+        let spacings: Vec<f64> = (0..cloud.n_points()).into_par_iter().map(spacing).collect();
+        let count = n_quadric_neighbours(cloud.dimension());
+        let fit = |point: usize| {
+            observer.checkpoint()?;
+            Ok(LocalFit::around(cloud, &neighbours, cloud.point(point), count))
+        };
+        let fits = (0..cloud.n_points()).into_par_iter().map(fit).collect::<Result<_, NumericsError>>()?;
+        let jets = match factor.kernel().has_kink() {
+            true => None,
+            false => Some(signature.at(cloud, JetOrder::HessianWithMagnitudes, observer)?),
+        };
+        let orientation = SurfaceOrientation { n_flipped: 0, is_open: false, is_given: given.is_some() };
+        let nearest = median(neighbours.spacings(cloud)).unwrap_or(0.0);
+        let is_too_rough = is_too_rough(factor.kernel(), nearest);
+        let normals = Vec::new();
+        let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
+        let mut this =
+            Self { signature, neighbours, jets, spacings, fits, normals, orientation, is_too_rough, radius };
+        this.orient(given, observer)?;
+        Ok(this)
+    }
+
+    fn orient(&mut self, given: Option<&Cloud>, observer: &dyn Observer) -> Result<(), NumericsError> {
+        let factor = self.signature.factor.clone();
+        let (cloud, d) = (factor.cloud(), factor.cloud().dimension());
+        let mut directions = self.directions(observer)?;
+        if let Some(given) = given {
+            let unit = |v: &[f64]| v.iter().map(|c| c / norm(v)).collect::<Vec<f64>>();
+            directions.normals = given.points().flat_map(unit).collect();
+        }
+        let found = consistent_signs(cloud, &self.neighbours, &directions);
+        self.orientation.is_open = found.is_open;
+        self.normals = directions.normals;
+        if given.is_none() {
+            self.orientation.n_flipped = found.n_flipped;
+            for (normal, sign) in self.normals.chunks_exact_mut(d).zip(&found.signs) {
+                normal.iter_mut().for_each(|c| *c *= sign);
+            }
+        }
+        // Positions alone give the better direction where the cloud is dense; the signature function has given the sign.
+        for (normal, fit) in self.normals.chunks_exact_mut(d).zip(&self.fits) {
+            if let Some(fit) = fit.as_ref().filter(|fit| fit.is_reliable() && given.is_none()) {
+                let sign = dot(normal, &fit.normal).signum();
+                normal.iter_mut().zip(&fit.normal).for_each(|(c, n)| *c = sign * n);
+            }
+        }
+        Ok(())
+    }
+
+    /// `−∇u/|∇u|` at the points where it means something, normals of unknown sign elsewhere.
+    fn directions(&self, observer: &dyn Observer) -> Result<Directions, NumericsError> {
+        let cloud = self.cloud();
+        let (n, d) = (cloud.n_points(), cloud.dimension());
+        let slopes = match self.jets {
+            Some(_) => Vec::new(),
+            None => self.slopes_along_fits(observer)?,
+        };
+        let mut normals = vec![0.0; n * d];
+        let mut has_sign = vec![false; n];
+        for point in 0..n {
+            let slot = &mut normals[point * d..][..d];
+            let fit = self.fits[point].as_ref();
+            match &self.jets {
+                Some(jets) if !self.vanishes(jets, point, self.spacings[point], fit) => {
+                    let gradient = jets.gradient(point);
+                    let length = norm(gradient);
+                    slot.iter_mut().zip(gradient).for_each(|(n, g)| *n = -g / length);
+                    has_sign[point] = true;
+                }
+                Some(_) => slot.copy_from_slice(fit.map_or(&vec![0.0; d], |fit| &fit.normal)),
+                None => {
+                    let Some(fit) = fit else { continue };
+                    let sign = if slopes[point] > 0.0 { -1.0 } else { 1.0 };
+                    slot.iter_mut().zip(&fit.normal).for_each(|(n, f)| *n = sign * f);
+                    has_sign[point] = slopes[point] != 0.0;
+                }
+            }
+        }
+        let is_at_rim = self.fits.iter().map(|fit| fit.as_ref().is_some_and(|fit| fit.is_at_rim)).collect();
+        Ok(Directions { normals, has_sign, is_at_rim, spacings: self.spacings.clone() })
+    }
+
+    /// `u(x + δn) − u(x − δn)` along the normals of the local fits: the kink of the kernel at x is even and drops out.
+    fn slopes_along_fits(&self, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let cloud = self.cloud();
+        let at = |side: f64| -> Result<Vec<f64>, NumericsError> {
+            let moved = (0..cloud.n_points()).flat_map(|point| {
+                let step = side * DIFFERENCE_STEP * self.spacings[point];
+                let normal = self.fits[point].as_ref().map(|fit| fit.normal.as_slice());
+                (0..cloud.dimension())
+                    .map(move |c| cloud.point(point)[c] + normal.map_or(0.0, |n| step * n[c]))
+            });
+            let moved = Cloud::new(moved.collect(), cloud.dimension())?;
+            Ok(self.signature.at(&moved, JetOrder::Value, observer)?.values())
+        };
+        Ok(at(1.0)?.iter().zip(at(-1.0)?).map(|(a, b)| a - b).collect())
+    }
+
+    /// Whether ∇u is no normal at a query: rounding (T1), no direction at the scale of the sampling (T2), or oblique to a
+    /// reliable local fit.
+    pub(crate) fn vanishes(&self, jets: &Jets, query: usize, spacing: f64, fit: Option<&LocalFit>) -> bool {
+        let gradient = jets.gradient(query);
+        let length = norm(gradient);
+        if is_rounding(&self.signature, jets, query) || turns_within_spacing(jets, query, spacing) {
+            return true;
+        }
+        fit.filter(|fit| fit.is_reliable())
+            .is_some_and(|fit| dot(gradient, &fit.normal).abs() < OBLIQUE * length)
+    }
+
+    /// The function u whose level surface this is.
+    pub fn signature(&self) -> &Interpolant {
+        &self.signature
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        self.signature.factor.cloud()
+    }
+
+    pub fn orientation(&self) -> SurfaceOrientation {
+        self.orientation
+    }
+
+    /// Whether second derivatives at the points see the cusp of the kernel.
+    pub(crate) fn is_too_rough(&self) -> bool {
+        self.is_too_rough
+    }
+
+    /// Half the diagonal of the bounding box, unit L; 1 for a single position.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    pub(crate) fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// Mean distance of a point to its neighbours, unit L.
+    pub(crate) fn spacing(&self, point: usize) -> f64 {
+        self.spacings[point]
+    }
+
+    /// The outward unit normal of a point, zero where unknown.
+    pub(crate) fn normal(&self, point: usize) -> &[f64] {
+        let d = self.cloud().dimension();
+        &self.normals[point * d..][..d]
+    }
+
+    /// u, ∇u and D²u at the points, where they were kept.
+    pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
+        self.jets.as_ref()
+    }
+
+    /// The local fit at a point.
+    pub(crate) fn fit(&self, point: usize) -> Option<&LocalFit> {
+        self.fits[point].as_ref()
+    }
+
+    /// The sign that turns ∇u at x into an outward direction: −1 unless signs of the points near x were repaired or given.
+    pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64]) -> f64 {
+        if self.orientation.n_flipped == 0 && !self.orientation.is_given {
+            return -1.0;
+        }
+        let nearest = self.neighbours.nearest(self.cloud(), x, SPACING_NEIGHBOURS);
+        let along: f64 = nearest
+            .iter()
+            .map(|found| {
+                // Near a thin sheet the point on this side of it decides.
+                let weight = 1.0 / (found.squared_distance + 1e-3 * self.spacings[found.point].powi(2));
+                weight * dot(self.normal(found.point), gradient)
+            })
+            .sum();
+        if along > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Bytes held on the heap beside the factor.
+    pub fn n_bytes(&self) -> usize {
+        Self::n_bytes_needed(self.cloud().n_points(), self.cloud().dimension())
+    }
+
+    /// Bytes that n points of dimension d take: tree, jets, fits with their vectors, normals.
+    pub fn n_bytes_needed(n_points: usize, dimension: usize) -> usize {
+        let jet = 1 + dimension + dimension * (dimension + 1) / 2 + 2;
+        let numbers = jet + 3 * dimension + 1;
+        n_points * (16 + 8 * numbers + size_of::<Option<LocalFit>>())
+    }
+}
