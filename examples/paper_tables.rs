@@ -1,0 +1,28 @@
+//! Prints the paper's tables with its figures beside ours: `cargo run --release --example paper_tables`.
+
+#[path = "../tests/paper/main.rs"]
+mod paper;
+
+fn main() {
+    let tables = [
+        paper::inflections::table,
+        paper::triangle::table,
+        paper::half_ellipse::table,
+        paper::square::table,
+        paper::quadrics::table,
+        paper::sphere::table,
+        paper::sphere_orders::table,
+        paper::torus_random::table_gauss,
+        paper::torus_random::table_laplace,
+        paper::torus_fibonacci::table_gauss,
+        paper::torus_fibonacci::table_laplace,
+        paper::ellipsoid::table,
+        paper::noisy_ellipse::table,
+        paper::posterior_coverage::table,
+    ];
+    for table in tables {
+        let start = std::time::Instant::now();
+        println!("{}", table());
+        println!("{:?}", start.elapsed());
+    }
+}

@@ -1,0 +1,45 @@
+//! Norms of errors and statistics of repetitions.
+
+/// Largest magnitude; NaN if there is one, so that no bound passes it.
+pub fn largest(a: &[f64]) -> f64 {
+    a.iter().fold(0.0, |a, b| if b.is_nan() || b.abs() > a { b.abs() } else { a })
+}
+
+/// `max|a − b| / max|b|`.
+pub fn relative_max(found: &[f64], exact: &[f64]) -> f64 {
+    largest(&difference(found, exact)) / largest(exact)
+}
+
+/// `|a − b|₂ / |b|₂`.
+pub fn relative_l2(found: &[f64], exact: &[f64]) -> f64 {
+    norm(&difference(found, exact)) / norm(exact)
+}
+
+pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+pub fn norm(a: &[f64]) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+pub fn mean(a: &[f64]) -> f64 {
+    a.iter().sum::<f64>() / a.len() as f64
+}
+
+/// The middle of a list, the mean of two.
+pub fn median(mut a: Vec<f64>) -> f64 {
+    a.sort_by(f64::total_cmp);
+    (a[(a.len() - 1) / 2] + a[a.len() / 2]) / 2.0
+}
+
+/// Column by column.
+pub fn medians<const N: usize>(runs: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|column| median(runs.iter().map(|run| run[column]).collect()))
+}
+
+/// Column by column.
+pub fn means<const N: usize>(runs: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|column| mean(&runs.iter().map(|run| run[column]).collect::<Vec<f64>>()))
+}

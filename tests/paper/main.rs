@@ -1,0 +1,25 @@
+//! The paper's experiments, one file each, with its figures beside ours; `examples/paper_tables.rs` prints them.
+//!
+//! Patrick Guidotti, "Geometric Kernel Interpolation and Regression", section "Numerical Experiments", with the corrected
+//! formulas of docs/errata.md. Seeds are fixed; what the paper draws at random once is drawn 20 times here.
+
+pub mod ellipsoid;
+pub mod half_ellipse;
+pub mod inflections;
+pub mod noisy_ellipse;
+pub mod posterior_coverage;
+pub mod quadrics;
+pub mod sphere;
+pub mod sphere_orders;
+pub mod square;
+pub mod torus_fibonacci;
+pub mod torus_random;
+pub mod triangle;
+
+mod curves;
+mod errors;
+mod random;
+mod shapes;
+mod support;
+mod table;
+mod torus;

@@ -1,0 +1,39 @@
+//! Seeded random numbers, so that every run draws the same clouds.
+
+use std::f64::consts::TAU;
+
+/// SplitMix64 (Steele, Lea and Flood 2014).
+pub struct Random(u64);
+
+impl Random {
+    pub fn of_seed(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0xd134_2543_de82_ef95))
+    }
+
+    /// In [0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// In [0, 2π).
+    pub fn angle(&mut self) -> f64 {
+        TAU * self.uniform()
+    }
+
+    /// Standard normal, by Box and Muller (1958).
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * self.angle().cos()
+    }
+
+    /// Uniform on the unit sphere of R³: a normal vector, normalised, as in the paper.
+    pub fn direction(&mut self) -> [f64; 3] {
+        let v = [self.normal(), self.normal(), self.normal()];
+        let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        v.map(|x| x / norm)
+    }
+}

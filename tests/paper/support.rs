@@ -1,0 +1,137 @@
+//! Every call of the experiments into the library.
+
+use std::sync::Arc;
+
+pub use gramian::numerics::cloud::Cloud;
+use gramian::numerics::geometry::Geometry;
+pub use gramian::numerics::geometry::Orientation;
+use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::jets::{JetOrder, Jets};
+pub use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::neighbours::Neighbours;
+use gramian::numerics::observer::Unobserved;
+use gramian::numerics::operators;
+use gramian::numerics::posterior;
+use gramian::numerics::regularization::Regularization;
+use gramian::numerics::solver::GramFactor;
+
+/// The regularised Laplace kernel of the paper's tables.
+pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
+pub const GAUSS: Family = Family::Gauss;
+
+/// The paper's kernels: length scale 1, variance 1.
+pub fn kernel(family: Family) -> Kernel {
+    Kernel::new(family, 1.0, 1.0).unwrap()
+}
+
+pub fn cloud<const D: usize>(points: &[[f64; D]]) -> Cloud {
+    Cloud::new(points.concat(), D).unwrap()
+}
+
+/// A cloud with its signature function u_X.
+pub struct Surface {
+    signature: Interpolant,
+    neighbours: Neighbours,
+}
+
+impl Surface {
+    pub fn of(cloud: &Cloud, family: Family, alpha: f64) -> Self {
+        let factor = factorize(cloud, kernel(family), alpha);
+        let signature = Interpolant::signature(factor, &Unobserved).unwrap();
+        Self { signature, neighbours: Neighbours::of(cloud) }
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        self.signature.factor.cloud()
+    }
+
+    /// u at the queries.
+    pub fn levels(&self, queries: &Cloud) -> Vec<f64> {
+        self.jets(queries, JetOrder::Value).values()
+    }
+
+    /// ∇u at the queries.
+    pub fn gradients(&self, queries: &Cloud) -> Vec<Vec<f64>> {
+        let jets = self.jets(queries, JetOrder::Gradient);
+        (0..jets.n_queries()).map(|query| jets.gradient(query).to_vec()).collect()
+    }
+
+    /// ū, the mean of u over the cloud: the level of the surface at α > 0.
+    pub fn mean_level(&self) -> f64 {
+        let levels = self.levels(self.cloud());
+        levels.iter().sum::<f64>() / levels.len() as f64
+    }
+
+    /// Outward normals; `None` where the gradient vanishes.
+    pub fn normals(&self, queries: &Cloud) -> Vec<Option<Vec<f64>>> {
+        let geometry = self.geometry(queries, Orientation::Outward);
+        let normal = |query: usize| (!geometry.is_degenerate()[query]).then(|| geometry.normal(query).to_vec());
+        (0..geometry.n_queries()).map(normal).collect()
+    }
+
+    /// Principal curvatures, ascending by value; `None` where the gradient vanishes.
+    pub fn curvatures(&self, queries: &Cloud, orientation: Orientation) -> Vec<Option<Vec<f64>>> {
+        let geometry = self.geometry(queries, orientation);
+        let principal = geometry.curvatures(&Unobserved).unwrap().principal;
+        let flags = geometry.is_degenerate().iter();
+        flags
+            .zip(principal.chunks(geometry.dimension() - 1))
+            .map(|(&flag, k)| (!flag).then(|| k.to_vec()))
+            .collect()
+    }
+
+    /// Values sampled at the points of the cloud.
+    pub fn function(&self, values: &[f64]) -> Function<'_> {
+        let interpolant = Interpolant::fit(self.signature.factor.clone(), values, &Unobserved).unwrap();
+        Function { surface: self, interpolant }
+    }
+
+    fn jets(&self, queries: &Cloud, order: JetOrder) -> Jets {
+        self.signature.at(queries, order, &Unobserved).unwrap()
+    }
+
+    fn geometry(&self, queries: &Cloud, orientation: Orientation) -> Geometry {
+        Geometry::of(&self.signature, &self.neighbours, queries, orientation, &Unobserved).unwrap()
+    }
+}
+
+/// The interpolant of values on a surface.
+pub struct Function<'a> {
+    surface: &'a Surface,
+    interpolant: Interpolant,
+}
+
+impl Function<'_> {
+    /// f, `[m]`.
+    pub fn values(&self, queries: &Cloud) -> Vec<f64> {
+        self.interpolant.at(queries, JetOrder::Value, &Unobserved).unwrap().values()
+    }
+
+    /// ∇_M f, `[m, d]`, and Δ_M f, `[m]`.
+    pub fn surface_derivatives(&self, queries: &Cloud) -> (Vec<f64>, Vec<f64>) {
+        let geometry = self.surface.geometry(queries, Orientation::Outward);
+        assert!(geometry.degenerate().is_empty());
+        let gradients = operators::surface_gradient(&geometry, &self.interpolant, queries, &Unobserved);
+        let laplacians = operators::laplace_beltrami(&geometry, &self.interpolant, queries, &Unobserved);
+        (gradients.unwrap(), laplacians.unwrap())
+    }
+}
+
+/// Posterior means and variances of the latent function at the queries.
+pub fn posterior(
+    cloud: &Cloud,
+    kernel: Kernel,
+    noise_variance: f64,
+    values: &[f64],
+    queries: &Cloud,
+) -> (Vec<f64>, Vec<f64>) {
+    let factor = factorize(cloud, kernel, noise_variance);
+    let variances = posterior::variances(&factor, queries, &Unobserved).unwrap().latent;
+    let mean = Interpolant::fit(factor, values, &Unobserved).unwrap();
+    (mean.at(queries, JetOrder::Value, &Unobserved).unwrap().values(), variances)
+}
+
+fn factorize(cloud: &Cloud, kernel: Kernel, alpha: f64) -> Arc<GramFactor> {
+    let alpha = Regularization::uniform(alpha).unwrap();
+    Arc::new(GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap())
+}

@@ -1,0 +1,122 @@
+//! Tables that put the paper's figure beside ours.
+
+use std::fmt;
+
+/// An experiment's results.
+pub struct Table {
+    pub title: &'static str,
+    pub columns: Vec<&'static str>,
+    pub rows: Vec<Row>,
+}
+
+/// One row of results.
+pub struct Row {
+    pub label: String,
+    pub cells: Vec<Cell>,
+}
+
+/// One result.
+#[derive(Clone, Copy)]
+pub struct Cell {
+    pub paper: Paper,
+    /// `None` where the gradient vanishes and the library says so.
+    pub ours: Option<f64>,
+}
+
+/// What the paper prints.
+#[derive(Clone, Copy)]
+pub enum Paper {
+    Number(f64),
+    /// A picture without numbers.
+    Figure,
+    /// Nothing: the result is ours alone.
+    Nothing,
+}
+
+impl Row {
+    /// Joins the numbers that the paper prints to ours.
+    pub fn beside(label: impl Into<String>, paper: &[f64], ours: &[f64]) -> Self {
+        assert_eq!(paper.len(), ours.len());
+        let cell = |(&paper, &ours): (&f64, &f64)| Cell { paper: Paper::Number(paper), ours: Some(ours) };
+        Self { label: label.into(), cells: paper.iter().zip(ours).map(cell).collect() }
+    }
+
+    /// Numbers of ours, where the paper has something else.
+    pub fn of(label: impl Into<String>, paper: Paper, ours: &[f64]) -> Self {
+        let cell = |&ours: &f64| Cell { paper, ours: Some(ours) };
+        Self { label: label.into(), cells: ours.iter().map(cell).collect() }
+    }
+
+    /// Our numbers.
+    pub fn ours(&self) -> Vec<f64> {
+        self.cells.iter().map(|cell| cell.ours.expect("the gradient vanishes nowhere in this row")).collect()
+    }
+}
+
+impl Cell {
+    /// Our number against the paper's.
+    pub fn ratio(&self) -> f64 {
+        match (self.paper, self.ours) {
+            (Paper::Number(paper), Some(ours)) => (ours / paper).abs(),
+            _ => f64::NAN,
+        }
+    }
+}
+
+impl Table {
+    /// Measurements where the paper has pictures alone.
+    pub fn of_figure(title: &'static str, facts: &[(&str, f64)]) -> Self {
+        let row = |&(label, ours): &(&str, f64)| Row::of(label, Paper::Figure, &[ours]);
+        Self { title, columns: vec![""], rows: facts.iter().map(row).collect() }
+    }
+
+    /// Our number in a row of one column.
+    pub fn fact(&self, label: &str) -> f64 {
+        self.row(label).ours()[0]
+    }
+
+    /// The row of a label.
+    pub fn row(&self, label: &str) -> &Row {
+        self.rows.iter().find(|row| row.label == label).expect("a label of this table")
+    }
+}
+
+/// Under each column of the table, the paper's figure and ours.
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let label_width = self.rows.iter().map(|row| row.label.chars().count()).max().unwrap_or(0);
+        writeln!(f, "{}", self.title)?;
+        write!(f, "{:label_width$}", "")?;
+        self.columns.iter().try_for_each(|column| write!(f, " | {column:^19}"))?;
+        write!(f, "\n{:label_width$}", "")?;
+        self.columns.iter().try_for_each(|_| write!(f, " | {:>9} {:>9}", "paper", "ours"))?;
+        writeln!(f)?;
+        for row in &self.rows {
+            write!(f, "{:label_width$}", row.label)?;
+            row.cells.iter().try_for_each(|cell| write!(f, " | {cell}"))?;
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Cell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let paper = match self.paper {
+            Paper::Number(number) => short(number),
+            Paper::Figure => "figure".to_owned(),
+            Paper::Nothing => "-".to_owned(),
+        };
+        write!(f, "{paper:>9} {:>9}", self.ours.map_or("null".to_owned(), short))
+    }
+}
+
+/// Four significant digits of moderate numbers, three of others.
+fn short(number: f64) -> String {
+    match number.abs() {
+        x if x == 0.0 => "0".to_owned(),
+        x if (0.1..10.0).contains(&x) => format!("{number:.4}"),
+        x if (10.0..1e4).contains(&x) => format!("{number:.1}"),
+        _ => format!("{number:.2e}"),
+    }
+}

@@ -1,0 +1,36 @@
+//! Set-up of the two tables on the ring torus, R₁ = 2, R₂ = ½, α = 1e-10.
+//!
+//! Queries: 32 equidistant points on the vertical circle at a random u. The two curvatures are compared in ascending order with
+//! `cos v/(R₁ + R₂ cos v)` and `1/R₂`, outward (errata.md, 5); the paper's −2 is the inward sign, and the order of its pairs
+//! is that of ours. Relative errors of a list: `max|κ − κ*|/max|κ*|` and `|κ − κ*|₂/|κ*|₂`.
+
+use std::f64::consts::TAU;
+
+use super::errors::{relative_l2, relative_max};
+use super::shapes::{TORUS, torus_point};
+use super::support::{Orientation, Surface, cloud};
+
+/// The columns of one kernel.
+pub const COLUMNS: [&str; 4] = ["Linf, cos v/(..)", "Linf, 1/R2", "L2, cos v/(..)", "L2, 1/R2"];
+
+/// The paper's α.
+pub const ALPHA: f64 = 1e-10;
+
+/// L∞ of both curvatures, then L² of both.
+pub fn errors(surface: &Surface, u: f64) -> [f64; 4] {
+    let [r1, r2] = TORUS;
+    let angles: Vec<f64> = (0..32).map(|i| TAU * f64::from(i) / 32.0).collect();
+    let queries = cloud(&angles.iter().map(|&v| torus_point(u, v)).collect::<Vec<_>>());
+    let found = surface.curvatures(&queries, Orientation::Outward);
+    // A flagged point counts as an error of any size.
+    let nth = |n: usize| found.iter().map(|k| k.as_ref().map_or(f64::NAN, |k| k[n])).collect::<Vec<f64>>();
+    let (small, large) = (nth(0), nth(1));
+    let exact_small: Vec<f64> = angles.iter().map(|v| v.cos() / (r1 + r2 * v.cos())).collect();
+    let exact_large = vec![1.0 / r2; angles.len()];
+    [
+        relative_max(&small, &exact_small),
+        relative_max(&large, &exact_large),
+        relative_l2(&small, &exact_small),
+        relative_l2(&large, &exact_large),
+    ]
+}
