@@ -21,8 +21,6 @@ fn main() {
         paper::posterior_coverage::table,
     ];
     for table in tables {
-        let start = std::time::Instant::now();
         println!("{}", table());
-        println!("{:?}", start.elapsed());
     }
 }

@@ -33,8 +33,8 @@ pub fn points(stations: &[Station]) -> Cloud {
 
 /// Steps of the search on either side of a curve.
 const STEPS: i32 = 30;
-/// Halvings of a step: to rounding.
-const HALVINGS: usize = 45;
+/// Halvings of a step: to 1e-9 of the reach.
+const HALVINGS: usize = 25;
 
 /// Signed distance along each normal to the nearest crossing of `u = level`; `None` if there is none within `reach`.
 ///
@@ -96,4 +96,21 @@ fn degrees_between(a: &[f64], b: &[f64]) -> f64 {
 /// Distances without their sign; NaN where there is none.
 pub fn lengths(distances: &[Option<f64>]) -> Vec<f64> {
     distances.iter().map(|distance| distance.map_or(f64::NAN, f64::abs)).collect()
+}
+
+/// Rays of [`rays_crossed_once`], half a degree off the axes: none meets a corner.
+pub const N_RAYS: u32 = 360;
+
+/// How many of 360 rays from the origin level 1 crosses just once within `reach`: all of them if it is a simple closed curve,
+/// star-shaped around the origin, and nothing else.
+pub fn rays_crossed_once(surface: &Surface, reach: f64) -> usize {
+    const STEPS_PER_RAY: usize = 200;
+    let ray = |i: u32| {
+        let (sin, cos) = (f64::from(i) + 0.5).to_radians().sin_cos();
+        let radius = move |step: usize| reach * step as f64 / STEPS_PER_RAY as f64;
+        (1..=STEPS_PER_RAY).map(move |step| [radius(step) * cos, radius(step) * sin])
+    };
+    let levels = surface.levels(&cloud(&(0..N_RAYS).flat_map(ray).collect::<Vec<_>>()));
+    let n_crossings = |u: &[f64]| u.windows(2).filter(|u| (u[0] >= 1.0) != (u[1] >= 1.0)).count();
+    levels.chunks(STEPS_PER_RAY).filter(|u| n_crossings(u) == 1).count()
 }

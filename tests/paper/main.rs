@@ -16,6 +16,8 @@ pub mod torus_fibonacci;
 pub mod torus_random;
 pub mod triangle;
 
+#[cfg(test)]
+mod bounds;
 mod curves;
 mod errors;
 mod random;

@@ -65,7 +65,8 @@ impl Surface {
     /// Outward normals; `None` where the gradient vanishes.
     pub fn normals(&self, queries: &Cloud) -> Vec<Option<Vec<f64>>> {
         let geometry = self.geometry(queries, Orientation::Outward);
-        let normal = |query: usize| (!geometry.is_degenerate()[query]).then(|| geometry.normal(query).to_vec());
+        let normal =
+            |query: usize| (!geometry.is_degenerate()[query]).then(|| geometry.normal(query).to_vec());
         (0..geometry.n_queries()).map(normal).collect()
     }
 

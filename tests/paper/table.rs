@@ -19,7 +19,7 @@ pub struct Row {
 #[derive(Clone, Copy)]
 pub struct Cell {
     pub paper: Paper,
-    /// `None` where the gradient vanishes and the library says so.
+    /// `None` where there is no answer: the gradient vanishes and the library says so, or no level line is found.
     pub ours: Option<f64>,
 }
 
@@ -46,38 +46,13 @@ impl Row {
         let cell = |&ours: &f64| Cell { paper, ours: Some(ours) };
         Self { label: label.into(), cells: ours.iter().map(cell).collect() }
     }
-
-    /// Our numbers.
-    pub fn ours(&self) -> Vec<f64> {
-        self.cells.iter().map(|cell| cell.ours.expect("the gradient vanishes nowhere in this row")).collect()
-    }
-}
-
-impl Cell {
-    /// Our number against the paper's.
-    pub fn ratio(&self) -> f64 {
-        match (self.paper, self.ours) {
-            (Paper::Number(paper), Some(ours)) => (ours / paper).abs(),
-            _ => f64::NAN,
-        }
-    }
 }
 
 impl Table {
-    /// Measurements where the paper has pictures alone.
+    /// Measurements where the paper has pictures alone, one column without a name.
     pub fn of_figure(title: &'static str, facts: &[(&str, f64)]) -> Self {
         let row = |&(label, ours): &(&str, f64)| Row::of(label, Paper::Figure, &[ours]);
         Self { title, columns: vec![""], rows: facts.iter().map(row).collect() }
-    }
-
-    /// Our number in a row of one column.
-    pub fn fact(&self, label: &str) -> f64 {
-        self.row(label).ours()[0]
-    }
-
-    /// The row of a label.
-    pub fn row(&self, label: &str) -> &Row {
-        self.rows.iter().find(|row| row.label == label).expect("a label of this table")
     }
 }
 
@@ -86,9 +61,12 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let label_width = self.rows.iter().map(|row| row.label.chars().count()).max().unwrap_or(0);
         writeln!(f, "{}", self.title)?;
+        if self.columns != [""] {
+            write!(f, "{:label_width$}", "")?;
+            self.columns.iter().try_for_each(|column| write!(f, " | {column:^19}"))?;
+            writeln!(f)?;
+        }
         write!(f, "{:label_width$}", "")?;
-        self.columns.iter().try_for_each(|column| write!(f, " | {column:^19}"))?;
-        write!(f, "\n{:label_width$}", "")?;
         self.columns.iter().try_for_each(|_| write!(f, " | {:>9} {:>9}", "paper", "ours"))?;
         writeln!(f)?;
         for row in &self.rows {
@@ -111,10 +89,10 @@ impl fmt::Display for Cell {
     }
 }
 
-/// Four significant digits of moderate numbers, three of others.
+/// Counts as they are, four or five digits of moderate numbers, three of others.
 fn short(number: f64) -> String {
     match number.abs() {
-        x if x == 0.0 => "0".to_owned(),
+        x if x < 1e4 && x.fract() == 0.0 => format!("{number:.0}"),
         x if (0.1..10.0).contains(&x) => format!("{number:.4}"),
         x if (10.0..1e4).contains(&x) => format!("{number:.1}"),
         _ => format!("{number:.2e}"),

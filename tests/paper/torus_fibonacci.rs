@@ -49,6 +49,7 @@ fn table(title: &'static str, family: Family, paper: &Paper) -> Table {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bounds::assert_errors_are_the_papers_or_smaller;
     use super::*;
 
     /// α shifts the level of the surface by about α/λ along each eigenvector of K: errors of 1e-8 in second derivatives, at
@@ -60,20 +61,13 @@ mod tests {
         let table = table_gauss();
         println!("{table}");
         assert!(table.row("m = 1024").ours().iter().all(|&error| error < LIMIT_OF_ALPHA));
-        assert_within_three_times(&table.rows[2..4]);
+        assert_errors_are_the_papers_or_smaller(&table.rows[2..4]);
     }
 
     #[test]
     fn laplace_errors_are_the_papers_or_smaller() {
         let table = table_laplace();
         println!("{table}");
-        assert_within_three_times(&table.rows[2..]);
-    }
-
-    /// A factor 3 leaves room for the circle, which the paper drew at random.
-    fn assert_within_three_times(rows: &[Row]) {
-        let ratios: Vec<f64> = rows.iter().flat_map(|row| &row.cells).map(|cell| cell.ratio()).collect();
-        assert!(ratios.iter().all(|&ratio| ratio < 3.0), "{ratios:?}");
-        assert!(ratios.iter().filter(|&&ratio| ratio < 1.0).count() > ratios.len() / 2, "{ratios:?}");
+        assert_errors_are_the_papers_or_smaller(&table.rows[2..]);
     }
 }

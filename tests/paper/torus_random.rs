@@ -54,29 +54,35 @@ fn run(m: usize, family: Family, seed: u64) -> [f64; 4] {
     errors(&surface, random.angle())
 }
 
-/// At m = 1,024 the density is enough for every random cloud; below it, the largest hole of a cloud rules its errors, which
-/// differ by more than a decade from cloud to cloud.
-#[test]
-fn with_1024_points_gauss_curvatures_are_right_to_1e_7() {
-    let table = table_gauss();
-    println!("{table}");
-    assert!(table.row("m = 1024").ours().iter().all(|&error| error < 1e-7));
-    assert_errors_fall(&table);
-}
-
-#[test]
-fn with_1024_points_laplace_curvatures_are_right_to_6e_5() {
-    let table = table_laplace();
-    println!("{table}");
-    assert!(table.row("m = 1024").ours().iter().all(|&error| error < 6e-5));
-    assert_errors_fall(&table);
-}
-
-/// Twice the points at least halve the median error.
 #[cfg(test)]
-fn assert_errors_fall(table: &Table) {
-    for pair in table.rows.windows(2) {
-        let falls = pair[0].ours().iter().zip(&pair[1].ours()).all(|(before, after)| *after < 0.5 * before);
-        assert!(falls, "{} to {}", pair[0].label, pair[1].label);
+mod tests {
+    use super::*;
+
+    /// Bounds at m = 1,024 alone: below it the largest hole of a cloud rules its errors, which differ by more than a decade from
+    /// cloud to cloud. At 1,024 Gauss is at the limit of α, 1e-8, in every cloud: 10 times that.
+    #[test]
+    fn with_1024_points_gauss_curvatures_are_right_to_1e_7() {
+        let table = table_gauss();
+        println!("{table}");
+        assert!(table.row("m = 1024").ours().iter().all(|&error| error < 1e-7));
+        assert_errors_fall(&table);
+    }
+
+    /// 7 times the paper's entry: its cloud is one of those that differ by a decade.
+    #[test]
+    fn with_1024_points_laplace_curvatures_are_right_to_6e_5() {
+        let table = table_laplace();
+        println!("{table}");
+        assert!(table.row("m = 1024").ours().iter().all(|&error| error < 6e-5));
+        assert_errors_fall(&table);
+    }
+
+    /// Convergence: twice the points at least halve the median error.
+    fn assert_errors_fall(table: &Table) {
+        for pair in table.rows.windows(2) {
+            let falls =
+                pair[0].ours().iter().zip(&pair[1].ours()).all(|(before, after)| *after < 0.5 * before);
+            assert!(falls, "{} to {}", pair[0].label, pair[1].label);
+        }
     }
 }
