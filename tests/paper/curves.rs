@@ -27,6 +27,7 @@ pub fn ellipse(t: f64) -> Station {
     Station::new([t.cos(), 0.5 * t.sin()], [0.5 * t.cos(), t.sin()])
 }
 
+/// Their points alone.
 pub fn points(stations: &[Station]) -> Cloud {
     cloud(&stations.iter().map(|station| station.point).collect::<Vec<_>>())
 }

@@ -15,15 +15,18 @@ pub fn relative_l2(found: &[f64], exact: &[f64]) -> f64 {
     norm(&difference(found, exact)) / norm(exact)
 }
 
+/// `a − b`.
 pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
+/// `|a|₂`.
 pub fn norm(a: &[f64]) -> f64 {
     a.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// The average.
 pub fn mean(a: &[f64]) -> f64 {
     a.iter().sum::<f64>() / a.len() as f64
 }

@@ -58,9 +58,11 @@ fn moved(station: Station, noise: f64, random: &mut Random) -> [f64; 2] {
     [station.point[0] + distance * direction.cos(), station.point[1] + distance * direction.sin()]
 }
 
-/// The points lie 0.05 from the ellipse on average: no better curve than one through them would pass.
+/// The points are moved by 0.05 on average, 0.032 of it along the normal, with a spacing of 0.15: a curve through them is off by
+/// 0.032 and its normals by tens of degrees. What is left at α = 0.1 is mostly the pull of the regularization, of which the
+/// Laplace kernel has more; the worst of 2,000 seeds has 0.046 and 7.9°.
 #[test]
-fn the_level_line_is_closer_to_the_ellipse_than_the_points_for_every_seed() {
+fn the_level_line_recovers_the_ellipse_and_its_normals_for_every_seed() {
     let table = table();
     println!("{table}");
     for row in &table.rows[..2] {

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 pub struct Random(u64);
 
 impl Random {
+    /// Far apart for neighbouring seeds.
     pub fn of_seed(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xd134_2543_de82_ef95))
     }

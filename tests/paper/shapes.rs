@@ -17,6 +17,7 @@ pub fn sphere(m: usize) -> Vec<[f64; 3]> {
 /// Radii of the ring torus.
 pub const TORUS: [f64; 2] = [2.0, 0.5];
 
+/// The point of the torus at two angles, v = 0 on the outside.
 pub fn torus_point(u: f64, v: f64) -> [f64; 3] {
     let [r1, r2] = TORUS;
     let r = r1 + r2 * v.cos();

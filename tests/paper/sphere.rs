@@ -52,6 +52,7 @@ fn errors_at(surface: &Surface, queries: &Cloud) -> [f64; 3] {
     ]
 }
 
+/// A function at every point.
 pub fn at(points: &Cloud, f: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     points.points().map(f).collect()
 }

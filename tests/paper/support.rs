@@ -17,6 +17,7 @@ use gramian::numerics::solver::GramFactor;
 
 /// The regularised Laplace kernel of the paper's tables.
 pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
+/// exp(−|x|²).
 pub const GAUSS: Family = Family::Gauss;
 
 /// The paper's kernels: length scale 1, variance 1.
@@ -24,6 +25,7 @@ pub fn kernel(family: Family) -> Kernel {
     Kernel::new(family, 1.0, 1.0).unwrap()
 }
 
+/// Points as a cloud.
 pub fn cloud<const D: usize>(points: &[[f64; D]]) -> Cloud {
     Cloud::new(points.concat(), D).unwrap()
 }
@@ -35,12 +37,14 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Fits the constant 1, ℓ = 1.
     pub fn of(cloud: &Cloud, family: Family, alpha: f64) -> Self {
         let factor = factorize(cloud, kernel(family), alpha);
         let signature = Interpolant::signature(factor, &Unobserved).unwrap();
         Self { signature, neighbours: Neighbours::of(cloud) }
     }
 
+    /// The points.
     pub fn cloud(&self) -> &Cloud {
         self.signature.factor.cloud()
     }
