@@ -20,6 +20,9 @@ fn main() {
         paper::noisy_ellipse::table,
         paper::posterior_coverage::table,
     ];
+    println!(
+        "\"figure\": the paper shows a picture without numbers; \"-\": it has nothing; \"null\": no answer, and said so\n"
+    );
     for table in tables {
         println!("{}", table());
     }
