@@ -1,8 +1,8 @@
 //! Convergence orders on the unit sphere, Matérn 3/2 and 5/2, ℓ = 1, α = 0.
 //!
-//! The order is that in the spacing h ~ m^{−1/2}: each doubling of m divides the error by 2^{order/2}. Relative L² errors at 4,000
-//! random points, the same for every m (Fibonacci points would be as close to the cloud as m is to their number). The paper's theorem bounds orders from below; smooth data
-//! converge about twice as fast (errata.md, 11).
+//! The order is that in the spacing h ~ m^{−1/2}: each doubling of m divides the error by 2^{order/2}. Relative L² errors at
+//! 4,000 random points, the same for every m (Fibonacci points come close to the cloud where m is close to their number).
+//! The paper's theorem bounds orders from below; smooth data converge about twice as fast (errata.md, 11).
 
 use super::errors::relative_l2;
 use super::random::Random;
