@@ -46,6 +46,9 @@ const ROUNDING_FACTOR: f64 = 64.0;
 /// T2: fraction of `h_q ‖D²u‖_F` under which the direction of ∇u turns within the sampling distance.
 const SCALE_FACTOR: f64 = 0.05;
 
+/// The same fraction below which a gradient is weak: the error that the sampling leaves in it shows in the curvatures.
+const WEAK_FACTOR: f64 = 0.25;
+
 /// Spacings from the nearest point beyond which a query is far from the cloud.
 const FAR_SPACINGS: f64 = 3.0;
 
@@ -60,6 +63,11 @@ pub(crate) fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) ->
 /// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`.
 pub(crate) fn turns_within_spacing(jets: &Jets, query: usize, spacing: f64) -> bool {
     norm(jets.gradient(query)) < SCALE_FACTOR * spacing * norm(&jets.hessian(query))
+}
+
+/// Whether curvatures had better come from the offset model, if it has an answer: `|∇u| < 0.25 h_q ‖D²u‖_F`.
+pub(crate) fn is_weak(jets: &Jets, query: usize, spacing: f64) -> bool {
+    norm(jets.gradient(query)) < WEAK_FACTOR * spacing * norm(&jets.hessian(query))
 }
 
 /// Whether the nearest point is too far away for a query to lie on the surface.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::degeneracy::{DegeneracyReason, is_far};
+use super::degeneracy::{DegeneracyReason, is_far, is_weak};
 use super::error::NumericsError;
 use super::geometry::{Answer, GeometryRequest, Orientation, SurfaceModel};
 use super::jets::{JetOrder, Jets};
@@ -78,7 +78,10 @@ impl<'a> Examination<'a> {
             Ok(match self.request.model {
                 SurfaceModel::Signature => false,
                 SurfaceModel::Offset => true,
-                SurfaceModel::Auto => self.vanishes(query, &self.site(query)),
+                SurfaceModel::Auto => {
+                    let site = self.site(query);
+                    self.vanishes(query, &site) || self.is_weak(query, &site)
+                }
             })
         };
         let needs_offset: Vec<bool> =
@@ -119,6 +122,14 @@ impl<'a> Examination<'a> {
         self.surface.vanishes(&self.jets, query, site.spacing, fit)
     }
 
+    /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which
+    /// the offset model interpolates.
+    fn is_weak(&self, query: usize, site: &Site<'_>) -> bool {
+        self.request.checks_curvatures
+            && site.fit.as_ref().is_some_and(|fit| fit.is_smooth())
+            && is_weak(&self.jets, query, site.spacing)
+    }
+
     fn of_signature(&self, query: usize, site: &Site<'_>) -> Answer {
         if self.request.model == SurfaceModel::Signature && self.vanishes(query, site) {
             return self.null(query, DegeneracyReason::VanishingGradient);
@@ -131,10 +142,13 @@ impl<'a> Examination<'a> {
         Answer { gradient, hessian: self.jets.hessian(query), sign, is_offset: false, reason: None }
     }
 
-    /// The offset model, whose gradient points outward.
+    /// The offset model, whose gradient points outward; where it has no answer, what else there is.
     fn of_offset(&self, query: usize, site: &Site<'_>) -> Answer {
         let Some(jet) = rescue(self.surface, site.x) else {
-            return self.null(query, DegeneracyReason::VanishingGradient);
+            return match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
+                true => self.of_signature(query, site),
+                false => self.null(query, DegeneracyReason::VanishingGradient),
+            };
         };
         let sign = match self.request.orientation {
             Orientation::Gradient => -1.0,

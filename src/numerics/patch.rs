@@ -178,6 +178,9 @@ pub(crate) struct LocalFit {
 const RELIABLE_RESIDUAL: f64 = 0.05;
 const RELIABLE_BEND: f64 = 1.5;
 
+/// Residual against the radius below which there is no noise to speak of.
+const SMOOTH_RESIDUAL: f64 = 0.01;
+
 impl LocalFit {
     /// Whether the neighbours look like a piece of one smooth surface.
     pub(crate) fn is_reliable(&self) -> bool {
@@ -190,6 +193,11 @@ impl LocalFit {
             true => self.curvatures.iter().rev().map(|k| -k).collect(),
             false => self.curvatures.clone(),
         }
+    }
+
+    /// Whether the quadric leaves so little that the points are free of noise.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.residual < SMOOTH_RESIDUAL * self.radius && self.bend() < RELIABLE_BEND
     }
 
     /// Largest curvature times radius: about the angle by which the normal turns among the neighbours.

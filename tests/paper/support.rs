@@ -3,17 +3,17 @@
 use std::sync::Arc;
 
 pub use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::Geometry;
-pub use gramian::numerics::geometry::Orientation;
+use gramian::numerics::geometry::{Geometry, GeometryRequest};
+pub use gramian::numerics::geometry::{Orientation, SurfaceModel};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::jets::{JetOrder, Jets};
 pub use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::operators;
 use gramian::numerics::posterior;
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface;
 
 /// The regularised Laplace kernel of the paper's tables.
 pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
@@ -33,15 +33,22 @@ pub fn cloud<const D: usize>(points: &[[f64; D]]) -> Cloud {
 /// A cloud with its signature function u_X.
 pub struct Surface {
     signature: Interpolant,
-    neighbours: Neighbours,
+    surface: surface::Surface,
+    model: SurfaceModel,
 }
 
 impl Surface {
-    /// Fits the constant 1, ℓ = 1.
+    /// Fits the constant 1, ℓ = 1; the answers are those of the signature function alone, as the paper's.
     pub fn of(cloud: &Cloud, family: Family, alpha: f64) -> Self {
+        Self::with_model(cloud, family, alpha, SurfaceModel::Signature)
+    }
+
+    /// The same, answered by another model.
+    pub fn with_model(cloud: &Cloud, family: Family, alpha: f64, model: SurfaceModel) -> Self {
         let factor = factorize(cloud, kernel(family), alpha);
         let signature = Interpolant::signature(factor, &Unobserved).unwrap();
-        Self { signature, neighbours: Neighbours::of(cloud) }
+        let surface = surface::Surface::of(signature.clone(), None, &Unobserved).unwrap();
+        Self { signature, surface, model }
     }
 
     /// The points.
@@ -69,8 +76,7 @@ impl Surface {
     /// Outward normals; `None` where the gradient vanishes.
     pub fn normals(&self, queries: &Cloud) -> Vec<Option<Vec<f64>>> {
         let geometry = self.geometry(queries, Orientation::Outward);
-        let normal =
-            |query: usize| (!geometry.is_degenerate()[query]).then(|| geometry.normal(query).to_vec());
+        let normal = |query: usize| (!geometry.is_null()[query]).then(|| geometry.normal(query).to_vec());
         (0..geometry.n_queries()).map(normal).collect()
     }
 
@@ -78,7 +84,7 @@ impl Surface {
     pub fn curvatures(&self, queries: &Cloud, orientation: Orientation) -> Vec<Option<Vec<f64>>> {
         let geometry = self.geometry(queries, orientation);
         let principal = geometry.curvatures(&Unobserved).unwrap().principal;
-        let flags = geometry.is_degenerate().iter();
+        let flags = geometry.is_null().iter();
         flags
             .zip(principal.chunks(geometry.dimension() - 1))
             .map(|(&flag, k)| (!flag).then(|| k.to_vec()))
@@ -96,7 +102,13 @@ impl Surface {
     }
 
     fn geometry(&self, queries: &Cloud, orientation: Orientation) -> Geometry {
-        Geometry::of(&self.signature, &self.neighbours, queries, orientation, &Unobserved).unwrap()
+        let request = GeometryRequest {
+            orientation,
+            model: self.model,
+            checks_curvatures: self.model == SurfaceModel::Auto,
+            max_offsets: usize::MAX,
+        };
+        Geometry::of(&self.surface, queries, &request, &Unobserved).unwrap()
     }
 }
 
