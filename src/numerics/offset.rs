@@ -27,8 +27,9 @@ const LENGTH_SCALE: f64 = 3.0;
 /// δ against the mean spacing of the patch.
 const OFFSET_SPACINGS: f64 = 0.5;
 
-/// α against k₀: the layers are ill-conditioned by design.
-const ALPHA: f64 = 1e-12;
+/// α against k₀: the layers are ill-conditioned by design. The second is for patches that bend so much that float64 has no
+/// interpolant for the first.
+const ALPHAS: [f64; 2] = [1e-12, 1e-9];
 
 /// Points of a patch.
 pub(crate) fn n_patch_points(dimension: usize) -> usize {
@@ -65,8 +66,12 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
     }
     let kernel = Kernel::new(Family::Gauss, LENGTH_SCALE, 1.0)?;
     let nodes = Arc::new(Cloud::new(nodes, d)?);
-    let factor = GramFactor::factorize(nodes, kernel, Regularization::Uniform(ALPHA), &Unobserved)?;
-    let model = Interpolant::fit(Arc::new(factor), &data, &Unobserved)?;
+    let fit = |alpha| {
+        let alpha = Regularization::Uniform(alpha);
+        let factor = GramFactor::factorize(nodes.clone(), kernel, alpha, &Unobserved)?;
+        Interpolant::fit(Arc::new(factor), &data, &Unobserved)
+    };
+    let model = fit(ALPHAS[0]).or_else(|_| fit(ALPHAS[1]))?;
     let origin = Cloud::new(vec![0.0; d], d)?;
     let jets = model.at(&origin, JetOrder::Hessian, &Unobserved)?;
     Ok(OffsetJet {

@@ -1,7 +1,7 @@
 //! The offset model at a query of a surface: which points it is fitted to, and whether its answer can be believed.
 
 use super::offset::{OffsetJet, n_patch_points, offset_jet};
-use super::patch::{Patch, n_quadric_neighbours};
+use super::patch::{Patch, n_coefficients};
 use super::surface::Surface;
 use super::vector::{dot, norm};
 
@@ -10,6 +10,9 @@ const REACH_SPACINGS: f64 = 2.0;
 
 /// Cosine to the normal of the nearest point above which a point belongs to the same side of the same sheet.
 const SAME_SHEET: f64 = 0.4;
+
+/// Points per coefficient of a quadric that a patch needs at least.
+const MIN_PER_COEFFICIENT: usize = 2;
 
 /// A signed distance has |∇F| = 1; so far from it the patch was not fitted.
 const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
@@ -30,7 +33,7 @@ pub(crate) fn rescue(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
     points.extend(
         nearest.iter().map(|found| found.point).filter(|&p| dot(surface.normal(p), normal) > SAME_SHEET),
     );
-    if points.len() < n_quadric_neighbours(d) {
+    if points.len() < MIN_PER_COEFFICIENT * n_coefficients(d) {
         return None;
     }
     let patch = Patch::of(cloud, x, points)?;

@@ -146,7 +146,10 @@ impl Surface {
                 }
             }
         }
-        let is_at_rim = self.fits.iter().map(|fit| fit.as_ref().is_some_and(|fit| fit.is_at_rim)).collect();
+        // The tip of a hairpin looks like the end of a curve; no quadric fits there.
+        let is_at_rim =
+            |fit: &Option<LocalFit>| fit.as_ref().is_some_and(|fit| fit.is_at_rim && fit.is_reliable());
+        let is_at_rim = self.fits.iter().map(is_at_rim).collect();
         Ok(Directions { normals, has_sign, is_at_rim, spacings: self.spacings.clone() })
     }
 

@@ -1,5 +1,8 @@
 //! Where geometry is doubtful: right, or flagged.
 
+mod clouds;
+mod orientation;
 mod shapes;
+mod support;
 mod sweep;
 mod sweeps;

@@ -1,0 +1,117 @@
+//! Clouds on which the signature function is known to struggle.
+
+use std::f64::consts::PI;
+
+use super::shapes::Random;
+
+/// A cloud with its outward unit normals.
+pub struct Oriented {
+    pub points: Vec<f64>,
+    pub normals: Vec<Vec<f64>>,
+    pub dimension: usize,
+}
+
+impl Oriented {
+    fn new<const D: usize>(pairs: impl Iterator<Item = ([f64; D], [f64; D])>) -> Self {
+        let (mut points, mut normals) = (Vec::new(), Vec::new());
+        for (x, normal) in pairs {
+            points.extend(x);
+            let length = normal.iter().map(|c| c * c).sum::<f64>().sqrt();
+            normals.push(normal.iter().map(|c| c / length).collect());
+        }
+        Self { points, normals, dimension: D }
+    }
+
+    pub fn n_points(&self) -> usize {
+        self.normals.len()
+    }
+}
+
+/// The paper's closed curve `(sin t, sin³t + ½ cos t)` at equidistant parameters; clockwise, so outward is left of the tangent.
+pub fn closed_curve(n: usize) -> Oriented {
+    Oriented::new((0..n).map(|i| {
+        let t = 2.0 * PI * i as f64 / n as f64;
+        let (s, c) = t.sin_cos();
+        let tangent = [c, 3.0 * s * s * c - 0.5 * s];
+        ([s, s.powi(3) + 0.5 * c], [-tangent[1], tangent[0]])
+    }))
+}
+
+/// Two balls joined by a neck: the surface of revolution of `r(z)² = 4(1 − z²)(z² + 0.1)` about z.
+pub fn dumbbell(n: usize) -> Oriented {
+    let square = |z: f64| 4.0 * (1.0 - z * z) * (z * z + 0.1);
+    let slope = |z: f64| 8.0 * z * (0.9 - 2.0 * z * z);
+    // Area per dz is 2π √(r² + (r r′)²): equal shares of it.
+    let cells = 20_000;
+    let middle = |i: usize| -1.0 + 2.0 * (i as f64 + 0.5) / cells as f64;
+    let area = |z: f64| (square(z) + 0.25 * slope(z).powi(2)).sqrt();
+    let total: f64 = (0..cells).map(|i| area(middle(i))).sum();
+    let (mut below, mut heights) = (0.0, Vec::with_capacity(n));
+    for i in 0..cells {
+        below += area(middle(i));
+        while heights.len() < n && below * n as f64 >= (heights.len() as f64 + 0.5) * total {
+            heights.push(middle(i));
+        }
+    }
+    Oriented::new(heights.into_iter().enumerate().map(|(i, z)| {
+        let angle = PI * (1.0 + 5f64.sqrt()) * i as f64;
+        let (s, c) = angle.sin_cos();
+        let r = square(z).sqrt();
+        ([r * c, r * s, z], [2.0 * r * c, 2.0 * r * s, -slope(z)])
+    }))
+}
+
+/// Points of a graph over [−1, 1]², on a grid of side², with upward normals.
+pub fn graph(side: usize, height: impl Fn(f64, f64) -> f64) -> Oriented {
+    let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
+    let step = 1e-5;
+    Oriented::new((0..side * side).map(|i| {
+        let (x, y) = (at(i % side), at(i / side));
+        let slope_x = (height(x + step, y) - height(x - step, y)) / (2.0 * step);
+        let slope_y = (height(x, y + step) - height(x, y - step)) / (2.0 * step);
+        ([x, y, height(x, y)], [-slope_x, -slope_y, 1.0])
+    }))
+}
+
+/// The side of a cylinder of radius ½ and height 3, open at both ends, on a staggered grid.
+pub fn cylinder(around: usize, along: usize) -> Oriented {
+    Oriented::new((0..around * along).map(|i| {
+        let row = i / around;
+        let turn = (i % around) as f64 + if row % 2 == 0 { 0.0 } else { 0.5 };
+        let (s, c) = (2.0 * PI * turn / around as f64).sin_cos();
+        ([0.5 * c, 0.5 * s, 3.0 * row as f64 / (along - 1) as f64], [c, s, 0.0])
+    }))
+}
+
+/// The upper half of the unit sphere, n points of a Fibonacci lattice.
+pub fn half_sphere(n: usize) -> Oriented {
+    Oriented::new((0..n).map(|i| {
+        let z = 1.0 - (i as f64 + 0.5) / n as f64;
+        let (s, c) = (PI * (1.0 + 5f64.sqrt()) * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        ([r * c, r * s, z], [r * c, r * s, z])
+    }))
+}
+
+/// A closed plate `[−1, 1]² × [0, thickness]` without its rim: two grids of side² points, normals away from one another.
+pub fn plate(side: usize, thickness: f64) -> Oriented {
+    let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
+    let layer = |z: f64, normal: f64| {
+        (0..side * side).map(move |i| ([at(i % side), at(i / side), z], [0.0, 0.0, normal]))
+    };
+    Oriented::new(layer(0.0, -1.0).chain(layer(thickness, 1.0)))
+}
+
+/// A flat square at a general position, and its unit normal.
+pub fn flat_square(side: usize, random: Option<&mut Random>) -> Oriented {
+    let (u, v) = ([0.36, 0.48, -0.8], [-0.8, 0.6, 0.0]);
+    let normal = [0.48, 0.64, 0.6];
+    let grid = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
+    let mut coordinates: Vec<[f64; 2]> = (0..side * side).map(|i| [grid(i % side), grid(i / side)]).collect();
+    if let Some(random) = random {
+        coordinates.fill_with(|| [2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0]);
+    }
+    Oriented::new(
+        coordinates.into_iter().map(|[a, b]| ([0, 1, 2].map(|c| a * u[c] + b * v[c] + 0.3), normal)),
+    )
+}

@@ -1,0 +1,46 @@
+//! The library's answers for a cloud.
+
+use std::sync::Arc;
+
+use gramian::numerics::cloud::Cloud;
+use gramian::numerics::geometry::{Geometry, GeometryRequest};
+use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::observer::Unobserved;
+use gramian::numerics::regularization::Regularization;
+use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface::Surface;
+
+use super::clouds::Oriented;
+
+pub fn surface(points: &[f64], dimension: usize, family: Family, length_scale: f64, alpha: f64) -> Surface {
+    let cloud = Arc::new(Cloud::new(points.to_vec(), dimension).unwrap());
+    let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
+    let alpha = Regularization::uniform(alpha).unwrap();
+    let factor = GramFactor::factorize(cloud, kernel, alpha, &Unobserved).unwrap();
+    let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
+    Surface::of(signature, None, &Unobserved).unwrap()
+}
+
+pub fn surface_of(cloud: &Oriented, family: Family, length_scale: f64) -> Surface {
+    surface(&cloud.points, cloud.dimension, family, length_scale, 1e-10)
+}
+
+/// The geometry at the points themselves.
+pub fn geometry(surface: &Surface, request: &GeometryRequest) -> Geometry {
+    Geometry::of(surface, surface.cloud(), request, &Unobserved).unwrap()
+}
+
+/// Cosines of the normals with the true ones, `None` where there is no answer.
+pub fn cosines(geometry: &Geometry, truth: &[Vec<f64>]) -> Vec<Option<f64>> {
+    let cosine = |(query, normal): (usize, &Vec<f64>)| {
+        let found = geometry.normal(query);
+        (!geometry.is_null()[query]).then(|| found.iter().zip(normal).map(|(a, b)| a * b).sum())
+    };
+    truth.iter().enumerate().map(cosine).collect()
+}
+
+/// How many answers point inward.
+pub fn n_wrong(cosines: &[Option<f64>]) -> usize {
+    cosines.iter().flatten().filter(|&&cosine| cosine <= 0.0).count()
+}
