@@ -78,24 +78,18 @@ impl Cholesky {
         sums.into_iter().fold(0.0, f64::max)
     }
 
-    /// `A = LLᵀ` in place. The inner error is the index of the first point whose pivot is not positive.
+    /// `A = LLᵀ` in place. The inner error is the index of the first point whose pivot is not above `floor`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn factorize(mut self, observer: &dyn Observer) -> Result<Result<Self, usize>, NumericsError> {
-        let requirement = llt::factor::cholesky_in_place_scratch::<f64>(
-            self.n.min(LEAF_SIZE),
-            parallelism(f64::INFINITY),
-            Default::default(),
-        );
-        let mut scratch = MemBuffer::new(requirement);
+    pub(super) fn factorize(
+        mut self,
+        floor: f64,
+        observer: &dyn Observer,
+    ) -> Result<Result<Self, usize>, NumericsError> {
         let a =
             MatMut::from_column_major_slice_with_stride_mut(&mut self.buffer, self.n, self.n, self.stride);
-        match recurse(a, 0, MemStack::new(&mut scratch), observer) {
-            Ok(()) => Ok(Ok(self)),
-            Err(Stop::NotPositive(point)) => Ok(Err(point)),
-            Err(Stop::Cancelled(error)) => Err(error),
-        }
+        Ok(factorize_in_place(a, floor, observer)?.map(|()| self))
     }
 
     /// `rhs ← (LLᵀ)⁻¹ rhs`.
@@ -117,6 +111,29 @@ impl Cholesky {
     }
 }
 
+/// Overwrites the lower triangle of A by that of L, `A = LLᵀ`. The inner error is the first index whose pivot `L_ii²` is not
+/// above `floor`.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`].
+pub(super) fn factorize_in_place(
+    a: MatMut<'_, f64>,
+    floor: f64,
+    observer: &dyn Observer,
+) -> Result<Result<(), usize>, NumericsError> {
+    let requirement = llt::factor::cholesky_in_place_scratch::<f64>(
+        a.nrows().min(LEAF_SIZE),
+        parallelism(f64::INFINITY),
+        Default::default(),
+    );
+    let mut scratch = MemBuffer::new(requirement);
+    match recurse(a, 0, floor, MemStack::new(&mut scratch), observer) {
+        Ok(()) => Ok(Ok(())),
+        Err(Stop::NotPositive(point)) => Ok(Err(point)),
+        Err(Stop::Cancelled(error)) => Err(error),
+    }
+}
+
 enum Stop {
     NotPositive(usize),
     Cancelled(NumericsError),
@@ -129,6 +146,7 @@ enum Stop {
 fn recurse(
     mut a: MatMut<'_, f64>,
     first: usize,
+    floor: f64,
     scratch: &mut MemStack,
     observer: &dyn Observer,
 ) -> Result<(), Stop> {
@@ -137,20 +155,23 @@ fn recurse(
     let flops = (n as f64).powi(3) / 3.0;
     if n <= LEAF_SIZE {
         let outcome = llt::factor::cholesky_in_place(
-            a,
+            a.rb_mut(),
             Default::default(),
             parallelism(flops),
             scratch,
             Default::default(),
         );
         return match outcome {
-            Ok(_) => Ok(()),
+            Ok(_) => match (0..n).find(|&i| a[(i, i)] * a[(i, i)] <= floor) {
+                None => Ok(()),
+                Some(index) => Err(Stop::NotPositive(first + index)),
+            },
             Err(llt::factor::LltError::NonPositivePivot { index }) => Err(Stop::NotPositive(first + index)),
         };
     }
     let half = (n / 2).next_multiple_of(64).min(n - 1);
     let (mut leading, _, mut below, mut trailing) = a.rb_mut().split_at_mut(half, half);
-    recurse(leading.rb_mut(), first, scratch, observer)?;
+    recurse(leading.rb_mut(), first, floor, scratch, observer)?;
     let par = parallelism(flops);
     solve_lower_triangular_in_place(leading.rb(), below.rb_mut().transpose_mut(), par);
     observer.checkpoint().map_err(Stop::Cancelled)?;
@@ -165,5 +186,5 @@ fn recurse(
         -1.0,
         par,
     );
-    recurse(trailing, first + half, scratch, observer)
+    recurse(trailing, first + half, floor, scratch, observer)
 }

@@ -3,6 +3,7 @@
 mod cholesky;
 mod condition;
 mod pivoted_cholesky;
+mod pivoting;
 mod solution;
 
 use std::sync::Arc;
@@ -50,19 +51,20 @@ enum Factorization {
 }
 
 impl GramFactor {
-    /// Bytes a Cholesky factorization of n points needs at its peak, checked; the fallback may need several times that.
+    /// Bytes that a factorization of n points needs at its peak, checked: one n×n buffer, for Cholesky and, when that has
+    /// failed and given it back, for the fallback. O(n) numbers per thread come on top.
     pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
         n_points.checked_mul(Cholesky::stride_for(n_points))?.checked_mul(size_of::<f64>())
     }
 
-    /// Flops of a dense factorization of n points.
+    /// Flops of a Cholesky factorization of n points; the fallback adds at most twice that.
     pub fn flops_needed(n_points: usize) -> f64 {
         (n_points as f64).powi(3) / 3.0
     }
 
     /// Assembles and factorizes `K(X, X) + αI` exactly as given: no jitter is ever added.
     ///
-    /// Cholesky in place; where that fails in float64, pivoted Cholesky to 64 ε k₀ and least squares on the pivots.
+    /// Cholesky in place; where a pivot is rounding, pivoted Cholesky to 64 ε k₀ and least squares on the pivots.
     ///
     /// # Errors
     /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension, [`NumericsError::LengthMismatch`] of noise
@@ -86,7 +88,7 @@ impl GramFactor {
         fill_lower_gram(&cloud, &kernel, &regularization, gram.buffer_mut(), stride, observer)?;
         let norm1 = gram.norm1();
         observer.enter(Stage::Factor);
-        let factorization = match gram.factorize(observer)? {
+        let factorization = match gram.factorize(SMALLEST_PIVOT * kernel.at_zero(), observer)? {
             Ok(factor) => Factorization::Cholesky(factor),
             Err(failed_at) => {
                 let factor = PivotedCholesky::factorize(&cloud, &kernel, &regularization, observer)?;
@@ -228,6 +230,11 @@ impl GramFactor {
         }
     }
 }
+
+/// A pivot of Cholesky up to this multiple of k₀ is rounding: it came out positive by luck, and the weights behind it are
+/// noise that the residual hardly shows. Below `minimum_alpha`, which is at least 16 ε k₀ and enters a pivot twice where two
+/// points coincide.
+const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
 /// Flops below which waking other threads costs more than it gains.
 const SEQUENTIAL_FLOPS: f64 = 1e6;
