@@ -1,0 +1,13 @@
+//! Ill-conditioned problems: the answer is right, flagged or refused, never finite and wrong in silence.
+//!
+//! Through the public API of the numerics alone. Clouds and random numbers are seeded; every tolerance says where it comes
+//! from.
+
+mod cliff;
+mod hard;
+mod noise;
+mod placement;
+mod small;
+mod smooth;
+mod support;
+mod twins;

@@ -1,0 +1,48 @@
+//! Noise variances that differ from point to point, zeros among them.
+
+use std::sync::Arc;
+
+use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::kernel::Family;
+use gramian::numerics::observer::Unobserved;
+use gramian::numerics::regularization::Regularization;
+use gramian::numerics::solver::{GramFactor, Method};
+
+use crate::support::*;
+
+/// Every third point has noise; the others are known exactly, and more of them than the kernel can tell apart.
+fn mixed(variance: f64) -> Interpolant {
+    let points = cloud(&sphere(512));
+    let variances = (0..512).map(|i| if i % 3 == 0 { variance } else { 0.0 }).collect();
+    let noise = Regularization::per_point(variances).unwrap();
+    let factor =
+        GramFactor::factorize(Arc::new(points.clone()), kernel(Family::Gauss, 1.0), noise, &Unobserved);
+    let factor = Arc::new(factor.unwrap());
+    assert_eq!(factor.method(), Method::PivotedCholesky);
+    // Only the noisy points are off the wave, by less than their standard deviation.
+    let error = |i: usize| if i % 3 == 0 { variance.sqrt() * (1.7 * i as f64).sin() } else { 0.0 };
+    let values: Vec<f64> = points.points().enumerate().map(|(i, x)| wave(x) + error(i)).collect();
+    Interpolant::fit(factor, &values, &Unobserved).unwrap()
+}
+
+#[test]
+fn exact_points_are_met_and_noisy_ones_smoothed() {
+    // On the sphere: beside it even exact values determine u only as far as its norm does.
+    let mut random = Random(3);
+    let queries: Vec<[f64; 3]> = (0..40).map(|_| random.on_sphere()).collect();
+    let expected: Vec<f64> = queries.iter().map(|x| wave(x)).collect();
+    for variance in [1e-10, 1e-4, 1.0, 1e6] {
+        let u = mixed(variance);
+        // 341 exact points determine the wave to 1e-7 of its size, as they would alone; noise has no say beside them.
+        let error = relative_distance(&jets(&u, &cloud(&queries))[0], &expected);
+        println!("variance {variance:e}: error {error:.1e}, residual {:.1e}", u.solution.relative_residual);
+        assert!(error < 1e-6, "variance {variance:e}: {error:e}");
+        assert!(u.solution.relative_residual < 1e-9);
+        // D Λ is the misfit: the noisy points are missed by just what the fit says.
+        let misfit = jets(&u, u.factor.cloud())[0].clone();
+        let exact: Vec<f64> = (0..512).filter(|i| i % 3 != 0).map(|i| misfit[i]).collect();
+        let wanted: Vec<f64> =
+            (0..512).filter(|i| i % 3 != 0).map(|i| wave(u.factor.cloud().point(i))).collect();
+        assert!(relative_distance(&exact, &wanted) < 1e-6);
+    }
+}
