@@ -7,6 +7,7 @@ mod cliff;
 mod hard;
 mod noise;
 mod placement;
+mod remedy;
 mod small;
 mod smooth;
 mod support;

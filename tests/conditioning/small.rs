@@ -71,63 +71,60 @@ fn as_many_points_as_dimensions_are_met() {
     }
 }
 
-/// 40 points of a curve or surface patch without thickness, and the queries: the points and as many beside them.
-fn flat(point: impl Fn(&mut Random) -> [f64; 3], off: [f64; 3]) -> (Cloud, Cloud) {
+/// 40 points without thickness, in the unit square or on a segment of it; as queries the points, then points beside them.
+fn flat(point: impl Fn(f64, f64) -> [f64; 3], off: [f64; 3]) -> (Cloud, Cloud) {
     let mut random = Random(11);
-    let points: Vec<[f64; 3]> = (0..40).map(|_| point(&mut random)).collect();
+    let points: Vec<[f64; 3]> = (0..40).map(|_| point(random.uniform(), random.uniform())).collect();
     let beside = points.iter().map(|x| std::array::from_fn(|c| x[c] + off[c]));
     let queries: Vec<[f64; 3]> = points.iter().copied().chain(beside).collect();
     (cloud(&points), cloud(&queries))
 }
 
-/// Fits waves and the constant at three α, on a line or plane.
-fn check_flat(points: &Cloud, queries: &Cloud, what: &str, check: impl Fn(&Geometry, &str)) {
+/// Fits waves and the constant at several α; `off` is the unit vector from the points to the queries beside them.
+fn check_flat(points: &Cloud, queries: &Cloud, off: [f64; 3]) {
     let values = waves(points);
     for family in smooth_families() {
         let length_scale = if matches!(family, Family::Wendland { .. }) { 2.0 } else { 0.6 };
         for alpha in [0.0, 1e-10, 1e-4] {
-            let what = format!("{family:?} on {what}, α = {alpha}");
+            let what = format!("{family:?}, α = {alpha}");
             let factor = factorize(points, kernel(family, length_scale), alpha);
             let u = fit(&factor, &values);
-            // What Cholesky or the fallback leave, or what α does: λ_min of these clouds is far below 1e-4.
+            // α moves u at the points by α|Λ|; what Cholesky and the fallback leave is far less than 1e-6.
+            let weights = u.solution.weights.iter().map(|w| w * w).sum::<f64>().sqrt();
             let error = distance(&jets(&u, points)[0], &values);
-            assert!(error < if alpha == 1e-4 { 0.1 } else { 1e-6 }, "{what}: {error:e}");
-            let (_, geometry) = geometry(&factor, queries);
-            assert_finite(&geometry, &what);
-            println!(
-                "{what}: rank {}, {} of {} degenerate",
-                factor.rank(),
-                geometry.degenerate().len(),
-                queries.n_points()
+            assert!(error < 1e-6 + alpha * weights, "{what}: {error:e}");
+            check_flat_geometry(
+                &geometry(&factor, queries).1,
+                off,
+                family == Family::Gauss && alpha < 1e-4,
+                &what,
             );
-            check(&geometry, &what);
         }
     }
 }
 
-#[test]
-fn a_cloud_on_a_plane_is_met_and_its_normals_are_right_or_flagged() {
-    // u is even across the plane: its gradient there lies in the plane, and no normal is right.
-    let (points, queries) = flat(|r| [r.uniform(), r.uniform(), 0.25], [0.0, 0.0, 0.05]);
-    check_flat(&points, &queries, "a plane", |geometry, what| {
-        let wrong = (0..40)
-            .filter(|&query| !geometry.is_degenerate()[query] && geometry.normal(query)[2].abs() < 0.5)
-            .count();
-        println!("{what}: {wrong} wrong");
-    });
+/// u is even across the points: its gradient there lies in the line or plane, is small, and no normal is right. All of them
+/// are flagged where u is smooth enough (T2 lets others pass, of rough kernels up to 28 in 40). Beside the points level
+/// surfaces wrap the cloud, and normals point away from it, turned by less than 66° at its ends.
+fn check_flat_geometry(geometry: &Geometry, off: [f64; 3], is_smooth: bool, what: &str) {
+    assert_finite(geometry, what);
+    let (on, beside) = geometry.is_degenerate().split_at(geometry.n_queries() / 2);
+    assert!(!is_smooth || on.iter().all(|&flagged| flagged), "{what}");
+    for query in (0..beside.len()).filter(|&query| !beside[query]) {
+        let normal = geometry.normal(on.len() + query);
+        let away: f64 = normal.iter().zip(off).map(|(a, b)| a * b).sum();
+        assert!(away > 0.4, "{what}: query {query} beside the cloud, {away}");
+    }
 }
 
 #[test]
-fn a_cloud_on_a_line_is_met_and_its_normals_are_flagged() {
-    let (points, queries) = flat(
-        |r| {
-            let t = r.uniform();
-            [t, 0.5 * t, 0.1 - t]
-        },
-        [0.05, -0.1, 0.0],
-    );
-    check_flat(&points, &queries, "a line", |geometry, what| {
-        let unflagged = (0..40).filter(|&query| !geometry.is_degenerate()[query]).count();
-        println!("{what}: {unflagged} not flagged");
-    });
+fn a_cloud_on_a_plane_is_met() {
+    let (points, queries) = flat(|s, t| [s, t, 0.25], [0.0, 0.0, 0.05]);
+    check_flat(&points, &queries, [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn a_cloud_on_a_line_is_met() {
+    let (points, queries) = flat(|s, _| [s, 0.5 * s, 0.1 - s], [0.05 / 5f64.sqrt(), -0.1 / 5f64.sqrt(), 0.0]);
+    check_flat(&points, &queries, [1.0 / 5f64.sqrt(), -2.0 / 5f64.sqrt(), 0.0]);
 }

@@ -57,9 +57,10 @@ impl GramFactor {
         n_points.checked_mul(Cholesky::stride_for(n_points))?.checked_mul(size_of::<f64>())
     }
 
-    /// Flops of a Cholesky factorization of n points; the fallback adds at most twice that.
+    /// Flops that a factorization of n points takes at most: n³/3 for Cholesky, and where that fails up to 0.54 n³ for the
+    /// fallback (at rank 2n/3).
     pub fn flops_needed(n_points: usize) -> f64 {
-        (n_points as f64).powi(3) / 3.0
+        (n_points as f64).powi(3)
     }
 
     /// Assembles and factorizes `K(X, X) + αI` exactly as given: no jitter is ever added.

@@ -54,7 +54,7 @@ impl PivotedCholesky {
             Ok((buffer, pivots))
         };
         // Smooth kernels have small ranks, and a buffer for them is small enough to be cut to size by copying. A rough kernel
-        // begins again, after 3 n³/64 of its n³/3 flops.
+        // begins again, after 5 n³/96 of its n³/3 flops.
         let (mut buffer, mut pivots) = attempt(n / 4)?;
         if pivots.is_complete {
             buffer.truncate(n_numbers(n, pivots.rank));

@@ -48,9 +48,11 @@ fn the_fallback_serves_what_cholesky_cannot() {
 
 #[test]
 fn the_transposed_solve_is_the_transpose() {
-    for length_scale in [0.3, 3.0] {
+    // Cholesky; the fallback with more and with fewer pivots than other points.
+    for (length_scale, ranks) in [(0.3, 90..91), (5.0, 46..90), (20.0, 1..45)] {
         let cloud = fibonacci_sphere(90);
         let factor = factor(&cloud, Family::Gauss, length_scale, 0.0);
+        assert!(ranks.contains(&factor.rank()), "ℓ = {length_scale}: {}", factor.rank());
         let vector = |s: f64| (0..90).map(|i| (s * i as f64).sin()).collect::<Vec<f64>>();
         let (y, g) = (vector(0.9), vector(0.4));
         let (mut wy, mut wtg) = (y.clone(), g.clone());
@@ -109,6 +111,58 @@ fn a_cancelled_factorization_stops() {
     let cloud = Arc::new(fibonacci_sphere(50));
     let outcome = GramFactor::factorize(cloud, kernel, Regularization::Uniform(1.0), &Cancelled);
     assert!(matches!(outcome, Err(NumericsError::Cancelled)));
+}
+
+/// Stops at the checkpoint of this number; counts them.
+struct StopAt {
+    checkpoint: usize,
+    n_checkpoints: std::sync::atomic::AtomicUsize,
+}
+
+impl Observer for StopAt {
+    fn enter(&self, _stage: Stage) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.n_checkpoints.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= self.checkpoint
+    }
+}
+
+#[test]
+fn the_fallback_stops_at_every_checkpoint() {
+    let cloud = Arc::new(fibonacci_sphere(700));
+    let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
+    let outcome = |checkpoint: usize| {
+        let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
+        let factor = GramFactor::factorize(cloud.clone(), kernel, Regularization::Uniform(0.0), &observer);
+        (factor.map(|f| f.method()), observer.n_checkpoints.into_inner())
+    };
+    let (method, n_checkpoints) = outcome(usize::MAX);
+    assert_eq!(method, Ok(Method::PivotedCholesky));
+    // The Gram matrix and Cholesky look less than 60 times; a pivot block three times.
+    assert!(n_checkpoints > 100, "{n_checkpoints}");
+    for checkpoint in (0..n_checkpoints).step_by(7) {
+        assert_eq!(outcome(checkpoint).0, Err(NumericsError::Cancelled), "checkpoint {checkpoint}");
+    }
+}
+
+#[test]
+fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
+    // L₁₁L₁₁ᵀ is (K + D)(Z, Z): solving for a column of it gives a unit vector, noise variances included.
+    let cloud = fibonacci_sphere(200);
+    let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
+    let noise: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { 0.5 } else { 0.0 }).collect();
+    let regularization = Regularization::per_point(noise.clone()).unwrap();
+    let factor = GramFactor::factorize(Arc::new(cloud.clone()), kernel, regularization, &Unobserved).unwrap();
+    let weights: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { (i as f64).cos() } else { 0.0 }).collect();
+    let values: Vec<f64> = (0..200)
+        .map(|i| {
+            let k =
+                |j: usize| (-crate::numerics::cloud::squared_distance(cloud.point(i), cloud.point(j))).exp();
+            (0..200).map(|j| k(j) * weights[j]).sum::<f64>() + noise[i] * weights[i]
+        })
+        .collect();
+    let solution = Solution::of(&factor, &values, &Unobserved).unwrap();
+    assert!(solution.relative_residual < 1e-14, "{}", solution.relative_residual);
 }
 
 #[test]
