@@ -1,4 +1,4 @@
-//! tests/reference/hard.json (60-digit arithmetic, conditions 1e9 to 1e16): every array, to ten times what plain float64
+//! tests/reference/hard.json (60-digit arithmetic, ill-conditioned fits): every array, to ten times what plain float64
 //! reached in its README.
 
 use std::sync::Arc;

@@ -13,14 +13,14 @@ use crate::support::*;
 /// Every third point has noise; the others are known exactly, and more of them than the kernel can tell apart.
 fn mixed(variance: f64) -> Interpolant {
     let points = cloud(&sphere(512));
-    let variances = (0..512).map(|i| if i % 3 == 0 { variance } else { 0.0 }).collect();
+    let variances = (0..512).map(|i: usize| if i.is_multiple_of(3) { variance } else { 0.0 }).collect();
     let noise = Regularization::per_point(variances).unwrap();
     let factor =
         GramFactor::factorize(Arc::new(points.clone()), kernel(Family::Gauss, 1.0), noise, &Unobserved);
     let factor = Arc::new(factor.unwrap());
     assert_eq!(factor.method(), Method::PivotedCholesky);
     // Only the noisy points are off the wave, by less than their standard deviation.
-    let error = |i: usize| if i % 3 == 0 { variance.sqrt() * (1.7 * i as f64).sin() } else { 0.0 };
+    let error = |i: usize| if i.is_multiple_of(3) { variance.sqrt() * (1.7 * i as f64).sin() } else { 0.0 };
     let values: Vec<f64> = points.points().enumerate().map(|(i, x)| wave(x) + error(i)).collect();
     Interpolant::fit(factor, &values, &Unobserved).unwrap()
 }
@@ -40,9 +40,11 @@ fn exact_points_are_met_and_noisy_ones_smoothed() {
         assert!(u.solution.relative_residual < 1e-9);
         // D Λ is the misfit: the noisy points are missed by just what the fit says.
         let misfit = jets(&u, u.factor.cloud())[0].clone();
-        let exact: Vec<f64> = (0..512).filter(|i| i % 3 != 0).map(|i| misfit[i]).collect();
-        let wanted: Vec<f64> =
-            (0..512).filter(|i| i % 3 != 0).map(|i| wave(u.factor.cloud().point(i))).collect();
+        let exact: Vec<f64> = (0..512).filter(|i: &usize| !i.is_multiple_of(3)).map(|i| misfit[i]).collect();
+        let wanted: Vec<f64> = (0..512)
+            .filter(|i: &usize| !i.is_multiple_of(3))
+            .map(|i| wave(u.factor.cloud().point(i)))
+            .collect();
         assert!(relative_distance(&exact, &wanted) < 1e-6);
     }
 }

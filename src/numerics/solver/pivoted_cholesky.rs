@@ -37,7 +37,7 @@ pub(super) struct PivotedCholesky {
 }
 
 impl PivotedCholesky {
-    /// Factorizes; never holds more than n² numbers and O(n) per thread beside them.
+    /// Factorizes within n² numbers, and O(n) per thread beside them.
     ///
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] beyond the range of float64, [`NumericsError::Cancelled`].

@@ -85,14 +85,16 @@ impl<'a> Pivoting<'a> {
             let mut block = self.schur_complement(n_candidates, observer)?;
             for k in 0..n_candidates {
                 // The same number with the rounding of one sum instead of many: no candidate comes back for ever.
-                self.remaining[self.rank + k] = block[k * (n_candidates + 1)];
+                self.remaining[self.rank + k] = block.diagonal(k);
             }
-            let (swaps, n_accepted) = pivot_block(&mut block, n_candidates, floor);
-            if self.rank + n_accepted > max_rank {
+            let swaps = block.factorize(floor);
+            if self.rank + swaps.len() > max_rank {
                 break false;
             }
             self.swap_rows(&swaps);
-            self.append(&block, n_candidates, n_accepted, observer)?;
+            if !swaps.is_empty() {
+                self.append(&block, swaps.len(), observer)?;
+            }
         };
         Ok(Pivots { order: self.order, rank: self.rank, is_complete })
     }
@@ -109,8 +111,9 @@ impl<'a> Pivoting<'a> {
         }
         // Ascending, so that no swap moves a row that a later one names.
         rows.sort_unstable();
-        let swaps: Vec<(usize, usize)> = rows.iter().copied().enumerate().collect();
-        self.swap_rows(&swaps.iter().map(|&(k, row)| (k, row - self.rank)).collect::<Vec<_>>());
+        let swaps: Vec<(usize, usize)> =
+            rows.iter().enumerate().map(|(k, &row)| (k, row - self.rank)).collect();
+        self.swap_rows(&swaps);
         rows.len()
     }
 
@@ -129,67 +132,70 @@ impl<'a> Pivoting<'a> {
         });
     }
 
-    /// `K + D − LLᵀ` at the first rows that are no pivots, column by column, both triangles.
-    fn schur_complement(&self, n_rows: usize, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    /// `K + D − LLᵀ` at the first rows that are no pivots.
+    fn schur_complement(&self, n_rows: usize, observer: &dyn Observer) -> Result<Block, NumericsError> {
         let (n, first) = (self.order.len(), self.rank);
         let candidates = self.points(first, n_rows)?;
-        let mut block = vec![0.0; n_rows * n_rows];
-        fill_cross_gram(&Nodes::of(&candidates), self.kernel, &candidates, &mut block, observer)?;
+        let mut entries = vec![0.0; n_rows * n_rows];
+        fill_cross_gram(&Nodes::of(&candidates), self.kernel, &candidates, &mut entries, observer)?;
         for k in 0..n_rows {
-            block[k * (n_rows + 1)] += self.regularization.at(self.order[first + k]);
+            entries[k * (n_rows + 1)] += self.regularization.at(self.order[first + k]);
         }
         let l = MatRef::from_column_major_slice(&self.columns[..n * first], n, first).subrows(first, n_rows);
         let par = parallelism((2 * n_rows * n_rows * first) as f64);
-        let schur = MatMut::from_column_major_slice_mut(&mut block, n_rows, n_rows);
+        let schur = MatMut::from_column_major_slice_mut(&mut entries, n_rows, n_rows);
         matmul(schur, Accum::Add, l, l.transpose(), -1.0, par);
-        Ok(block)
+        Ok(Block { entries, n: n_rows })
     }
 
-    /// Appends the columns of accepted pivots, whose factor is the leading part of `block`.
+    /// Appends the columns of accepted pivots, the first rows of a factorized block: `L₂ = (K₂ − L₂′L₁′ᵀ) L₁⁻ᵀ`, with a
+    /// prime what stands in earlier columns.
     fn append(
         &mut self,
-        block: &[f64],
-        n_candidates: usize,
+        block: &Block,
         n_accepted: usize,
         observer: &dyn Observer,
     ) -> Result<(), NumericsError> {
-        if n_accepted == 0 {
-            return Ok(());
-        }
-        let (n, first) = (self.order.len(), self.rank);
-        let below = first + n_accepted;
-        let pivots = self.points(first, n_accepted)?;
+        self.write_kernel_columns(block, n_accepted, observer)?;
+        let (n, first, below) = (self.order.len(), self.rank, self.rank + n_accepted);
         let (before, rest) = self.columns.split_at_mut(n * first);
-        let new = &mut rest[..n * n_accepted];
-        fill_cross_gram(&self.nodes, self.kernel, &pivots, new, observer)?;
-        new.par_chunks_mut(n).enumerate().for_each(|(k, column)| {
-            let by_point = column.to_vec();
-            column[..first + k].fill(0.0);
-            column[first + k..below].copy_from_slice(&block[k * n_candidates + k..][..n_accepted - k]);
-            for (entry, &point) in column[below..].iter_mut().zip(&self.order[below..]) {
-                *entry = by_point[point];
-            }
-        });
-        let par = parallelism((2 * (n - first) * n_accepted * (first + n_accepted)) as f64);
-        let l = MatRef::from_column_major_slice(before, n, first);
+        let (l, new) = (MatRef::from_column_major_slice(before, n, first), &mut rest[..n * n_accepted]);
         let (upper, mut lower) =
             MatMut::from_column_major_slice_mut(&mut *new, n, n_accepted).split_at_row_mut(below);
-        matmul(
-            lower.as_mut(),
-            Accum::Add,
-            l.subrows(below, n - below),
-            l.subrows(first, n_accepted).transpose(),
-            -1.0,
-            par,
-        );
-        let l11 = upper.as_ref().subrows(first, n_accepted);
-        solve_lower_triangular_in_place(l11, lower.transpose_mut(), par);
+        let (l1, l2) = (l.subrows(first, n_accepted), l.subrows(below, n - below));
+        let par = parallelism((2 * (n - below) * n_accepted * below) as f64);
+        matmul(lower.as_mut(), Accum::Add, l2, l1.transpose(), -1.0, par);
+        let l1 = upper.as_ref().subrows(first, n_accepted);
+        solve_lower_triangular_in_place(l1, lower.transpose_mut(), par);
         for column in new.chunks_exact(n) {
             for (remaining, l) in self.remaining[below..].iter_mut().zip(&column[below..]) {
                 *remaining -= l * l;
             }
         }
         self.rank = below;
+        Ok(())
+    }
+
+    /// Writes behind L the columns of K at accepted pivots, in the order of the rows: in the rows of these pivots the factor
+    /// of their block, above it zero.
+    fn write_kernel_columns(
+        &mut self,
+        block: &Block,
+        n_accepted: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
+        let (n, first, below) = (self.order.len(), self.rank, self.rank + n_accepted);
+        let pivots = self.points(first, n_accepted)?;
+        let new = &mut self.columns[n * first..n * below];
+        fill_cross_gram(&self.nodes, self.kernel, &pivots, new, observer)?;
+        new.par_chunks_mut(n).enumerate().for_each(|(k, column)| {
+            let by_point = column.to_vec();
+            column[..first + k].fill(0.0);
+            column[first + k..below].copy_from_slice(&block.entries[k * block.n..][k..n_accepted]);
+            for (entry, &point) in column[below..].iter_mut().zip(&self.order[below..]) {
+                *entry = by_point[point];
+            }
+        });
         Ok(())
     }
 
@@ -201,36 +207,54 @@ impl<'a> Pivoting<'a> {
     }
 }
 
-/// Pivoted Cholesky of a small symmetric matrix, in place, while pivots are above `floor`: the swaps of rows in order, and how
-/// many columns of the factor there are.
-fn pivot_block(a: &mut [f64], n: usize, floor: f64) -> (Vec<(usize, usize)>, usize) {
-    let mut swaps = Vec::new();
-    for k in 0..n {
-        let diagonal = |i: usize| a[i * (n + 1)];
-        let pivot = (k..n).fold(k, |best, i| if diagonal(i) > diagonal(best) { i } else { best });
-        let largest = diagonal(pivot);
-        if largest.is_nan() || largest <= floor {
-            break;
+/// A small symmetric matrix, column by column, both triangles.
+struct Block {
+    entries: Vec<f64>,
+    n: usize,
+}
+
+impl Block {
+    fn diagonal(&self, k: usize) -> f64 {
+        self.entries[k * (self.n + 1)]
+    }
+
+    /// Pivoted Cholesky in place while pivots are above `floor`; returns the swaps of rows, one for each column of the factor.
+    fn factorize(&mut self, floor: f64) -> Vec<(usize, usize)> {
+        let mut swaps = Vec::new();
+        for k in 0..self.n {
+            let greater = |best, i| if self.diagonal(i) > self.diagonal(best) { i } else { best };
+            let pivot = (k..self.n).fold(k, greater);
+            let largest = self.diagonal(pivot);
+            if largest.is_nan() || largest <= floor {
+                break;
+            }
+            self.swap(k, pivot);
+            swaps.push((k, pivot));
+            self.eliminate(k);
         }
-        swaps.push((k, pivot));
-        for c in 0..n {
-            a.swap(c * n + k, c * n + pivot);
-        }
-        for i in 0..n {
-            a.swap(k * n + i, pivot * n + i);
-        }
-        let root = largest.sqrt();
-        let (before, after) = a.split_at_mut((k + 1) * n);
+        swaps
+    }
+
+    /// Swaps two rows and the same columns.
+    fn swap(&mut self, a: usize, b: usize) {
+        let n = self.n;
+        (0..n).for_each(|c| self.entries.swap(c * n + a, c * n + b));
+        (0..n).for_each(|r| self.entries.swap(a * n + r, b * n + r));
+    }
+
+    /// Turns column k into one of the factor and updates the columns after it.
+    fn eliminate(&mut self, k: usize) {
+        let n = self.n;
+        let (before, after) = self.entries.split_at_mut((k + 1) * n);
         let column = &mut before[k * n..];
+        let root = column[k].sqrt();
         column[k..].iter_mut().for_each(|x| *x /= root);
         column[k] = root;
-        for (j, other) in after.chunks_exact_mut(n).enumerate() {
-            let factor = column[k + 1 + j];
+        for (other, j) in after.chunks_exact_mut(n).zip(k + 1..) {
+            let factor = column[j];
             for (x, l) in other[k + 1..].iter_mut().zip(&column[k + 1..]) {
                 *x -= factor * l;
             }
         }
     }
-    let n_accepted = swaps.len();
-    (swaps, n_accepted)
 }
