@@ -12,14 +12,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use gramian::numerics::cloud::Cloud;
-use gramian::numerics::defaults::{Purpose, default_fit};
-use gramian::numerics::geometry::{Geometry, Orientation};
+use gramian::numerics::defaults::{Purpose, Scales, default_fit};
+use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::neighbours::Neighbours;
+use gramian::numerics::noise::estimate_noise;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface::Surface;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
@@ -92,7 +94,8 @@ impl<'a> Scan<'a> {
     }
 
     fn rule(&self) -> Result<(Kernel, f64)> {
-        Ok(default_fit(&self.cloud, &self.neighbours, Purpose::Normals)?)
+        let noise = || estimate_noise(&self.cloud, &self.neighbours);
+        Ok(default_fit(&Scales::of(&self.cloud, &self.neighbours), Purpose::Normals, noise)?)
     }
 
     /// Median angle between lines, in degrees: signs are another matter.
@@ -101,8 +104,10 @@ impl<'a> Scan<'a> {
         let alpha = Regularization::uniform(alpha)?;
         let factor = GramFactor::factorize(self.cloud.clone(), kernel, alpha, &Unobserved)?;
         let signature = Interpolant::signature(Arc::new(factor), &Unobserved)?;
-        let geometry =
-            Geometry::of(&signature, &self.neighbours, &self.cloud, Orientation::Outward, &Unobserved)?;
+        let surface = Surface::of(signature, None, &Unobserved)?;
+        let model = SurfaceModel::Signature;
+        let request = GeometryRequest { model, checks_curvatures: false, ..GeometryRequest::CURVATURES };
+        let geometry = Geometry::of(&surface, &self.cloud, &request, &Unobserved)?;
         let mut angles: Vec<f64> = (0..self.cloud.n_points())
             .map(|point| {
                 let truth = &self.truth[3 * point..][..3];

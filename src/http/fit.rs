@@ -295,8 +295,8 @@ impl Chosen {
     ) -> Result<(NumericalKernel, Regularization), Problem> {
         let refuse = |error| Problem::from_numerics(error, place);
         let (kernel, default_alpha) = match &self.kernel {
-            Some(kernel) => (kernel.resolve(&stored.cloud, || stored.neighbours(), place)?, DEFAULT_ALPHA),
-            None => default_fit(&stored.cloud, stored.neighbours(), purpose).map_err(refuse)?,
+            Some(kernel) => (kernel.resolve(|| stored.scales(), place)?, DEFAULT_ALPHA),
+            None => default_fit(stored.scales(), purpose, || stored.noise()).map_err(refuse)?,
         };
         let regularization = match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {

@@ -2,10 +2,8 @@
 
 use super::problem::{Place, Problem};
 use super::shared::{Kernel, KernelFamily, KernelUsed};
-use crate::numerics::cloud::Cloud;
-use crate::numerics::defaults::length_scale_for;
+use crate::numerics::defaults::{Scales, length_scale_for};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
-use crate::numerics::neighbours::Neighbours;
 
 impl Kernel {
     /// Fills in what is absent and checks the rest.
@@ -14,14 +12,13 @@ impl Kernel {
     /// 422 with a pointer to the parameter.
     pub fn resolve<'a>(
         &self,
-        cloud: &Cloud,
-        neighbours: impl FnOnce() -> &'a Neighbours,
+        scales: impl FnOnce() -> &'a Scales,
         place: Place,
     ) -> Result<NumericalKernel, Problem> {
         let family = self.resolve_family(place)?;
         let length_scale = match self.length_scale {
             Some(length_scale) => length_scale,
-            None => length_scale_for(cloud, neighbours(), family),
+            None => length_scale_for(scales(), family),
         };
         NumericalKernel::new(family, length_scale, self.variance.unwrap_or(1.0))
             .map_err(|error| Problem::from_numerics(error, place))

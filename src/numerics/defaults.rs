@@ -2,7 +2,7 @@
 //!
 //! Everything scales with the cloud: millimetres and kilometres get the same geometry.
 
-use super::cloud::Cloud;
+use super::cloud::{Cloud, squared_distance};
 use super::error::NumericsError;
 use super::kernel::{Family, Kernel};
 use super::neighbours::Neighbours;
@@ -21,85 +21,100 @@ pub enum Purpose {
 /// α where none is given.
 pub const DEFAULT_ALPHA: f64 = 1e-10;
 
-/// α of the rules for surfaces: between the 1e-8 and 1e-3 that scans were measured to tolerate (numerics.md, Defaults).
-const SURFACE_ALPHA: f64 = 1e-6;
+/// Least α of the rules for surfaces: what it costs on exact data is far below what the sampling costs, and where the
+/// estimate of the noise fails (coarse clouds) it keeps the fit from following the noise (docs/defaults.md).
+const SURFACE_ALPHA: f64 = 1e-3;
 
-/// ℓ of values, in multiples of the median distance to the nearest point: wide enough for a smooth interpolant, narrow
+/// α of noisy surfaces, `5 (σ/h₄)^1.5`: between the linear law that is best for smooth surfaces and the square one of
+/// α = (σ|∇u|)² (docs/defaults.md).
+const NOISE_FACTOR: f64 = 5.0;
+const NOISE_EXPONENT: f64 = 1.5;
+
+/// ℓ of values, in multiples of h₄: wide enough for a smooth interpolant, narrow
 /// enough for Matérn 5/2 to stay positive definite in float64 with α = 1e-10.
 const VALUES_SPACINGS: f64 = 10.0;
 
-/// ℓ of normals against the radius, and √ε ℓ against the median spacing (numerics.md, Defaults).
-const NORMALS_RADII: f64 = 0.3;
-const NORMALS_SMOOTHING: f64 = 0.1;
-
-/// Median spacing against the radius above which a cloud is coarse: the cusps of neighbouring points no longer blend, all
-/// gradients at the points fail T2, and the rule for curvatures, which smooths them away, serves normals as well.
-const COARSE_SPACING: f64 = 0.1;
-
-/// The same for curvatures and operators: right to 1e-3 on a sphere where the rule for normals is off by factors.
-const CURVATURES_RADII: f64 = 0.5;
-const CURVATURES_SMOOTHING: f64 = 2.0;
-
-/// The kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces.
-///
-/// # Errors
-/// [`NumericsError::InvalidKernelParameter`] if the cloud is too small or large for any length scale.
-pub fn default_fit(
-    cloud: &Cloud,
-    neighbours: &Neighbours,
-    purpose: Purpose,
-) -> Result<(Kernel, f64), NumericsError> {
-    let scales = Scales::of(cloud, neighbours);
-    let laplace = |radii: f64, smoothing: f64| {
-        let length_scale = radii * scales.radius;
-        let epsilon = (smoothing * scales.spacing / length_scale).powi(2);
-        Kernel::new(Family::Laplace { epsilon }, length_scale, 1.0)
-    };
-    match purpose {
-        Purpose::Values => {
-            let length_scale = default_length_scale(&scales, Family::Matern { order: 2 });
-            Ok((Kernel::new(Family::Matern { order: 2 }, length_scale, 1.0)?, DEFAULT_ALPHA))
-        }
-        Purpose::Normals if scales.spacing < COARSE_SPACING * scales.radius => {
-            Ok((laplace(NORMALS_RADII, NORMALS_SMOOTHING)?, SURFACE_ALPHA))
-        }
-        Purpose::Normals | Purpose::Curvatures => {
-            Ok((laplace(CURVATURES_RADII, CURVATURES_SMOOTHING)?, SURFACE_ALPHA))
-        }
-    }
+/// A rule for a surface: ℓ is the greater of `extents` times the extent and `spacings` times h₄; √ε ℓ is `smoothing` h₄.
+struct SurfaceRule {
+    extents: f64,
+    spacings: f64,
+    smoothing: f64,
 }
 
-/// A length scale for a family that the client chose, unit L.
-pub fn length_scale_for(cloud: &Cloud, neighbours: &Neighbours, family: Family) -> f64 {
-    default_length_scale(&Scales::of(cloud, neighbours), family)
-}
+/// Sharp enough for the edges of scans (docs/defaults.md).
+const NORMALS: SurfaceRule = SurfaceRule { extents: 0.45, spacings: 4.0, smoothing: 0.4 };
 
-fn default_length_scale(scales: &Scales, family: Family) -> f64 {
-    let spacings = VALUES_SPACINGS * scales.spacing;
-    match family {
-        // Analytic kernels lose positive definiteness in float64 soonest.
-        Family::Gauss | Family::InverseMultiquadric => (0.3 * spacings).min(scales.radius),
-        Family::Laplace { .. } => CURVATURES_RADII * scales.radius,
-        Family::Matern { .. } => spacings.min(2.0 * scales.radius),
-        // The support must reach well past the neighbours.
-        Family::Wendland { .. } => spacings.min(4.0 * scales.radius),
-    }
-}
+/// Smooth enough for second derivatives at the points, which see the kernel's cusp.
+const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoothing: 3.0 };
 
-struct Scales {
+/// Lengths of a cloud, unit L; all 1 for one position alone, which has no scale.
+#[derive(Debug, Clone, Copy)]
+pub struct Scales {
     /// Half the diagonal of the bounding box.
     radius: f64,
-    /// Median distance to the nearest point elsewhere.
+    /// Root mean square distance to the centroid, which no rotation changes.
+    extent: f64,
+    /// h: median distance to the nearest point elsewhere.
+    nearest: f64,
+    /// h₄: median of the mean distance to the 4 nearest points elsewhere.
     spacing: f64,
 }
 
 impl Scales {
-    /// One position alone has no scale; 1 is as good as any.
-    fn of(cloud: &Cloud, neighbours: &Neighbours) -> Self {
-        match median(neighbours.spacings(cloud)) {
-            Some(spacing) => Self { radius: cloud.radius(), spacing },
-            None => Self { radius: 1.0, spacing: 1.0 },
+    pub fn of(cloud: &Cloud, neighbours: &Neighbours) -> Self {
+        let n = cloud.n_points();
+        let spacings = (0..n).filter_map(|point| neighbours.mean_spacing(cloud, point, 4)).collect();
+        match (median(neighbours.spacings(cloud)), median(spacings)) {
+            (Some(nearest), Some(spacing)) => {
+                Self { radius: cloud.radius(), extent: extent(cloud), nearest, spacing }
+            }
+            _ => Self { radius: 1.0, extent: 1.0, nearest: 1.0, spacing: 1.0 },
         }
+    }
+}
+
+fn extent(cloud: &Cloud) -> f64 {
+    let n = cloud.n_points() as f64;
+    let mut centroid = vec![0.0; cloud.dimension()];
+    for x in cloud.points() {
+        centroid.iter_mut().zip(x).for_each(|(c, x)| *c += x / n);
+    }
+    cloud.points().map(|x| squared_distance(x, &centroid) / n).sum::<f64>().sqrt()
+}
+
+/// The kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces. `noise` is asked for surfaces
+/// only: the standard deviation of the points across the surface, unit L.
+///
+/// # Errors
+/// [`NumericsError::InvalidKernelParameter`] if the cloud is too small or large for any length scale.
+pub fn default_fit(
+    scales: &Scales,
+    purpose: Purpose,
+    noise: impl FnOnce() -> f64,
+) -> Result<(Kernel, f64), NumericsError> {
+    let rule = match purpose {
+        Purpose::Values => {
+            let family = Family::Matern { order: 2 };
+            return Ok((Kernel::new(family, length_scale_for(scales, family), 1.0)?, DEFAULT_ALPHA));
+        }
+        Purpose::Normals => NORMALS,
+        Purpose::Curvatures => CURVATURES,
+    };
+    let length_scale = (rule.extents * scales.extent).max(rule.spacings * scales.spacing);
+    let epsilon = (rule.smoothing * scales.spacing / length_scale).powi(2);
+    let alpha = SURFACE_ALPHA.max(NOISE_FACTOR * (noise() / scales.spacing).powf(NOISE_EXPONENT));
+    Ok((Kernel::new(Family::Laplace { epsilon }, length_scale, 1.0)?, alpha))
+}
+
+/// A length scale for a family, unit L.
+pub fn length_scale_for(scales: &Scales, family: Family) -> f64 {
+    match family {
+        // Analytic kernels lose positive definiteness in float64 soonest.
+        Family::Gauss | Family::InverseMultiquadric => (3.0 * scales.nearest).min(scales.radius),
+        Family::Laplace { .. } => 0.5 * scales.radius,
+        Family::Matern { .. } => (VALUES_SPACINGS * scales.spacing).min(2.0 * scales.radius),
+        // The support must reach well past the neighbours.
+        Family::Wendland { .. } => (VALUES_SPACINGS * scales.spacing).min(4.0 * scales.radius),
     }
 }
 
@@ -119,19 +134,25 @@ mod tests {
     use super::*;
     use crate::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
     use crate::numerics::interpolant::Interpolant;
+    use crate::numerics::noise::estimate_noise;
     use crate::numerics::observer::Unobserved;
     use crate::numerics::regularization::Regularization;
     use crate::numerics::solver::GramFactor;
     use crate::numerics::surface::Surface;
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
+    fn of(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64) {
+        let neighbours = Neighbours::of(cloud);
+        default_fit(&Scales::of(cloud, &neighbours), purpose, || estimate_noise(cloud, &neighbours)).unwrap()
+    }
+
     #[test]
     fn defaults_scale_with_the_cloud() {
         let cloud = fibonacci_sphere(200);
         let scaled = Cloud::new(cloud.coordinates().iter().map(|x| 1e3 * x).collect(), 3).unwrap();
         for purpose in [Purpose::Values, Purpose::Normals, Purpose::Curvatures] {
-            let (a, _) = default_fit(&cloud, &Neighbours::of(&cloud), purpose).unwrap();
-            let (b, _) = default_fit(&scaled, &Neighbours::of(&scaled), purpose).unwrap();
+            let (a, _) = of(&cloud, purpose);
+            let (b, _) = of(&scaled, purpose);
             assert!((b.length_scale() / a.length_scale() - 1e3).abs() < 1e-9);
         }
     }
@@ -140,8 +161,7 @@ mod tests {
     fn every_circle_has_normals_by_default() {
         for n in [6, 8, 12, 16, 32, 64, 200] {
             let cloud = Arc::new(circle(n));
-            let neighbours = Neighbours::of(&cloud);
-            let (kernel, alpha) = default_fit(&cloud, &neighbours, Purpose::Normals).unwrap();
+            let (kernel, alpha) = of(&cloud, Purpose::Normals);
             let alpha = Regularization::uniform(alpha).unwrap();
             let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
             let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
@@ -162,7 +182,7 @@ mod tests {
     #[test]
     fn a_single_point_has_a_default() {
         let cloud = Cloud::new(vec![4.0, 5.0], 2).unwrap();
-        let (kernel, alpha) = default_fit(&cloud, &Neighbours::of(&cloud), Purpose::Values).unwrap();
+        let (kernel, alpha) = of(&cloud, Purpose::Values);
         assert!(kernel.length_scale() > 0.0 && alpha == DEFAULT_ALPHA);
     }
 

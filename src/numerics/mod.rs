@@ -13,6 +13,7 @@ pub mod interpolant;
 pub mod jets;
 pub mod kernel;
 pub mod neighbours;
+pub mod noise;
 pub mod observer;
 pub mod operators;
 pub mod posterior;

@@ -8,8 +8,10 @@ use moka::sync::Cache;
 use super::key::CloudId;
 use super::{Owner, bounded_cache};
 use crate::numerics::cloud::Cloud;
+use crate::numerics::defaults::Scales;
 use crate::numerics::duplicates::count_duplicates;
 use crate::numerics::neighbours::Neighbours;
+use crate::numerics::noise::estimate_noise;
 
 /// A cloud with what is derived from it once, on demand.
 pub struct StoredCloud {
@@ -20,6 +22,8 @@ pub struct StoredCloud {
     pub created_at: SystemTime,
     neighbours: OnceLock<Neighbours>,
     spacings: OnceLock<Spacings>,
+    scales: OnceLock<Scales>,
+    noise: OnceLock<f64>,
 }
 
 /// Distances from each point to the nearest point elsewhere, unit L, and the number of exact duplicates.
@@ -46,6 +50,16 @@ impl StoredCloud {
             };
             Spacings { min_median_max, n_duplicates: count_duplicates(&self.cloud) }
         })
+    }
+
+    /// The lengths that kernels are chosen by.
+    pub fn scales(&self) -> &Scales {
+        self.scales.get_or_init(|| Scales::of(&self.cloud, self.neighbours()))
+    }
+
+    /// Standard deviation of the points across the surface that they sample, unit L.
+    pub fn noise(&self) -> f64 {
+        *self.noise.get_or_init(|| estimate_noise(&self.cloud, self.neighbours()))
     }
 
     /// Bytes on the heap once everything is derived; the tree takes at most 16 bytes a point.
@@ -77,6 +91,8 @@ impl CloudStore {
                 created_at: SystemTime::now(),
                 neighbours: OnceLock::new(),
                 spacings: OnceLock::new(),
+                scales: OnceLock::new(),
+                noise: OnceLock::new(),
             })
         });
         let is_new = entry.is_fresh();

@@ -16,7 +16,7 @@ fn smooth_families() -> impl Iterator<Item = Family> {
 fn assert_finite(geometry: &Geometry, what: &str) {
     let curvatures = geometry.curvatures(&Unobserved).unwrap();
     let d = geometry.dimension();
-    for query in (0..geometry.n_queries()).filter(|&query| !geometry.is_degenerate()[query]) {
+    for query in (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query]) {
         let norm = geometry.normal(query).iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!((norm - 1.0).abs() < 1e-14, "{what}: a normal of length {norm}");
         assert!(curvatures.principal[query * (d - 1)..][..d - 1].iter().all(|k| k.is_finite()), "{what}");
@@ -42,11 +42,7 @@ fn one_point_is_met_and_its_level_surfaces_are_spheres() {
                     continue;
                 }
                 // The gradient vanishes at the maximum of u, and no surface passes there.
-                assert_eq!(
-                    geometry(&factor, &point).1.is_degenerate(),
-                    [true],
-                    "{family:?} in dimension {d}"
-                );
+                assert_eq!(geometry(&factor, &point).1.is_null(), [true], "{family:?} in dimension {d}");
                 // Around it the level surfaces are spheres: normal outwards, all curvatures 1/distance.
                 let (_, sphere) = geometry(&factor, &at(0.5));
                 let curvatures = sphere.curvatures(&Unobserved).unwrap();
@@ -108,7 +104,7 @@ fn check_flat(points: &Cloud, queries: &Cloud, off: [f64; 3]) {
 /// surfaces wrap the cloud, and normals point away from it, turned by less than 66° at its ends.
 fn check_flat_geometry(geometry: &Geometry, off: [f64; 3], is_smooth: bool, what: &str) {
     assert_finite(geometry, what);
-    let (on, beside) = geometry.is_degenerate().split_at(geometry.n_queries() / 2);
+    let (on, beside) = geometry.is_null().split_at(geometry.n_queries() / 2);
     assert!(!is_smooth || on.iter().all(|&flagged| flagged), "{what}");
     for query in (0..beside.len()).filter(|&query| !beside[query]) {
         let normal = geometry.normal(on.len() + query);

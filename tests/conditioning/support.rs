@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use gramian::numerics::cloud::Cloud;
 use gramian::numerics::error::NumericsError;
-use gramian::numerics::geometry::{Geometry, Orientation};
+use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::jets::JetOrder;
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
-use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::surface::Surface;
 
 pub const EPS: f64 = f64::EPSILON;
 
@@ -52,11 +52,12 @@ pub fn fit(factor: &Arc<GramFactor>, values: &[f64]) -> Interpolant {
     try_fit(factor, values).unwrap()
 }
 
-/// The signature function of the factor's cloud with its geometry at queries, ν = −∇u/|∇u|.
+/// The signature function of the factor's cloud with its geometry at queries, by itself: no offset model.
 pub fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> (Interpolant, Geometry) {
     let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
-    let neighbours = Neighbours::of(factor.cloud());
-    let geometry = Geometry::of(&signature, &neighbours, queries, Orientation::Outward, &Unobserved).unwrap();
+    let surface = Surface::of(signature.clone(), None, &Unobserved).unwrap();
+    let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
+    let geometry = Geometry::of(&surface, queries, &request, &Unobserved).unwrap();
     (signature, geometry)
 }
 

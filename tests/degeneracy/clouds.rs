@@ -21,10 +21,6 @@ impl Oriented {
         }
         Self { points, normals, dimension: D }
     }
-
-    pub fn n_points(&self) -> usize {
-        self.normals.len()
-    }
 }
 
 /// The paper's closed curve `(sin t, sin³t + ½ cos t)` at equidistant parameters; clockwise, so outward is left of the tangent.
@@ -77,7 +73,7 @@ pub fn graph(side: usize, height: impl Fn(f64, f64) -> f64) -> Oriented {
 pub fn cylinder(around: usize, along: usize) -> Oriented {
     Oriented::new((0..around * along).map(|i| {
         let row = i / around;
-        let turn = (i % around) as f64 + if row % 2 == 0 { 0.0 } else { 0.5 };
+        let turn = (i % around) as f64 + if row.is_multiple_of(2) { 0.0 } else { 0.5 };
         let (s, c) = (2.0 * PI * turn / around as f64).sin_cos();
         ([0.5 * c, 0.5 * s, 3.0 * row as f64 / (along - 1) as f64], [c, s, 0.0])
     }))

@@ -1,6 +1,6 @@
 //! Signs of normals where the signature function alone flips them.
 
-use gramian::numerics::geometry::{GeometryRequest, Orientation, SurfaceModel};
+use gramian::numerics::geometry::{GeometryRequest, SurfaceModel};
 use gramian::numerics::kernel::Family;
 
 use super::clouds::{Oriented, closed_curve, dumbbell, half_sphere, plate};
