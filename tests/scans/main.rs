@@ -1,0 +1,5 @@
+//! Clouds that nobody prepared, with no parameters: kernel, length scale, epsilon and alpha are the service's choice.
+
+mod bunny;
+mod curvatures;
+mod support;
