@@ -13,7 +13,7 @@ use super::neighbours::Neighbour;
 use super::observer::Observer;
 use super::patch::{LocalFit, n_quadric_neighbours};
 use super::rescue::rescue;
-use super::resolution::is_resolved;
+use super::resolution::Claim;
 use super::shape::principal_curvatures;
 use super::surface::Surface;
 use super::vector::norm;
@@ -183,10 +183,18 @@ impl<'a> Examination<'a> {
     }
 
     fn is_resolved(&self, answer: &Answer, site: &Site<'_>) -> bool {
-        let length = norm(&answer.gradient);
-        let normal: Vec<f64> = answer.gradient.iter().map(|g| answer.sign * g / length).collect();
+        let gradient_norm = norm(&answer.gradient);
+        let normal: Vec<f64> = answer.gradient.iter().map(|g| answer.sign * g / gradient_norm).collect();
         let (curvatures, _) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
-        let fit = site.fit.as_deref();
-        is_resolved(self.surface, site.x, site.spacing, &normal, &curvatures, fit, answer.is_offset)
+        let claim = Claim {
+            x: site.x,
+            spacing: site.spacing,
+            curvatures: &curvatures,
+            normal: &normal,
+            gradient_norm,
+            fit: site.fit.as_deref(),
+            is_offset: answer.is_offset,
+        };
+        claim.is_confirmed(self.surface)
     }
 }

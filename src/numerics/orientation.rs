@@ -16,6 +16,10 @@ use super::vector::dot;
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
 
+/// Weight of an edge below which it says nothing: on coarse clouds normals turn by more than 45° from point to point, and
+/// what seems a flip is the surface.
+const SURE: f64 = 0.4;
+
 /// Share of the gradients that must agree for their sign to be believed without the volume.
 const UNANIMITY: f64 = 0.95;
 
@@ -101,7 +105,7 @@ fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<E
             };
             let across = (step(normal_a) + cosine.signum() * step(normal_b)).abs();
             let weight = cosine * cosine * (1.0 - 2.0 * across / found.squared_distance.sqrt());
-            if weight > 0.01 {
+            if weight > SURE {
                 edges.push(Edge { a, b, cosine, weight });
             }
         }

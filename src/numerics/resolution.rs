@@ -1,13 +1,16 @@
-//! T4: whether the neighbours confirm the curvatures of a surface.
+//! T3 and T4: whether the cloud confirms the curvatures of a surface.
 //!
 //! A kernel that is too wide or too narrow for the sampling gives smooth, wrong curvatures. Two opinions that do not depend
-//! on it are at hand: a quadric through some neighbours, cheap and coarse, and the offset model on a patch, which costs as
-//! much as a hundred quadrics. Where the quadric agrees, nothing more is asked; where it does not, the patch decides.
+//! on it are at hand (T4): a quadric through some neighbours, cheap and coarse, and the offset model on a patch, which costs
+//! as much as a hundred quadrics. Where the quadric agrees, nothing more is asked; where it does not, the patch decides.
+//! Clouds so small that no patch lies on one side of them have a third (T3): whether the signature function would have
+//! predicted the points nearby, had each of them been left out.
 
 use super::patch::LocalFit;
 use super::rescue::rescue;
 use super::shape::principal_curvatures;
-use super::surface::Surface;
+use super::surface::{SPACING_NEIGHBOURS, Surface};
+use super::vector::dot;
 
 /// Differences, against the largest curvature, up to which the quadric confirms, and up to which the patch does.
 const CONFIRMED_BY_QUADRIC: f64 = 0.07;
@@ -22,39 +25,81 @@ const QUADRIC_BEND: f64 = 0.6;
 /// Curvatures below this fraction of one over the radius of the cloud count as zero.
 const FLAT: f64 = 0.1;
 
-/// Angle by which the normal may turn from one point to the next for the sampling to show the surface at all.
+/// Angle by which the normal may turn from one point to the next for neighbours to show the surface at all.
 const RESOLVED_TURN: f64 = 0.8;
 
-/// Whether curvatures `[d−1]`, ascending for the outward normal `normal` at x, are confirmed by the points around x.
-pub(crate) fn is_resolved(
-    surface: &Surface,
-    x: &[f64],
-    spacing: f64,
-    normal: &[f64],
-    curvatures: &[f64],
-    fit: Option<&LocalFit>,
-    is_offset: bool,
-) -> bool {
-    let largest = curvatures.iter().fold(0.0, |a: f64, k| a.max(k.abs()));
-    if largest * spacing > RESOLVED_TURN {
-        return false;
+/// T3: the level surface may miss a point that was left out by this fraction of `h_q² κ`.
+const LEFT_OUT_MISS: f64 = 0.01;
+
+/// Curvatures at a query, to be confirmed.
+pub(crate) struct Claim<'a> {
+    pub x: &'a [f64],
+    /// h_q, unit L.
+    pub spacing: f64,
+    /// Principal curvatures `[d−1]`, ascending, for this unit normal.
+    pub curvatures: &'a [f64],
+    pub normal: &'a [f64],
+    /// |∇u| of the function that gave them.
+    pub gradient_norm: f64,
+    pub fit: Option<&'a LocalFit>,
+    pub is_offset: bool,
+}
+
+impl Claim<'_> {
+    /// Whether the points around x confirm the curvatures.
+    pub(crate) fn is_confirmed(&self, surface: &Surface) -> bool {
+        if self.is_offset {
+            return self
+                .difference_from_quadric(surface)
+                .is_some_and(|difference| difference <= CONFIRMED_OFFSET);
+        }
+        let turn = self.largest() * self.spacing;
+        if turn <= RESOLVED_TURN && self.is_confirmed_by_quadric(surface) {
+            return true;
+        }
+        match self.is_confirmed_by_patch(surface) {
+            Some(is_confirmed) => turn <= RESOLVED_TURN && is_confirmed,
+            None => self.is_predicted(surface),
+        }
     }
-    let floor = FLAT / surface.radius();
-    let differ = |other: &[f64]| {
-        let largest = curvatures.iter().chain(other).fold(floor, |a, k| a.max(k.abs()));
-        curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
-    };
-    let by_quadric =
-        fit.filter(|fit| fit.is_reliable()).map(|fit| (differ(&fit.curvatures_for(normal)), fit.bend()));
-    if is_offset {
-        return by_quadric.is_some_and(|(difference, _)| difference <= CONFIRMED_OFFSET);
+
+    fn largest(&self) -> f64 {
+        self.curvatures.iter().fold(0.0, |a: f64, k| a.max(k.abs()))
     }
-    if by_quadric.is_some_and(|(difference, bend)| difference <= CONFIRMED_BY_QUADRIC && bend < QUADRIC_BEND)
-    {
-        return true;
+
+    fn is_confirmed_by_quadric(&self, surface: &Surface) -> bool {
+        self.fit.is_some_and(|fit| fit.bend() < QUADRIC_BEND)
+            && self
+                .difference_from_quadric(surface)
+                .is_some_and(|difference| difference <= CONFIRMED_BY_QUADRIC)
     }
-    rescue(surface, x).is_some_and(|jet| {
-        let (other, _) = principal_curvatures(&jet.gradient, &jet.hessian, 1.0);
-        differ(&other) <= CONFIRMED_BY_PATCH
-    })
+
+    fn difference_from_quadric(&self, surface: &Surface) -> Option<f64> {
+        let fit = self.fit.filter(|fit| fit.is_reliable())?;
+        Some(self.difference(surface, &fit.curvatures_for(self.normal)))
+    }
+
+    /// `None` where there is no patch.
+    fn is_confirmed_by_patch(&self, surface: &Surface) -> Option<bool> {
+        let jet = rescue(surface, self.x)?;
+        let side = dot(&jet.gradient, self.normal).signum();
+        let (curvatures, _) = principal_curvatures(&jet.gradient, &jet.hessian, side);
+        Some(self.difference(surface, &curvatures) <= CONFIRMED_BY_PATCH)
+    }
+
+    /// Largest difference against the largest curvature.
+    fn difference(&self, surface: &Surface, other: &[f64]) -> f64 {
+        let floor = FLAT / surface.radius();
+        let largest = other.iter().fold(self.largest().max(floor), |a, k| a.max(k.abs()));
+        self.curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
+    }
+
+    /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ 0.01 |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
+    /// that is left out (Rippa 1999).
+    fn is_predicted(&self, surface: &Surface) -> bool {
+        let Some(misses) = surface.left_out_misses() else { return false };
+        let allowed = LEFT_OUT_MISS * self.gradient_norm * self.spacing.powi(2) * self.largest();
+        let nearest = surface.neighbours().nearest(surface.cloud(), self.x, SPACING_NEIGHBOURS);
+        nearest.iter().all(|found| misses[found.point] <= allowed)
+    }
 }

@@ -1,5 +1,7 @@
 //! The surface that a cloud samples: its signature function, and what its points say about it by themselves.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
@@ -15,7 +17,10 @@ use super::patch::{LocalFit, n_quadric_neighbours};
 use super::vector::{dot, norm};
 
 /// Neighbours that define the sampling distance.
-const SPACING_NEIGHBOURS: usize = 4;
+pub(crate) const SPACING_NEIGHBOURS: usize = 4;
+
+/// Points up to which the diagonal of the inverse is computed: it costs three factorizations.
+const MAX_LEFT_OUT: usize = 512;
 
 /// Cosine between ∇u and the normal of a reliable local fit below which ∇u is not normal to the surface at all.
 const OBLIQUE: f64 = 0.5;
@@ -38,6 +43,7 @@ pub struct Surface {
     orientation: SurfaceOrientation,
     is_too_rough: bool,
     radius: f64,
+    left_out_misses: OnceLock<Option<Vec<f64>>>,
 }
 
 /// How the signs of normals were found.
@@ -82,10 +88,20 @@ impl Surface {
         let orientation = SurfaceOrientation { n_flipped: 0, is_open: false, is_given: given.is_some() };
         let nearest = median(neighbours.spacings(cloud)).unwrap_or(0.0);
         let is_too_rough = is_too_rough(factor.kernel(), nearest);
-        let normals = Vec::new();
+        let (normals, left_out_misses) = (Vec::new(), OnceLock::new());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        let mut this =
-            Self { signature, neighbours, jets, spacings, fits, normals, orientation, is_too_rough, radius };
+        let mut this = Self {
+            signature,
+            neighbours,
+            jets,
+            spacings,
+            fits,
+            normals,
+            orientation,
+            is_too_rough,
+            radius,
+            left_out_misses,
+        };
         this.orient(given, observer)?;
         Ok(this)
     }
@@ -202,6 +218,20 @@ impl Surface {
     /// Half the diagonal of the bounding box, unit L; 1 for a single position.
     pub(crate) fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999); for small clouds with a Cholesky
+    /// factor only.
+    pub(crate) fn left_out_misses(&self) -> Option<&[f64]> {
+        let compute = || {
+            let factor = &self.signature.factor;
+            if factor.n_points() > MAX_LEFT_OUT {
+                return None;
+            }
+            let diagonal = factor.inverse_diagonal()?;
+            Some(self.signature.solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
+        };
+        self.left_out_misses.get_or_init(compute).as_deref()
     }
 
     pub(crate) fn neighbours(&self) -> &Neighbours {

@@ -118,7 +118,7 @@ impl<'a> Case<'a> {
     fn check_geometry(&mut self, u: &Interpolant) {
         let (expected, reached) = (self.expected, self.reached);
         let (_, geometry) = geometry(&self.factor, &self.queries);
-        assert_eq!(geometry.degenerate().len(), 0, "{}", reached.case);
+        assert!(geometry.is_null().iter().all(|is_null| !is_null), "{}", reached.case);
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
         self.check("gradient norm", geometry.gradient_norms(), &expected["gradient_norm"], reached.gradient);
         // Orientation::Outward keeps ν = −∇u/|∇u| or repairs it; these clouds are closed and need no repair.

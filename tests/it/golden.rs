@@ -84,8 +84,10 @@ impl Case<'_> {
             // The reference has ν = −∇u/|∇u| in every case.
             let sign = if orientation == "gradient" { -1.0 } else { 1.0 };
             let found = self.post("/v1/curvatures", json!({"orientation": orientation})).await;
-            let n_degenerate = found["degenerate"].as_array().unwrap().len();
-            assert_eq!(n_degenerate, if may_be_null(&self.name) { 3 } else { 0 }, "{}", self.name);
+            // Two dozen points do not resolve these surfaces, and the answers say so; but they are answers.
+            let is_null = |k: &&Value| k.is_null();
+            let n_null = found["principal_curvatures"].as_array().unwrap().iter().filter(is_null).count();
+            assert_eq!(n_null, if may_be_null(&self.name) { 3 } else { 0 }, "{}", self.name);
             let check = |what, found: &Value, expected: &str, sign| {
                 assert_close(&self.name, what, found, &self.case[expected], sign);
             };
