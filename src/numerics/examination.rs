@@ -10,7 +10,7 @@ use super::error::NumericsError;
 use super::geometry::{Answer, GeometryRequest, Orientation, SurfaceModel};
 use super::jets::{JetOrder, Jets};
 use super::neighbours::Neighbour;
-use super::observer::Observer;
+use super::observer::{Observer, Stage};
 use super::patch::{LocalFit, n_quadric_neighbours};
 use super::rescue::rescue;
 use super::resolution::Claim;
@@ -72,6 +72,7 @@ impl<'a> Examination<'a> {
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn answers(&self, observer: &dyn Observer) -> Result<Vec<Answer>, NumericsError> {
+        observer.enter(Stage::Evaluate);
         let m = self.queries.n_points();
         let needs_offset = |query| {
             observer.checkpoint()?;
@@ -194,6 +195,7 @@ impl<'a> Examination<'a> {
             gradient_norm,
             fit: site.fit.as_deref(),
             is_offset: answer.is_offset,
+            may_use_patch: self.queries.n_points() <= self.request.max_offsets,
         };
         claim.is_confirmed(self.surface)
     }

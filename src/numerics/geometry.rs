@@ -36,7 +36,8 @@ pub struct GeometryRequest {
     pub model: SurfaceModel,
     /// Whether second derivatives are served: they are checked against the neighbours and the cusp of the kernel.
     pub checks_curvatures: bool,
-    /// Queries at which the offset model may be asked; beyond them the answer is null.
+    /// Queries at which the offset model may be asked where the signature function has no answer; beyond them the answer is
+    /// null. With more queries than that it confirms no curvatures either.
     pub max_offsets: usize,
 }
 

@@ -16,9 +16,13 @@ use super::vector::dot;
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
 
-/// Weight of an edge below which it says nothing: on coarse clouds normals turn by more than 45° from point to point, and
-/// what seems a flip is the surface.
-const SURE: f64 = 0.4;
+/// Mean weight of the pairs of neighbours below which a cloud does not resolve its surface: normals turn by as much as they
+/// please from point to point, what seems a flip is the surface, and nothing is repaired. The bunny with 1 % of noise has 0.3, a
+/// torus of 24 points 0.06.
+const RESOLVED: f64 = 0.2;
+
+/// Share of the edges, by weight, that may contradict repaired signs.
+const CONTRADICTION: f64 = 0.1;
 
 /// Share of the gradients that must agree for their sign to be believed without the volume.
 const UNANIMITY: f64 = 0.95;
@@ -74,8 +78,25 @@ pub(crate) fn consistent_signs(cloud: &Cloud, neighbours: &Neighbours, direction
         is_open |= has_rim;
         piece.points.iter().for_each(|&point| signs[point] *= sign);
     }
+    let mean_weight = edges.iter().map(|edge| edge.weight).sum::<f64>() / (n * n_neighbours(cloud)) as f64;
+    if mean_weight < RESOLVED || contradiction(&edges, &signs) > CONTRADICTION {
+        (0..n).filter(|&point| directions.has_sign[point]).for_each(|point| signs[point] = 1.0);
+    }
     let n_flipped = (0..n).filter(|&point| directions.has_sign[point] && signs[point] < 0.0).count();
     Signs { signs, n_flipped, is_open }
+}
+
+/// Neighbours that a point shares edges with.
+fn n_neighbours(cloud: &Cloud) -> usize {
+    2 * cloud.dimension() + 2
+}
+
+/// The share of the edges, by weight, across which normals with these signs are opposite.
+fn contradiction(edges: &[Edge], signs: &[f64]) -> f64 {
+    let is_opposite = |edge: &&Edge| signs[edge.a] * signs[edge.b] * edge.cosine < 0.0;
+    let weight = |edge: &Edge| edge.weight;
+    let total: f64 = edges.iter().map(weight).sum();
+    if total == 0.0 { 0.0 } else { edges.iter().filter(is_opposite).map(weight).sum::<f64>() / total }
 }
 
 /// Two neighbours on one sheet of the surface.
@@ -96,7 +117,7 @@ fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<E
     let mut edges = Vec::new();
     for a in 0..cloud.n_points() {
         let normal_a = &normals[a * d..][..d];
-        for found in neighbours.nearest_elsewhere(cloud, cloud.point(a), 2 * d + 2) {
+        for found in neighbours.nearest_elsewhere(cloud, cloud.point(a), n_neighbours(cloud)) {
             let b = found.point;
             let normal_b = &normals[b * d..][..d];
             let cosine = dot(normal_a, normal_b);
@@ -105,7 +126,7 @@ fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<E
             };
             let across = (step(normal_a) + cosine.signum() * step(normal_b)).abs();
             let weight = cosine * cosine * (1.0 - 2.0 * across / found.squared_distance.sqrt());
-            if weight > SURE {
+            if weight > 0.01 {
                 edges.push(Edge { a, b, cosine, weight });
             }
         }

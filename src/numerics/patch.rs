@@ -168,6 +168,8 @@ pub(crate) struct LocalFit {
     pub height: f64,
     /// Root mean square distance of the neighbours from the quadric, unit L.
     pub residual: f64,
+    /// Standard error of the curvatures if the residual is noise, 1/L.
+    pub uncertainty: f64,
     /// Greatest distance of a neighbour, unit L.
     pub radius: f64,
     pub is_at_rim: bool,
@@ -180,6 +182,10 @@ const RELIABLE_BEND: f64 = 1.5;
 
 /// Residual against the radius below which there is no noise to speak of.
 const SMOOTH_RESIDUAL: f64 = 0.01;
+
+/// Standard error of a second derivative, times √k, from k heights of unit noise over the unit disc: the variance of ½t₁² that
+/// 1, t and t₂² leave is 1/72.
+const DISC_ERROR: f64 = 8.5;
 
 impl LocalFit {
     /// Whether the neighbours look like a piece of one smooth surface.
@@ -226,6 +232,7 @@ impl LocalFit {
             curvatures,
             height,
             residual: quadric.residual * patch.radius,
+            uncertainty: DISC_ERROR * quadric.residual / (patch.radius * (patch.points.len() as f64).sqrt()),
             radius: patch.radius,
             is_at_rim: patch.is_at_rim(),
         })

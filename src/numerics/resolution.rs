@@ -43,24 +43,34 @@ pub(crate) struct Claim<'a> {
     pub gradient_norm: f64,
     pub fit: Option<&'a LocalFit>,
     pub is_offset: bool,
+    /// Whether the cost of a patch was admitted.
+    pub may_use_patch: bool,
 }
 
 impl Claim<'_> {
     /// Whether the points around x confirm the curvatures.
     pub(crate) fn is_confirmed(&self, surface: &Surface) -> bool {
         if self.is_offset {
-            return self
-                .difference_from_quadric(surface)
-                .is_some_and(|difference| difference <= CONFIRMED_OFFSET);
+            let difference = self.difference_from_quadric(surface);
+            return self.is_free_of_noise(surface) && difference.is_some_and(|d| d <= CONFIRMED_OFFSET);
         }
         let turn = self.largest() * self.spacing;
         if turn <= RESOLVED_TURN && self.is_confirmed_by_quadric(surface) {
             return true;
         }
+        if !self.may_use_patch {
+            return false;
+        }
         match self.is_confirmed_by_patch(surface) {
             Some(is_confirmed) => turn <= RESOLVED_TURN && is_confirmed,
             None => self.is_predicted(surface),
         }
+    }
+
+    /// Whether noise is too small to make up the curvatures: quadric and patch would both follow it.
+    fn is_free_of_noise(&self, surface: &Surface) -> bool {
+        let scale = self.largest().max(FLAT / surface.radius());
+        self.fit.is_some_and(|fit| fit.uncertainty <= CONFIRMED_OFFSET * scale)
     }
 
     fn largest(&self) -> f64 {

@@ -231,11 +231,19 @@ fn plan(
     let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
     planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
     // The sums over the points, and some thirty operations per entry of each shape operator.
-    let flops = 60.0 * (n as f64) * (m + n) as f64 + 30.0 * m as f64 * (d as f64).powi(3);
-    Ok(Plan { main, surface: None, work: Work { queries, request }, flops })
+    let sums = 60.0 * (n as f64) * (m + n) as f64 + 30.0 * m as f64 * (d as f64).powi(3);
+    let offsets = match request.model {
+        SurfaceModel::Offset => FLOPS_PER_OFFSET * m.min(MAX_OFFSETS) as f64,
+        // Few queries need it; which, is not known before.
+        SurfaceModel::Auto | SurfaceModel::Signature => 0.0,
+    };
+    Ok(Plan { main, surface: None, work: Work { queries, request }, flops: sums + offsets })
 }
 
-/// Queries at which the offset model may be asked in one request: each costs about as much as a factorization of 130 points.
+/// What the offset model costs at one query, in flops of a large factorization: 0.12 ms of one core.
+const FLOPS_PER_OFFSET: f64 = 1e7;
+
+/// Queries at which one request may ask the offset model: as much work as a factorization of 14,000 points.
 const MAX_OFFSETS: usize = 100_000;
 
 /// What a request asks of the geometry of its surface.
