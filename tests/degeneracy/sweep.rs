@@ -46,7 +46,9 @@ pub struct Tally {
     /// Served without a flag, and off by more than 10 % or 50 %.
     pub missed_10: usize,
     pub missed_50: usize,
-    /// Flagged (numbers that are served) although right to 10 %.
+    /// Flagged numbers that are off by more than 50 %.
+    pub caught_50: usize,
+    /// Flagged numbers that are right to 10 %.
     pub false_alarms: usize,
     /// Greatest error without a flag.
     pub worst: f64,
@@ -60,6 +62,7 @@ impl Tally {
         self.offset += other.offset;
         self.missed_10 += other.missed_10;
         self.missed_50 += other.missed_50;
+        self.caught_50 += other.caught_50;
         self.false_alarms += other.false_alarms;
         self.worst = self.worst.max(other.worst);
         self
@@ -123,6 +126,7 @@ impl Case {
                 Some(reason) if DegeneracyReason::is_null(reason) => tally.null += 1,
                 Some(_) => {
                     tally.flagged += 1;
+                    tally.caught_50 += usize::from(error > 0.5);
                     tally.false_alarms += usize::from(error <= 0.1);
                 }
                 None => {
