@@ -120,7 +120,11 @@ impl<'a> Examination<'a> {
 
     fn vanishes(&self, query: usize, site: &Site<'_>) -> bool {
         let fit = site.fit.as_deref().filter(|fit| fit.height.abs() <= ON_SURFACE_SPACINGS * site.spacing);
-        self.surface.vanishes(&self.jets, query, site.spacing, fit)
+        let reach = ON_SURFACE_SPACINGS * site.spacing;
+        let is_on_thread = site.fit.is_none()
+            && site.nearest.squared_distance <= reach * reach
+            && self.surface.is_thread(site.x);
+        is_on_thread || self.surface.vanishes(&self.jets, query, site.spacing, fit)
     }
 
     /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which

@@ -14,6 +14,9 @@ const NEIGHBOURS_PER_COEFFICIENT: usize = 3;
 /// Diagonal entries of R below this fraction of the largest mean that the neighbours do not determine a quadric.
 const RANK_TOLERANCE: f64 = 1e-6;
 
+/// Breadth against length under which points lie on a line.
+const THREAD: f64 = 1e-3;
+
 /// Coefficients of a quadric over d − 1 tangential coordinates: `d(d+1)/2`.
 pub(crate) fn n_coefficients(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
@@ -28,6 +31,8 @@ pub(crate) fn n_quadric_neighbours(dimension: usize) -> usize {
 pub(crate) struct Patch {
     /// Rows: d − 1 tangents, then the normal, `[d, d]`.
     frame: Vec<f64>,
+    /// Least standard deviation along a tangent against the greatest.
+    breadth: f64,
     /// Coordinates over `radius`, the last one the height above the tangent plane, `[k, d]`.
     coordinates: Vec<f64>,
     /// Greatest distance of a point from x, unit L.
@@ -55,8 +60,8 @@ impl Patch {
             return None;
         }
         differences.iter_mut().for_each(|c| *c /= radius);
-        let mut patch =
-            Self { frame: principal_axes(&differences, d), coordinates: Vec::new(), radius, points };
+        let (frame, breadth) = principal_axes(&differences, d);
+        let mut patch = Self { frame, breadth, coordinates: Vec::new(), radius, points };
         patch.coordinates = differences.chunks_exact(d).flat_map(|v| patch.to_frame(v)).collect();
         Some(patch)
     }
@@ -87,6 +92,11 @@ impl Patch {
             v.iter_mut().zip(axis).for_each(|(v, a)| *v += c * a);
         }
         v
+    }
+
+    /// Whether the points lie on a thread: they span fewer than d − 1 directions, and no surface.
+    pub(crate) fn is_thread(&self) -> bool {
+        self.breadth < THREAD
     }
 
     /// Whether x is at the rim of the patch: no neighbour lies within 75° of the direction opposite to most of them.
@@ -256,8 +266,9 @@ impl Patch {
     }
 }
 
-/// Orthonormal principal axes of differences `[k, d]` about their mean, the direction of least variance last.
-fn principal_axes(differences: &[f64], d: usize) -> Vec<f64> {
+/// Orthonormal principal axes of differences `[k, d]` about their mean, the direction of least variance last; and the standard
+/// deviation along the last but one against that along the first.
+fn principal_axes(differences: &[f64], d: usize) -> (Vec<f64>, f64) {
     let n = (differences.len() / d) as f64;
     let mut mean = vec![0.0; d];
     for v in differences.chunks_exact(d) {
@@ -271,8 +282,9 @@ fn principal_axes(differences: &[f64], d: usize) -> Vec<f64> {
             }
         }
     }
-    let (_, vectors) = symmetric_eigen(&covariance, d);
-    vectors.into_iter().rev().flatten().collect()
+    let (variances, vectors) = symmetric_eigen(&covariance, d);
+    let breadth = (variances[1].max(0.0) / variances[d - 1]).sqrt();
+    (vectors.into_iter().rev().flatten().collect(), breadth)
 }
 
 /// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2), A row-major `[n, p]`.

@@ -13,7 +13,7 @@ use super::jets::{JetOrder, Jets};
 use super::neighbours::Neighbours;
 use super::observer::Observer;
 use super::orientation::{Directions, consistent_signs};
-use super::patch::{LocalFit, n_quadric_neighbours};
+use super::patch::{LocalFit, Patch, n_quadric_neighbours};
 use super::vector::{dot, norm};
 
 /// Neighbours that define the sampling distance.
@@ -195,6 +195,13 @@ impl Surface {
         }
         fit.filter(|fit| fit.is_reliable())
             .is_some_and(|fit| dot(gradient, &fit.normal).abs() < OBLIQUE * length)
+    }
+
+    /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.
+    pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
+        let count = n_quadric_neighbours(self.cloud().dimension());
+        let patch = Patch::around(self.cloud(), &self.neighbours, x, count);
+        patch.is_some_and(|patch| patch.points.len() == count && patch.is_thread())
     }
 
     /// The function u whose level surface this is.
