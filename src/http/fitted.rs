@@ -17,6 +17,7 @@ use crate::numerics::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::error::NumericsError;
 use crate::numerics::geometry::{Geometry, GeometryRequest};
 use crate::numerics::interpolant::Interpolant;
+use crate::numerics::kernel::Family;
 use crate::numerics::regularization::Regularization;
 use crate::numerics::solver::{Method, Solution};
 use crate::numerics::surface::Surface;
@@ -218,9 +219,13 @@ impl SurfaceGeometry {
             |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
         let n_offset = (0..m).filter(|&query| self.geometry.is_offset(query)).count();
         let orientation = self.surface.orientation();
+        let too_rough = match self.surface.signature().factor.kernel().family() {
+            Family::Laplace { .. } => LAPLACE_TOO_ROUGH,
+            _ => KERNEL_TOO_ROUGH,
+        };
         let counted = [
             (n_offset, WarningCode::OffsetModelUsed, "queries are served by the offset model"),
-            (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, KERNEL_TOO_ROUGH),
+            (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
             (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, DISAGREES),
             (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
         ];
@@ -239,7 +244,8 @@ impl SurfaceGeometry {
     }
 }
 
-const KERNEL_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
+const LAPLACE_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
+const KERNEL_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; take a smoother kernel";
 const DISAGREES: &str = "queries have curvatures that their neighbours do not confirm; see degenerate";
 const FAR: &str = "queries are farther from the cloud than three spacings";
 const OPEN_CLOUD: &str =

@@ -18,7 +18,7 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub points: Option<Points>,
-    /// Normals at the points, one row each, with `points` only.
+    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub normals: Option<Points>,
@@ -113,12 +113,13 @@ pub enum DuplicatePolicy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceChoice {
-    /// `signature`, and `offset` where its gradient vanishes.
+    /// `signature`, and `offset` where its gradient vanishes or, for curvatures, is weak.
     #[default]
     Auto,
     /// The interpolant of the constant 1.
     Signature,
-    /// An interpolant of signed distances on two offset layers, fitted to the points near each query.
+    /// An interpolant of signed distances on two offset layers, fitted to the points near each query. It needs no derivatives
+    /// of `kernel`.
     Offset,
 }
 
@@ -136,11 +137,11 @@ pub enum SurfaceUsed {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OrientationChoice {
-    /// Against the gradient of the signature function, which is out of closed surfaces while the length scale is not small
-    /// against their features. A sphere has positive curvatures.
+    /// To the side of the cloud's normals where it has some; else out of closed surfaces, against the gradient of the
+    /// signature function, with signs repaired where neighbours contradict it. A sphere has positive curvatures.
     #[default]
     Outward,
-    /// Along the gradient of the signature function.
+    /// Along the gradient of the signature function, whatever its sign; with the offset model, the opposite of `outward`.
     Gradient,
 }
 
@@ -204,7 +205,8 @@ macro_rules! request {
             #[schema(nullable = false)]
             pub kernel: Option<$crate::http::shared::Kernel>,
             /// Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-            /// of the noise regresses. 1e-10 if absent with a kernel given.
+            /// of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
+            /// the noise of the points, 1e-3 at least.
             #[serde(default, deserialize_with = "crate::http::body::present")]
             #[schema(nullable = false, minimum = 0.0)]
             pub alpha: Option<f64>,
@@ -286,7 +288,7 @@ pub enum WarningCode {
     VarianceClamped,
     /// The offset model served where the signature function could not.
     OffsetModelUsed,
-    /// Signs of normals were made consistent.
+    /// The gradient of the signature function pointed inward at some points; `outward` is the repaired side.
     OrientationRepaired,
     /// The cloud is open, so that outward has no meaning.
     OpenCloud,
@@ -356,13 +358,14 @@ pub struct Diagnostics {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DegenerateReason {
-    /// The gradient of the signature function vanishes, so that there is no normal: the entry is null.
+    /// The gradient of the signature function vanishes, and the offset model was not asked or has no answer: the entry is
+    /// null.
     VanishingGradient,
-    /// The sampling does not resolve the surface here; the number is served.
+    /// The points around the query do not confirm its curvatures; the number is served.
     UnderResolved,
-    /// The kernel's cusp is seen here; the number is served.
+    /// The kernel's cusp at the points shows in the curvatures, which may be off by factors; the number is served.
     KernelTooRough,
-    /// The query lies far from the cloud; the number is served.
+    /// The query is farther from the cloud than three spacings; the number is served.
     FarFromCloud,
     /// The offset model would cost more than is admitted; the entry is null.
     UnaffordableRescue,
@@ -375,7 +378,8 @@ pub struct Degenerate {
     pub query: usize,
     /// Why.
     pub reason: DegenerateReason,
-    /// |∇u| there, 1/length.
+    /// |∇| of the function that was asked there: 1/length for the signature function, about 1 for the offset model, 0
+    /// where that has no answer.
     #[serde(serialize_with = "finite")]
     pub gradient_norm: f64,
 }

@@ -15,4 +15,5 @@ mod protocol;
 mod refusals;
 mod routes;
 mod support;
+mod surfaces;
 mod unsolvable;

@@ -32,7 +32,7 @@ pub struct CloudRequest {
     /// The points, one row of coordinates each, all of the same length.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// Normals at the points, one row each.
+    /// Normals at the points, one row each, of any length but 0. Their side is outward.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub normals: Option<Points>,

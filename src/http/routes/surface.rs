@@ -33,7 +33,7 @@ request! {
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// Which function's level surface is meant.
+        /// Which function's level surface is meant; `auto` if absent.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
@@ -51,7 +51,7 @@ request! {
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// Which function's level surface is meant.
+        /// Which function's level surface is meant; `auto` if absent.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
@@ -71,10 +71,10 @@ pub struct NormalsResponse {
     /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
     #[schema(value_type = Vec<f64>)]
     gradient_norms: Array,
-    /// u at each query: 1 on the surface, above it inside a closed one.
+    /// The signature function at each query: 1 on the surface, usually more inside a closed one.
     #[schema(value_type = Vec<f64>)]
     levels: Array,
-    /// The function whose level surface was used at each query.
+    /// The function whose level surface was used at each query; `signature` where there is no answer.
     surfaces: Vec<SurfaceUsed>,
     /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
@@ -91,22 +91,22 @@ pub struct CurvaturesResponse {
     /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
     #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
     principal_directions: Array,
-    /// Their average at each query, 1/length.
+    /// Their average at each query, 1/length; null where there are none.
     #[schema(value_type = Vec<Option<f64>>)]
     mean_curvatures: Array,
-    /// Their product at each query, 1/length to the d − 1.
+    /// Their product at each query, 1/length to the d − 1; null where there are none.
     #[schema(value_type = Vec<Option<f64>>)]
     gaussian_curvatures: Array,
-    /// The normal at each query, of length 1.
+    /// The normal at each query, of length 1; null where there is none.
     #[schema(value_type = Vec<Option<Vec<f64>>>)]
     normals: Array,
     /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
     #[schema(value_type = Vec<f64>)]
     gradient_norms: Array,
-    /// u at each query: 1 on the surface, above it inside a closed one.
+    /// The signature function at each query: 1 on the surface, usually more inside a closed one.
     #[schema(value_type = Vec<f64>)]
     levels: Array,
-    /// The function whose level surface was used at each query.
+    /// The function whose level surface was used at each query; `signature` where there is no answer.
     surfaces: Vec<SurfaceUsed>,
     /// The queries where geometry has no meaning (null), or less accuracy than it seems.
     degenerate: Vec<Degenerate>,
@@ -117,7 +117,8 @@ pub struct CurvaturesResponse {
 /// Compute normals
 ///
 /// The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the interpolant of the
-/// constant 1. The cloud needs no mesh and no neighbourhoods.
+/// constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours and repaired; where
+/// the gradient of u vanishes, an offset model of the nearest points answers in its place.
 #[utoipa::path(
     post,
     path = "/v1/normals",
@@ -138,7 +139,9 @@ pub async fn compute_normals(
 /// Compute curvatures
 ///
 /// Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator S = σPD²uP/|∇u| of
-/// the level surface of the signature function u. A sphere of radius r has curvatures +1/r with outward normals.
+/// the level surface of the signature function u, or of an offset model of the nearest points where the gradient of u
+/// vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around a query
+/// do not confirm are flagged.
 #[utoipa::path(
     post,
     path = "/v1/curvatures",
