@@ -15,7 +15,7 @@ use crate::app::App;
 use crate::numerics::cloud::Cloud;
 use crate::numerics::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::error::NumericsError;
-use crate::numerics::geometry::{Geometry, GeometryRequest};
+use crate::numerics::geometry::{Geometry, GeometryRequest, Orientation};
 use crate::numerics::interpolant::Interpolant;
 use crate::numerics::kernel::Family;
 use crate::numerics::regularization::Regularization;
@@ -63,7 +63,7 @@ impl Fits {
         let surface = fitted.surface(&self.app, observer)?;
         let geometry =
             Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
-        Ok(SurfaceGeometry { surface, geometry })
+        Ok(SurfaceGeometry { surface, geometry, orientation: request.orientation })
     }
 }
 
@@ -71,6 +71,7 @@ impl Fits {
 pub struct SurfaceGeometry {
     pub surface: Arc<Surface>,
     pub geometry: Geometry,
+    orientation: Orientation,
 }
 
 /// A fit with its factorization.
@@ -224,15 +225,18 @@ impl SurfaceGeometry {
             _ => KERNEL_TOO_ROUGH,
         };
         let counted = [
-            (n_offset, WarningCode::OffsetModelUsed, "queries are served by the offset model"),
+            (n_offset, WarningCode::OffsetModelUsed, "served by the offset model"),
             (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
             (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, DISAGREES),
             (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
         ];
         let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
         let mut warnings: Vec<Warning> = counted
-            .map(|(count, code, what)| Warning { code, detail: format!("{count} of {m} {what}") })
+            .map(|(count, code, what)| Warning { code, detail: format!("{what} (queries: {count} of {m})") })
             .collect();
+        if self.orientation == Orientation::Gradient {
+            return warnings;
+        }
         if orientation.n_flipped > 0 {
             let detail = format!("the gradient pointed inward at {} of {n} points", orientation.n_flipped);
             warnings.push(Warning { code: WarningCode::OrientationRepaired, detail });
@@ -244,9 +248,9 @@ impl SurfaceGeometry {
     }
 }
 
-const LAPLACE_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
-const KERNEL_TOO_ROUGH: &str = "queries see the cusp of the kernel at the points; take a smoother kernel";
-const DISAGREES: &str = "queries have curvatures that their neighbours do not confirm; see degenerate";
-const FAR: &str = "queries are farther from the cloud than three spacings";
+const LAPLACE_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
+const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; take a smoother kernel";
+const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
+const FAR: &str = "farther from the cloud than three spacings";
 const OPEN_CLOUD: &str =
     "the cloud has a rim, so that outward has no meaning; the side is that of most gradients";

@@ -186,7 +186,8 @@ impl Problem {
             }
             E::KernelNotSmooth { query, .. } => {
                 let remedy = format!(
-                    "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, or query elsewhere"
+                    "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or ask for the \
+                     geometry of surface offset, which needs no gradient"
                 );
                 Self::of_field(Slug::KernelNotSmooth, Place::entry(place.queries, query), remedy)
             }

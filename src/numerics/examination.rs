@@ -156,7 +156,7 @@ impl<'a> Examination<'a> {
             };
         };
         let sign = match self.request.orientation {
-            Orientation::Gradient => -1.0,
+            Orientation::Gradient => self.surface.gradient_side(site.x, &jet.gradient),
             Orientation::Outward => 1.0,
         };
         Answer { gradient: jet.gradient, hessian: jet.hessian, sign, is_offset: true, reason: None }
@@ -170,7 +170,8 @@ impl<'a> Examination<'a> {
                 (self.jets.gradient(query).to_vec(), self.jets.hessian(query))
             }
         };
-        Answer { gradient, hessian, sign: 1.0, is_offset: false, reason: Some(reason) }
+        let is_offset = self.request.model == SurfaceModel::Offset;
+        Answer { gradient, hessian, sign: 1.0, is_offset, reason: Some(reason) }
     }
 
     /// What makes an answer doubtful.

@@ -76,9 +76,35 @@ impl Neighbours {
         self.search(cloud, x, count, f64::from_bits(1))
     }
 
-    /// Mean distance from a point to its `count` nearest points elsewhere, unit L; `None` if there are none.
+    /// The `count` nearest positions, each by its first point, nearest first: repeated observations count once.
+    pub fn nearest_positions(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
+        self.positions(cloud, x, count, 0.0)
+    }
+
+    fn positions(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64) -> Vec<Neighbour> {
+        let mut n_asked = count;
+        loop {
+            let found = self.search(cloud, x, n_asked, at_least);
+            let n_found = found.len();
+            let mut distinct: Vec<Neighbour> = Vec::with_capacity(count);
+            for next in found {
+                // Coinciding points are equally far.
+                let peers = distinct.iter().rev().take_while(|d| d.squared_distance == next.squared_distance);
+                let is_known = peers.into_iter().any(|d| cloud.point(d.point) == cloud.point(next.point));
+                if !is_known && distinct.len() < count {
+                    distinct.push(next);
+                }
+            }
+            if distinct.len() == count || n_found < n_asked {
+                return distinct;
+            }
+            n_asked *= 2;
+        }
+    }
+
+    /// Mean distance from a point to its `count` nearest positions elsewhere, unit L; `None` if there are none.
     pub fn mean_spacing(&self, cloud: &Cloud, point: usize, count: usize) -> Option<f64> {
-        let found = self.nearest_elsewhere(cloud, cloud.point(point), count);
+        let found = self.positions(cloud, cloud.point(point), count, f64::from_bits(1));
         let total: f64 = found.iter().map(|n| n.squared_distance.sqrt()).sum();
         (!found.is_empty()).then(|| total / found.len() as f64)
     }
@@ -220,6 +246,18 @@ mod tests {
         );
         assert_eq!(tree.spacings(&cloud), [3.0, 3.0, 3.0]);
         assert_eq!(tree.mean_spacing(&cloud, 2, 4), Some(3.0));
+    }
+
+    #[test]
+    fn repeated_observations_count_once() {
+        let cloud = Cloud::new(vec![0.0, 1.0, 1.0, -1.0, 1.0, 0.0, 5.0], 1).unwrap();
+        let tree = Neighbours::of(&cloud);
+        let points = |count| -> Vec<usize> {
+            tree.nearest_positions(&cloud, &[0.0], count).iter().map(|found| found.point).collect()
+        };
+        assert_eq!(points(3), [0, 1, 3]);
+        assert_eq!(points(9), [0, 1, 3, 6]);
+        assert_eq!(tree.mean_spacing(&cloud, 0, 2), Some(1.0));
     }
 
     #[test]

@@ -31,9 +31,10 @@ pub fn estimate_noise(cloud: &Cloud, neighbours: &Neighbours) -> f64 {
     let growth = 2f64.powf(6.0 / (d - 1) as f64);
     let variance_at = |point: usize| {
         let x = cloud.point(point);
-        let nearest = neighbours.nearest(cloud, x, n_large);
+        let nearest = neighbours.nearest_positions(cloud, x, n_large);
         let variance = |count: usize| {
-            let patch = Patch::of(cloud, x, nearest[..count].iter().map(|found| found.point).collect())?;
+            let nearest = nearest.get(..count)?;
+            let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point).collect())?;
             Some((patch.quadric()?.residual * patch.radius).powi(2))
         };
         Some((growth * variance(n_small)? - variance(n_large)?) / (growth - 1.0))

@@ -44,7 +44,7 @@ pub(crate) struct Patch {
 impl Patch {
     /// The `count` points nearest to x, in the frame of their principal axes; `None` if all of them are at x.
     pub(crate) fn around(cloud: &Cloud, neighbours: &Neighbours, x: &[f64], count: usize) -> Option<Self> {
-        let nearest = neighbours.nearest(cloud, x, count);
+        let nearest = neighbours.nearest_positions(cloud, x, count);
         Self::of(cloud, x, nearest.into_iter().map(|found| found.point).collect())
     }
 

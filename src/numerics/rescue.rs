@@ -24,7 +24,7 @@ const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
 pub(crate) fn rescue(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
     let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
     let mut points: Vec<usize> = Vec::with_capacity(n_patch_points(d));
-    let nearest = surface.neighbours().nearest(cloud, x, n_patch_points(d));
+    let nearest = surface.neighbours().nearest_positions(cloud, x, n_patch_points(d));
     let first = nearest.first()?;
     if first.squared_distance > (REACH_SPACINGS * surface.spacing(first.point)).powi(2) {
         return None;

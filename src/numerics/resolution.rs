@@ -109,7 +109,7 @@ impl Claim<'_> {
     fn is_predicted(&self, surface: &Surface) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
         let allowed = LEFT_OUT_MISS * self.gradient_norm * self.spacing.powi(2) * self.largest();
-        let nearest = surface.neighbours().nearest(surface.cloud(), self.x, SPACING_NEIGHBOURS);
+        let nearest = surface.neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
         nearest.iter().all(|found| misses[found.point] <= allowed)
     }
 }

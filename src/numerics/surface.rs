@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::cloud::Cloud;
 use super::defaults::median;
 use super::degeneracy::{is_rounding, is_too_rough, turns_within_spacing};
+use super::duplicates::count_duplicates;
 use super::error::NumericsError;
 use super::interpolant::Interpolant;
 use super::jets::{JetOrder, Jets};
@@ -232,7 +233,8 @@ impl Surface {
     pub(crate) fn left_out_misses(&self) -> Option<&[f64]> {
         let compute = || {
             let factor = &self.signature.factor;
-            if factor.n_points() > MAX_LEFT_OUT {
+            // A repeated observation is predicted by its copy.
+            if factor.n_points() > MAX_LEFT_OUT || count_duplicates(factor.cloud()) > 0 {
                 return None;
             }
             let diagonal = factor.inverse_diagonal()?;
@@ -280,6 +282,14 @@ impl Surface {
                 weight * dot(self.normal(found.point), gradient)
             })
             .sum();
+        if along > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Whether ∇u at the points near x goes the way of a direction, +1 or −1; −1, inward, where there is no ∇u.
+    pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64]) -> f64 {
+        let Some(jets) = &self.jets else { return -1.0 };
+        let nearest = self.neighbours.nearest_positions(self.cloud(), x, SPACING_NEIGHBOURS);
+        let along: f64 = nearest.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
         if along > 0.0 { 1.0 } else { -1.0 }
     }
 

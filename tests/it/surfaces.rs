@@ -89,7 +89,7 @@ async fn a_saddle_without_mean_curvature_is_served_by_the_offset_model() {
     assert_all_near(&numbers(&rescued["gradient_norms"]), 1.0, 0.01);
     assert_eq!(rescued["surfaces"], json!(["offset"]));
     assert_eq!(rescued["degenerate"], json!([]));
-    assert!(detail(&rescued["diagnostics"], "offset_model_used").starts_with("1 of 1 "));
+    assert!(detail(&rescued["diagnostics"], "offset_model_used").contains("1 of 1"));
 
     body["surface"] = json!("auto");
     assert_eq!(server.post("/v1/curvatures", &body).await.expect_ok(), rescued);
@@ -118,7 +118,7 @@ async fn operators_live_on_the_surface_that_was_chosen() {
     });
     let rescued = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_all_near(&numbers(&rescued["values"]), 2.0, 0.01);
-    assert!(detail(&rescued["diagnostics"]["geometry"], "offset_model_used").starts_with("1 of 1 "));
+    assert!(detail(&rescued["diagnostics"]["geometry"], "offset_model_used").contains("1 of 1"));
     body["geometry"] = json!({"surface": "signature"});
     let refused = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
     assert_eq!(refused["values"], json!([null]));
@@ -139,7 +139,7 @@ async fn the_offset_model_needs_no_derivatives_of_the_kernel() {
         assert_all_near(&cosines(&answer, &sphere), 1.0, 1e-4);
         assert_eq!(answer["surfaces"], json!(vec!["offset"; 300]));
         assert_eq!(answer["degenerate"], json!([]));
-        assert!(detail(&answer["diagnostics"], "offset_model_used").starts_with("300 of 300 "));
+        assert!(detail(&answer["diagnostics"], "offset_model_used").contains("300 of 300"));
     }
 }
 
@@ -265,7 +265,7 @@ async fn a_query_far_from_the_cloud_is_served_and_flagged() {
         let answer = server.post(path, &body).await.expect_ok();
         assert_eq!(flagged(&answer, "far_from_cloud"), [1], "{path}");
         assert_all_near(&cosines(&answer, &[[1.0, 0.0, 0.0]; 2]), 1.0, 1e-3);
-        assert!(detail(&answer["diagnostics"], "far_from_cloud").starts_with("1 of 2 "), "{path}");
+        assert!(detail(&answer["diagnostics"], "far_from_cloud").contains("1 of 2"), "{path}");
     }
     let mut body = body.clone();
     body["values"] = json!(sphere.iter().map(|x| x[2]).collect::<Vec<_>>());
@@ -289,7 +289,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
     assert_eq!(numbers(&narrow["principal_curvatures"]).len(), 80);
     // Off by a fifth at least: the flag is deserved.
     assert!(numbers(&narrow["mean_curvatures"]).iter().all(|&mean| mean > 1.2));
-    assert!(detail(&narrow["diagnostics"], "disagrees_with_neighbours").starts_with("40 of 40 "));
+    assert!(detail(&narrow["diagnostics"], "disagrees_with_neighbours").contains("40 of 40"));
 
     let request = |path: &str| {
         let mut body = body.clone();
@@ -302,7 +302,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
         let answer = server.post(path, &request(path)).await.expect_ok();
         assert_eq!(flagged(&answer, "under_resolved"), everything, "{path}");
         let geometry = &answer["diagnostics"]["geometry"];
-        assert!(detail(geometry, "disagrees_with_neighbours").starts_with("40 of 40 "), "{path}");
+        assert!(detail(geometry, "disagrees_with_neighbours").contains("40 of 40"), "{path}");
         let member = match path {
             "/v1/surface-gradient" => "gradients",
             _ if path.ends_with("matrix") => "matrix",

@@ -9,7 +9,7 @@ use crate::http::fit::Planner;
 use crate::http::fitted::{Fits, SurfaceGeometry};
 use crate::http::operation::Plan;
 use crate::http::problem::Problem;
-use crate::http::shared::{Diagnostics, Fit, Geometry};
+use crate::http::shared::{Diagnostics, Fit, Geometry, OrientationChoice};
 use crate::numerics::cloud::Cloud;
 use crate::numerics::geometry::GeometryRequest;
 
@@ -96,5 +96,6 @@ pub fn plan_matrix(
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
 fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
-    geometry_request(geometry.as_ref().and_then(|geometry| geometry.surface), None, true)
+    let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
+    geometry_request(surface, Some(OrientationChoice::Gradient), true)
 }

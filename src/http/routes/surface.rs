@@ -246,8 +246,8 @@ fn plan(
 /// What the offset model costs at one query, in flops of a large factorization: 0.12 ms of one core.
 const FLOPS_PER_OFFSET: f64 = 1e7;
 
-/// Queries at which one request may ask the offset model: as much work as a factorization of 14,000 points.
-const MAX_OFFSETS: usize = 100_000;
+/// Queries at which one request may ask the offset model: as much work as a factorization of 8,500 points.
+const MAX_OFFSETS: usize = 20_000;
 
 /// What a request asks of the geometry of its surface.
 pub(super) fn geometry_request(
