@@ -73,31 +73,30 @@ impl<'a> Examination<'a> {
     /// [`NumericsError::Cancelled`].
     pub(crate) fn answers(&self, observer: &dyn Observer) -> Result<Vec<Answer>, NumericsError> {
         observer.enter(Stage::Evaluate);
-        let m = self.queries.n_points();
-        let needs_offset = |query| {
-            observer.checkpoint()?;
-            Ok(match self.request.model {
-                SurfaceModel::Signature => false,
-                SurfaceModel::Offset => true,
-                SurfaceModel::Auto => {
-                    let site = self.site(query);
-                    self.vanishes(query, &site) || self.is_weak(query, &site)
-                }
-            })
-        };
-        let needs_offset: Vec<bool> =
-            (0..m).into_par_iter().map(needs_offset).collect::<Result<_, NumericsError>>()?;
-        let last_affordable =
-            (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
-        let answer = |query: usize| {
+        let survey = |query| {
             observer.checkpoint()?;
             let site = self.site(query);
-            let mut answer = match needs_offset[query] {
-                true if query >= last_affordable => self.null(query, DegeneracyReason::UnaffordableRescue),
-                true => self.of_offset(query, &site),
-                false => self.of_signature(query, &site),
+            let needs_offset = match self.request.model {
+                SurfaceModel::Signature => false,
+                SurfaceModel::Offset => true,
+                SurfaceModel::Auto => self.vanishes(query, &site) || self.is_weak(query, &site),
             };
-            answer.reason = answer.reason.or_else(|| self.flag(&answer, &site));
+            Ok((site, needs_offset))
+        };
+        let m = self.queries.n_points();
+        let sites: Vec<(Site<'_>, bool)> =
+            (0..m).into_par_iter().map(survey).collect::<Result<_, NumericsError>>()?;
+        let first_unaffordable =
+            (0..m).filter(|&query| sites[query].1).nth(self.request.max_offsets).unwrap_or(m);
+        let answer = |query: usize| {
+            observer.checkpoint()?;
+            let (site, needs_offset) = &sites[query];
+            let mut answer = match (*needs_offset, query < first_unaffordable) {
+                (true, true) => self.of_offset(query, site),
+                (true, false) => self.without_offset(query, site, DegeneracyReason::UnaffordableRescue),
+                (false, _) => self.of_signature(query, site),
+            };
+            answer.reason = answer.reason.or_else(|| self.flag(&answer, site));
             Ok(answer)
         };
         (0..m).into_par_iter().map(answer).collect()
@@ -147,19 +146,24 @@ impl<'a> Examination<'a> {
         Answer { gradient, hessian: self.jets.hessian(query), sign, is_offset: false, reason: None }
     }
 
-    /// The offset model, whose gradient points outward; where it has no answer, what else there is.
+    /// The offset model, whose gradient points outward.
     fn of_offset(&self, query: usize, site: &Site<'_>) -> Answer {
         let Some(jet) = rescue(self.surface, site.x) else {
-            return match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
-                true => self.of_signature(query, site),
-                false => self.null(query, DegeneracyReason::VanishingGradient),
-            };
+            return self.without_offset(query, site, DegeneracyReason::VanishingGradient);
         };
         let sign = match self.request.orientation {
             Orientation::Gradient => self.surface.gradient_side(site.x, &jet.gradient),
             Orientation::Outward => 1.0,
         };
         Answer { gradient: jet.gradient, hessian: jet.hessian, sign, is_offset: true, reason: None }
+    }
+
+    /// What there is without the offset model: a weak gradient is better than nothing.
+    fn without_offset(&self, query: usize, site: &Site<'_>, reason: DegeneracyReason) -> Answer {
+        match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
+            true => self.of_signature(query, site),
+            false => self.null(query, reason),
+        }
     }
 
     fn null(&self, query: usize, reason: DegeneracyReason) -> Answer {

@@ -1,7 +1,8 @@
 //! Surfaces without mean curvature, and open ones: the signature function has no gradient there, the offset model has.
 
 use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
+use gramian::numerics::degeneracy::DegeneracyReason;
+use gramian::numerics::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
 
@@ -125,5 +126,37 @@ fn rescued_answers_scale_and_move_with_the_cloud() {
             }
             assert!(geometry.degenerate().is_empty(), "scale {scale}, shift {shift}");
         }
+    }
+}
+
+#[test]
+fn beyond_the_admitted_work_answers_are_null() {
+    let cloud = flat_square(12, None);
+    let surface = surface_of(&cloud, Family::Gauss, 1.0);
+    let geometry = geometry(&surface, &GeometryRequest { max_offsets: 10, ..CURVATURES });
+    assert!(geometry.is_null().iter().enumerate().all(|(query, &is_null)| is_null == (query >= 10)));
+    let reasons: Vec<DegeneracyReason> = geometry.degenerate().iter().map(|entry| entry.reason).collect();
+    assert_eq!(reasons, [DegeneracyReason::UnaffordableRescue; 134]);
+}
+
+/// The gradient of the signature function points inward, whichever function answers.
+#[test]
+fn the_gradient_side_of_the_offset_model_is_that_of_the_signature_function() {
+    let cloud = half_sphere(300);
+    let surface = surface_of(&cloud, Family::Laplace { epsilon: 1.0 }, 0.7);
+    for model in [SurfaceModel::Signature, SurfaceModel::Auto, SurfaceModel::Offset] {
+        let request = GeometryRequest { orientation: Orientation::Gradient, model, ..CURVATURES };
+        let geometry = geometry(&surface, &request);
+        let inward =
+            cosines(&geometry, &cloud.normals).iter().flatten().filter(|&&cosine| cosine < -0.9).count();
+        let answered = geometry.is_null().iter().filter(|&&is_null| !is_null).count();
+        assert!(inward == answered && answered > 290, "{model:?}: {inward} of {answered}");
+        let principal = geometry.curvatures(&Unobserved).unwrap().principal;
+        let flagged: Vec<usize> = geometry.degenerate().iter().map(|entry| entry.query).collect();
+        let unflagged = (0..300).filter(|query| !flagged.contains(query));
+        for query in unflagged {
+            assert!(principal[query * 2..][..2].iter().all(|k| (k + 1.0).abs() < 0.3), "{model:?}, {query}");
+        }
+        assert!(flagged.len() < 60, "{model:?}: {} flagged", flagged.len());
     }
 }
