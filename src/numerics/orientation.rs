@@ -21,6 +21,9 @@ const SAME_REGION: f64 = 0.7;
 /// torus of 24 points 0.06.
 const RESOLVED: f64 = 0.2;
 
+/// Factor by which the volume may shrink.
+const LOST_VOLUME: f64 = 1.05;
+
 /// Share of the edges, by weight, that may contradict repaired signs.
 const CONTRADICTION: f64 = 0.1;
 
@@ -47,6 +50,8 @@ pub(crate) struct Signs {
     pub n_flipped: usize,
     /// Whether a connected piece has a rim, so that it has no outside.
     pub is_open: bool,
+    /// Whether neighbours have so much to do with one another that their signs can be compared.
+    pub is_resolved: bool,
 }
 
 /// Makes the signs of normals consistent.
@@ -77,13 +82,17 @@ pub(crate) fn consistent_signs(cloud: &Cloud, neighbours: &Neighbours, direction
         let sign = piece.sign(has_rim);
         is_open |= has_rim;
         piece.points.iter().for_each(|&point| signs[point] *= sign);
+        if !has_rim && piece.loses_volume() {
+            piece.points.iter().filter(|&&p| directions.has_sign[p]).for_each(|&p| signs[p] = 1.0);
+        }
     }
     let mean_weight = edges.iter().map(|edge| edge.weight).sum::<f64>() / (n * n_neighbours(cloud)) as f64;
-    if mean_weight < RESOLVED || contradiction(&edges, &signs) > CONTRADICTION {
+    let is_resolved = mean_weight >= RESOLVED;
+    if !is_resolved || contradiction(&edges, &signs) > CONTRADICTION {
         (0..n).filter(|&point| directions.has_sign[point]).for_each(|point| signs[point] = 1.0);
     }
     let n_flipped = (0..n).filter(|&point| directions.has_sign[point] && signs[point] < 0.0).count();
-    Signs { signs, n_flipped, is_open }
+    Signs { signs, n_flipped, is_open, is_resolved }
 }
 
 /// Neighbours that a point shares edges with.
@@ -173,14 +182,23 @@ impl Piece<'_> {
         let signed = || self.points.iter().filter(|&&point| self.directions.has_sign[point]);
         let total: f64 = signed().map(|&point| self.area(point)).sum();
         let vote: f64 = signed().map(|&point| self.relative[point] * self.area(point)).sum();
-        let volume = self.volume();
+        let volume = self.volume(|point| self.relative[point]);
         let decides_itself = has_rim || vote.abs() >= (2.0 * UNANIMITY - 1.0) * total;
         let decisive = if total > 0.0 && decides_itself || volume == 0.0 { vote } else { volume };
         if decisive < 0.0 { -1.0 } else { 1.0 }
     }
 
-    /// `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem, in units of its largest possible value.
-    fn volume(&self) -> f64 {
+    /// Whether consistent signs enclose less than the gradients do by themselves: separate surfaces that nearly touch, each of
+    /// them right, were taken for one. Curves cross their own inside too often for this to tell.
+    fn loses_volume(&self) -> bool {
+        let signed = |sign: f64, point: usize| if self.directions.has_sign[point] { sign } else { 0.0 };
+        let by_gradients = self.volume(|point| signed(1.0, point)).abs();
+        let repaired = self.volume(|point| signed(self.relative[point], point)).abs();
+        self.cloud.dimension() > 2 && by_gradients > LOST_VOLUME * repaired
+    }
+
+    /// `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem.
+    fn volume(&self, sign: impl Fn(usize) -> f64) -> f64 {
         let d = self.cloud.dimension();
         let mut centre = vec![0.0; d];
         let total: f64 = self.points.iter().map(|&point| self.area(point)).sum();
@@ -191,7 +209,7 @@ impl Piece<'_> {
         let of_point = |&point: &usize| {
             let normal = &self.directions.normals[point * d..][..d];
             let arm = self.cloud.point(point).iter().zip(&centre).map(|(x, c)| x - c);
-            self.relative[point] * self.area(point) * arm.zip(normal).map(|(a, n)| a * n).sum::<f64>()
+            sign(point) * self.area(point) * arm.zip(normal).map(|(a, n)| a * n).sum::<f64>()
         };
         self.points.iter().map(of_point).sum()
     }

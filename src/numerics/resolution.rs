@@ -17,7 +17,11 @@ const CONFIRMED_BY_QUADRIC: f64 = 0.07;
 const CONFIRMED_BY_PATCH: f64 = 0.10;
 
 /// The same for answers of the patch itself: the quadric is the coarser of the two.
-const CONFIRMED_OFFSET: f64 = 0.30;
+const CONFIRMED_OFFSET: f64 = 0.20;
+
+/// Standard error of the curvatures of the quadric, against the largest curvature, beyond which nothing is confirmed: quadric and
+/// patch follow the same noise, and agree by chance.
+const NOISY: f64 = 0.1;
 
 /// Curvature times radius below which the quartic terms that a quadric leaves out are small: `(κr)²/4` of a sphere's curvature.
 const QUADRIC_BEND: f64 = 0.6;
@@ -27,6 +31,9 @@ const FLAT: f64 = 0.1;
 
 /// Angle by which the normal may turn from one point to the next for neighbours to show the surface at all.
 const RESOLVED_TURN: f64 = 0.8;
+
+/// The same for leaving points out, whose criterion would be met by curvatures that are large and wrong.
+const PREDICTED_TURN: f64 = 1.2;
 
 /// T3: the level surface may miss a point that was left out by this fraction of `h_q² κ`.
 const LEFT_OUT_MISS: f64 = 0.01;
@@ -50,27 +57,31 @@ pub(crate) struct Claim<'a> {
 impl Claim<'_> {
     /// Whether the points around x confirm the curvatures.
     pub(crate) fn is_confirmed(&self, surface: &Surface) -> bool {
+        let is_noisy = self.is_noisy(surface);
         if self.is_offset {
             let difference = self.difference_from_quadric(surface);
-            return self.is_free_of_noise(surface) && difference.is_some_and(|d| d <= CONFIRMED_OFFSET);
+            return !is_noisy && difference.is_some_and(|difference| difference <= CONFIRMED_OFFSET);
         }
         let turn = self.largest() * self.spacing;
-        if turn <= RESOLVED_TURN && self.is_confirmed_by_quadric(surface) {
+        let may_be_seen = turn <= RESOLVED_TURN && !is_noisy;
+        if may_be_seen && self.is_confirmed_by_quadric(surface) {
             return true;
         }
         if !self.may_use_patch {
             return false;
         }
+        // Leaving points out needs no gate against noise: it does not predict noise.
         match self.is_confirmed_by_patch(surface) {
-            Some(is_confirmed) => turn <= RESOLVED_TURN && is_confirmed,
-            None => self.is_predicted(surface),
+            Some(is_confirmed) => is_confirmed && may_be_seen,
+            None => turn <= PREDICTED_TURN && self.is_predicted(surface),
         }
     }
 
-    /// Whether noise is too small to make up the curvatures: quadric and patch would both follow it.
-    fn is_free_of_noise(&self, surface: &Surface) -> bool {
-        let scale = self.largest().max(FLAT / surface.radius());
-        self.fit.is_some_and(|fit| fit.uncertainty <= CONFIRMED_OFFSET * scale)
+    /// Whether what the quadric leaves, taken for noise, makes up a tenth of the curvatures. A flat cloud counts as curved by half
+    /// of one over its radius.
+    fn is_noisy(&self, surface: &Surface) -> bool {
+        let scale = self.largest().max(0.5 / surface.radius());
+        self.fit.is_some_and(|fit| fit.uncertainty > NOISY * scale)
     }
 
     fn largest(&self) -> f64 {
@@ -107,9 +118,15 @@ impl Claim<'_> {
     /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ 0.01 |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
     /// that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &Surface) -> bool {
+        let nearest = surface.neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
+        // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
+        let is_at_point =
+            nearest.first().is_some_and(|found| found.squared_distance <= (0.5 * self.spacing).powi(2));
+        if !is_at_point || self.fit.is_some_and(|fit| fit.is_at_rim && fit.is_reliable()) {
+            return false;
+        }
         let Some(misses) = surface.left_out_misses() else { return false };
         let allowed = LEFT_OUT_MISS * self.gradient_norm * self.spacing.powi(2) * self.largest();
-        let nearest = surface.neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
         nearest.iter().all(|found| misses[found.point] <= allowed)
     }
 }

@@ -44,6 +44,7 @@ pub struct Surface {
     orientation: SurfaceOrientation,
     is_too_rough: bool,
     radius: f64,
+    has_consistent_signs: bool,
     left_out_misses: OnceLock<Option<Vec<f64>>>,
 }
 
@@ -101,6 +102,7 @@ impl Surface {
             orientation,
             is_too_rough,
             radius,
+            has_consistent_signs: false,
             left_out_misses,
         };
         this.orient(given, observer)?;
@@ -117,6 +119,7 @@ impl Surface {
         }
         let found = consistent_signs(cloud, &self.neighbours, &directions);
         self.orientation.is_open = found.is_open;
+        self.has_consistent_signs = found.is_resolved;
         self.normals = directions.normals;
         if given.is_none() {
             self.orientation.n_flipped = found.n_flipped;
@@ -268,9 +271,10 @@ impl Surface {
         self.fits[point].as_ref()
     }
 
-    /// The sign that turns ∇u at x into an outward direction: −1 unless signs of the points near x were repaired or given.
+    /// The sign that turns ∇u at x into an outward direction: that of the points near x (a narrow kernel makes u a ridge, and −∇u
+    /// points inward just inside), −1 on clouds that do not resolve their surface.
     pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64]) -> f64 {
-        if self.orientation.n_flipped == 0 && !self.orientation.is_given {
+        if !self.has_consistent_signs && !self.orientation.is_given {
             return -1.0;
         }
         let nearest = self.neighbours.nearest(self.cloud(), x, SPACING_NEIGHBOURS);
