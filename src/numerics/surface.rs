@@ -15,7 +15,7 @@ use super::neighbours::Neighbours;
 use super::observer::Observer;
 use super::orientation::{Directions, consistent_signs};
 use super::patch::{LocalFit, Patch, n_quadric_neighbours};
-use super::vector::{dot, norm};
+use super::vector::{dot, norm, unit};
 
 /// Neighbours that define the sampling distance.
 pub(crate) const SPACING_NEIGHBOURS: usize = 4;
@@ -114,7 +114,6 @@ impl Surface {
         let (cloud, d) = (factor.cloud(), factor.cloud().dimension());
         let mut directions = self.directions(observer)?;
         if let Some(given) = given {
-            let unit = |v: &[f64]| v.iter().map(|c| c / norm(v)).collect::<Vec<f64>>();
             directions.normals = given.points().flat_map(unit).collect();
         }
         let found = consistent_signs(cloud, &self.neighbours, &directions);

@@ -8,6 +8,18 @@ pub(crate) fn norm(v: &[f64]) -> f64 {
     dot(v, v).sqrt()
 }
 
+/// The vector of length 1 in the same direction; zero for zero. Components are scaled first, so that none is lost to the range
+/// of float64.
+pub(crate) fn unit(v: &[f64]) -> Vec<f64> {
+    let largest = v.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
+    if largest == 0.0 {
+        return v.to_vec();
+    }
+    let scaled: Vec<f64> = v.iter().map(|c| c / largest).collect();
+    let length = norm(&scaled);
+    scaled.iter().map(|c| c / length).collect()
+}
+
 /// An orthonormal basis of ν's complement: the other columns of the Householder reflection that maps ν to ±e₁.
 pub(crate) fn tangent_basis(normal: &[f64]) -> Vec<Vec<f64>> {
     let d = normal.len();
@@ -24,6 +36,16 @@ pub(crate) fn tangent_basis(normal: &[f64]) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unit_vectors_have_length_one_at_any_size() {
+        for size in [1e-250, 1e-3, 1.0, 1e100] {
+            let found = unit(&[3.0 * size, 0.0, -4.0 * size]);
+            assert!((found[0] - 0.6).abs() < 1e-15 && (found[2] + 0.8).abs() < 1e-15, "{size}: {found:?}");
+        }
+        // Normals of merged points may cancel.
+        assert_eq!(unit(&[0.0, 0.0]), [0.0, 0.0]);
+    }
 
     #[test]
     fn tangent_bases_are_orthonormal_for_every_normal() {

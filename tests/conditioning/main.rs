@@ -3,6 +3,9 @@
 //! Through the public API of the numerics alone. Clouds and random numbers are seeded; every tolerance says where it comes
 //! from.
 
+#[path = "../common/random.rs"]
+mod random;
+
 mod cliff;
 mod hard;
 mod noise;

@@ -14,6 +14,8 @@ use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::surface::Surface;
 
+pub use crate::random::Random;
+
 pub const EPS: f64 = f64::EPSILON;
 
 /// One kernel of every smoothness, from a kink to analytic.
@@ -74,18 +76,7 @@ pub fn jets(u: &Interpolant, queries: &Cloud) -> [Vec<f64>; 3] {
     ]
 }
 
-/// Uniform random numbers in [0, 1) (SplitMix64, Steele et al. 2014).
-pub struct Random(pub u64);
-
 impl Random {
-    pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
     /// A point of the unit sphere.
     pub fn on_sphere(&mut self) -> [f64; 3] {
         let (z, angle) = (2.0 * self.uniform() - 1.0, 2.0 * PI * self.uniform());

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::shapes::Random;
+use super::random::Random;
 
 /// A cloud with its outward unit normals.
 pub struct Oriented {
@@ -105,7 +105,7 @@ pub fn flat_square(side: usize, random: Option<&mut Random>) -> Oriented {
     let grid = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
     let mut coordinates: Vec<[f64; 2]> = (0..side * side).map(|i| [grid(i % side), grid(i / side)]).collect();
     if let Some(random) = random {
-        coordinates.fill_with(|| [2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0]);
+        coordinates.fill_with(|| [2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0]);
     }
     Oriented::new(
         coordinates.into_iter().map(|[a, b]| ([0, 1, 2].map(|c| a * u[c] + b * v[c] + 0.3), normal)),

@@ -7,7 +7,7 @@ use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
 
 use super::clouds::{Oriented, cylinder, flat_square, graph, half_sphere};
-use super::shapes::Random;
+use super::random::Random;
 use super::support::{cosines, geometry, n_wrong, surface, surface_of};
 
 const CURVATURES: GeometryRequest = GeometryRequest::CURVATURES;

@@ -1,5 +1,8 @@
 //! Where geometry is doubtful: right, or flagged.
 
+#[path = "../common/random.rs"]
+mod random;
+
 mod clouds;
 mod flat;
 mod orientation;

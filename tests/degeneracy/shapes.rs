@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use super::random::Random;
+
 /// A surface given by its implicit function, positive outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
@@ -21,19 +23,6 @@ pub const SHAPES: [Shape; 5] = [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, S
 const AXES: [f64; 3] = [1.0, 0.7, 0.5];
 const TUBE: f64 = 0.4;
 
-/// Uniform numbers in [0, 1), the same for the same seed (SplitMix64, Steele et al. 2014).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 impl Shape {
     /// n points, at random or regular: Fibonacci lattices, and a grid of the next smaller square number.
     pub fn sample(self, n: usize, random: Option<&mut Random>) -> Vec<[f64; 3]> {
@@ -43,9 +32,9 @@ impl Shape {
                 let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
                 (0..side * side).map(|i| self.over(at(i % side), at(i / side))).collect()
             }
-            (Self::Saddle | Self::Plane, Some(random)) => {
-                (0..n).map(|_| self.over(2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0)).collect()
-            }
+            (Self::Saddle | Self::Plane, Some(random)) => (0..n)
+                .map(|_| self.over(2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0))
+                .collect(),
             (Self::Torus, None) => (0..n)
                 .map(|i| {
                     let share = (i as f64 + 0.5) / n as f64;
@@ -53,14 +42,14 @@ impl Shape {
                 })
                 .collect(),
             (Self::Torus, Some(random)) => {
-                (0..n).map(|_| on_torus(random.next(), angle_of_share(random.next()))).collect()
+                (0..n).map(|_| on_torus(random.uniform(), angle_of_share(random.uniform()))).collect()
             }
             (Self::Sphere | Self::Ellipsoid, random) => {
                 let mut random = random;
                 (0..n)
                     .map(|i| match &mut random {
                         None => (1.0 - (2 * i + 1) as f64 / n as f64, PI * (1.0 + 5f64.sqrt()) * i as f64),
-                        Some(random) => (2.0 * random.next() - 1.0, 2.0 * PI * random.next()),
+                        Some(random) => (2.0 * random.uniform() - 1.0, 2.0 * PI * random.uniform()),
                     })
                     .map(|(z, t)| {
                         let r = (1.0 - z * z).sqrt();

@@ -12,7 +12,8 @@ use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::surface::Surface;
 
-use super::shapes::{Random, Shape};
+use super::random::Random;
+use super::shapes::Shape;
 
 /// Seven kernels, each with the length scale at which it is about as wide as the Gauss kernel at 1.
 pub const KERNELS: [(&str, Family, f64); 7] = [

@@ -3,6 +3,9 @@
 //! Patrick Guidotti, "Geometric Kernel Interpolation and Regression", section "Numerical Experiments", with the corrected
 //! formulas of docs/errata.md. Seeds are fixed; what the paper draws at random once is drawn 20 times here.
 
+#[path = "../common/random.rs"]
+mod uniform;
+
 pub mod ellipsoid;
 pub mod half_ellipse;
 pub mod inflections;

@@ -2,22 +2,12 @@
 
 use std::f64::consts::TAU;
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
-pub struct Random(u64);
+pub use super::uniform::Random;
 
 impl Random {
     /// Far apart for neighbouring seeds.
     pub fn of_seed(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xd134_2543_de82_ef95))
-    }
-
-    /// In [0, 1).
-    pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// In [0, 2π).

@@ -1,5 +1,8 @@
 //! Clouds that nobody prepared, with no parameters: kernel, length scale, epsilon and alpha are the service's choice.
 
+#[path = "../common/random.rs"]
+mod random;
+
 mod bunny;
 mod curvatures;
 mod support;

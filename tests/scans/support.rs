@@ -13,6 +13,8 @@ use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::surface::Surface;
 
+pub use crate::random::Random;
+
 /// The factorization for a purpose with nothing chosen by the client.
 pub fn factor(cloud: &Arc<Cloud>, purpose: Purpose) -> Arc<GramFactor> {
     let neighbours = Neighbours::of(cloud);
@@ -32,19 +34,8 @@ pub fn geometry(cloud: &Arc<Cloud>, purpose: Purpose) -> (Surface, Geometry) {
     (surface, geometry)
 }
 
-/// Uniform and normal random numbers, the same for the same seed (SplitMix64, Steele et al. 2014).
-pub struct Random(pub u64);
-
 impl Random {
-    pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Box and Muller (1958).
+    /// Standard normal (Box and Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
