@@ -173,8 +173,9 @@ pub enum FactorFailure {
 
 async fn factorize(app: Arc<App>, plan: FitPlan) -> Result<StoredFactor, FactorFailure> {
     let flops = GramFactor::flops_needed(plan.fitted.n_points());
+    let spare = app.factors.spare().clone();
     let job = move |observer: &JobObserver| {
-        GramFactor::factorize(plan.fitted, plan.kernel, plan.regularization, observer)
+        GramFactor::factorize_with(&spare, plan.fitted, plan.kernel, plan.regularization, observer)
     };
     let (outcome, times) = app.compute.run(flops, job).await.map_err(FactorFailure::Broken)?;
     let factor = outcome.map_err(FactorFailure::Refused)?;

@@ -11,6 +11,9 @@ use crate::numerics::error::{NotDefinite, NumericsError};
 /// Points listed in `point_indices` at most: enough to find the pattern, and bounded.
 const MAX_POINT_INDICES: usize = 1000;
 
+/// When to come back after an allocation failed: factorizations under way have ended by then.
+const RETRY_AFTER_MEMORY_SECONDS: u64 = 60;
+
 /// What went wrong, where, and what to do about it.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -219,6 +222,12 @@ impl Problem {
             }
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
+            }
+            E::OutOfMemory { .. } => {
+                let mut problem =
+                    Self::new(Slug::Overloaded, format!("{detail}; try again when less is computed"));
+                problem.members.retry_after_seconds = Some(RETRY_AFTER_MEMORY_SECONDS);
+                problem
             }
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
             // Whoever cancelled is gone and reads nothing; the deadline has its own answer.

@@ -42,6 +42,8 @@ pub enum NumericsError {
     Overflow { query: usize },
     #[error("the weights are outside the range of float64")]
     WeightsOverflow,
+    #[error("{n_bytes} bytes of memory are not to be had")]
+    OutOfMemory { n_bytes: usize },
     #[error("the computation was cancelled")]
     Cancelled,
 }

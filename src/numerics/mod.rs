@@ -12,6 +12,7 @@ pub mod geometry;
 pub mod interpolant;
 pub mod jets;
 pub mod kernel;
+pub mod memory;
 pub mod neighbours;
 pub mod noise;
 pub mod observer;

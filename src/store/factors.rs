@@ -8,11 +8,15 @@ use moka::sync::Cache;
 use super::key::{CloudId, FactorKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
 use super::{Owner, bounded_cache};
+use crate::numerics::memory::SpareBuffer;
 use crate::numerics::solver::{GramFactor, Solution};
 use crate::numerics::surface::Surface;
 
 /// The share of the cache that weights may take: they are n numbers beside the n² of a factor.
 const WEIGHTS_SHARE: u64 = 16;
+
+/// The share of the cache's budget, beside it, up to which the memory of a factor that was let go is kept for the next one.
+const SPARE_SHARE: u64 = 8;
 
 /// A factorization with the surface of its cloud, once that was asked for, and the time it took.
 pub struct StoredFactor {
@@ -63,6 +67,7 @@ pub struct FactorStore<E> {
     solutions: Cache<(FactorKey, ValuesKey), Arc<Solution>>,
     flights: SingleFlight<FactorKey, (Arc<StoredFactor>, bool), E>,
     max_factor_bytes: u64,
+    spare: Arc<SpareBuffer>,
 }
 
 impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
@@ -74,7 +79,13 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
             solutions: bounded_cache(max_solution_bytes, |s: &Arc<Solution>| s.n_bytes() + 256).build(),
             flights: SingleFlight::new(),
             max_factor_bytes,
+            spare: SpareBuffer::up_to(usize::try_from(max_bytes / SPARE_SHARE).unwrap_or(usize::MAX)),
         }
+    }
+
+    /// The memory of factors that were let go.
+    pub fn spare(&self) -> &Arc<SpareBuffer> {
+        &self.spare
     }
 
     /// Returns the factor of `key`, computing it at most once however many ask, and where it came from.

@@ -1,5 +1,7 @@
 //! Cholesky factorization in place: one n×n buffer, one triangle of it used.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -9,7 +11,9 @@ use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 
 use super::parallelism;
+use super::substitution::LowerTriangle;
 use crate::numerics::error::NumericsError;
+use crate::numerics::memory::{Buffer, SpareBuffer};
 use crate::numerics::observer::Observer;
 
 /// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
@@ -20,7 +24,7 @@ const LEAF_SIZE: usize = 512;
 
 /// A lower triangle, column by column, of `K + αI` first and of its factor L after [`Cholesky::factorize`].
 pub(super) struct Cholesky {
-    buffer: Vec<f64>,
+    buffer: Buffer,
     n: usize,
     stride: usize,
 }
@@ -33,10 +37,13 @@ impl Cholesky {
         if stride.is_multiple_of(512) { stride + 8 } else { stride }
     }
 
-    /// A buffer of zeros; its pages are mapped as they are written, so that with small pages the upper triangle costs nothing.
-    pub(super) fn allocate(n: usize) -> Self {
+    /// A matrix whose entries are still to be written.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfMemory`].
+    pub(super) fn allocate(n: usize, spare: &Arc<SpareBuffer>) -> Result<Self, NumericsError> {
         let stride = Self::stride_for(n);
-        Self { buffer: vec![0.0; n * stride], n, stride }
+        Ok(Self { buffer: spare.take(n.saturating_mul(stride))?, n, stride })
     }
 
     pub(super) fn stride(&self) -> usize {
@@ -48,7 +55,7 @@ impl Cholesky {
     }
 
     pub(super) fn n_bytes(&self) -> usize {
-        size_of_val(self.buffer.as_slice())
+        self.buffer.n_bytes()
     }
 
     fn lower(&self) -> MatRef<'_, f64> {
@@ -89,18 +96,37 @@ impl Cholesky {
     ) -> Result<Result<Self, usize>, NumericsError> {
         let a =
             MatMut::from_column_major_slice_with_stride_mut(&mut self.buffer, self.n, self.n, self.stride);
-        Ok(factorize_in_place(a, floor, observer)?.map(|()| self))
+        match factorize_in_place(a, floor, observer)? {
+            Ok(()) => Ok(Ok(self)),
+            Err(point) => {
+                // What comes next needs as much memory as this has.
+                self.buffer.discard();
+                Ok(Err(point))
+            }
+        }
+    }
+
+    fn triangle(&self) -> LowerTriangle<'_> {
+        LowerTriangle { columns: &self.buffer, n: self.n, stride: self.stride }
     }
 
     /// `rhs ← (LLᵀ)⁻¹ rhs`.
     pub(super) fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
+        if let Some(x) = only_column(rhs.rb_mut()) {
+            self.triangle().solve_forward(x);
+            self.triangle().solve_backward(x);
+            return;
+        }
         let par = parallelism((self.n * self.n * rhs.ncols()) as f64);
         solve_lower_triangular_in_place(self.lower(), rhs.rb_mut(), par);
         solve_upper_triangular_in_place(self.lower().transpose(), rhs, par);
     }
 
     /// `rhs ← L⁻¹ rhs`.
-    pub(super) fn whiten_in_place(&self, rhs: MatMut<'_, f64>) {
+    pub(super) fn whiten_in_place(&self, mut rhs: MatMut<'_, f64>) {
+        if let Some(x) = only_column(rhs.rb_mut()) {
+            return self.triangle().solve_forward(x);
+        }
         let par = parallelism((self.n * self.n * rhs.ncols()) as f64);
         solve_lower_triangular_in_place(self.lower(), rhs, par);
     }
@@ -109,6 +135,14 @@ impl Cholesky {
     pub(super) fn log_determinant(&self) -> f64 {
         (0..self.n).map(|i| 2.0 * self.buffer[i * self.stride + i].ln()).sum()
     }
+}
+
+/// The column of a matrix that has one.
+fn only_column(rhs: MatMut<'_, f64>) -> Option<&mut [f64]> {
+    if rhs.ncols() != 1 {
+        return None;
+    }
+    rhs.col_mut(0).try_as_col_major_mut().map(faer::ColMut::as_slice_mut)
 }
 
 /// Overwrites the lower triangle of A by that of L, `A = LLᵀ`. The inner error is the first index whose pivot `L_ii²` is not

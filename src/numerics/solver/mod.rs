@@ -5,6 +5,7 @@ mod condition;
 mod pivoted_cholesky;
 mod pivoting;
 mod solution;
+mod substitution;
 
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use super::duplicates::coinciding_points;
 use super::error::{NotDefinite, NumericsError};
 use super::gram::fill_lower_gram;
 use super::kernel::Kernel;
+use super::memory::SpareBuffer;
 use super::observer::{Observer, Stage};
 use super::regularization::Regularization;
 pub use solution::Solution;
@@ -70,8 +72,23 @@ impl GramFactor {
     /// # Errors
     /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension, [`NumericsError::LengthMismatch`] of noise
     /// variances, [`NumericsError::DuplicatePoints`] where two coinciding points have no regularization,
-    /// [`NumericsError::Cancelled`].
+    /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
     pub fn factorize(
+        cloud: Arc<Cloud>,
+        kernel: Kernel,
+        regularization: Regularization,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        Self::factorize_with(&SpareBuffer::up_to(0), cloud, kernel, regularization, observer)
+    }
+
+    /// [`GramFactor::factorize`] in the memory of an earlier factorization, if one was given back; this one's is when it is
+    /// dropped.
+    ///
+    /// # Errors
+    /// Those of [`GramFactor::factorize`].
+    pub fn factorize_with(
+        spare: &Arc<SpareBuffer>,
         cloud: Arc<Cloud>,
         kernel: Kernel,
         regularization: Regularization,
@@ -84,7 +101,7 @@ impl GramFactor {
             return Err(NumericsError::DuplicatePoints { points: twins });
         }
         observer.enter(Stage::Gram);
-        let mut gram = Cholesky::allocate(cloud.n_points());
+        let mut gram = Cholesky::allocate(cloud.n_points(), spare)?;
         let stride = gram.stride();
         fill_lower_gram(&cloud, &kernel, &regularization, gram.buffer_mut(), stride, observer)?;
         let norm1 = gram.norm1();

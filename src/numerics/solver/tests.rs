@@ -172,3 +172,28 @@ fn the_reciprocal_condition_is_one_for_the_identity() {
     let kernel_family = Family::Wendland { smoothness: crate::numerics::kernel::WendlandSmoothness::C2 };
     assert!((factor(&cloud, kernel_family, 1.0, 0.0).reciprocal_condition() - 1.0).abs() < 1e-14);
 }
+
+#[test]
+fn nothing_of_what_was_in_the_memory_before_is_read() {
+    let cloud = Arc::new(fibonacci_sphere(1300));
+    let kernel = Kernel::new(Family::Matern { order: 2 }, 0.5, 1.0).unwrap();
+    let alpha = Regularization::uniform(1e-6).unwrap();
+    let spare = SpareBuffer::up_to(1 << 30);
+    let mut poisoned = spare.take(1300 * 1304).unwrap();
+    poisoned.fill(f64::NAN);
+    drop(poisoned);
+    let recycled =
+        GramFactor::factorize_with(&spare, cloud.clone(), kernel, alpha.clone(), &Unobserved).unwrap();
+    let fresh = GramFactor::factorize(cloud, kernel, alpha, &Unobserved).unwrap();
+    assert_eq!(recycled.reciprocal_condition(), fresh.reciprocal_condition());
+    assert_eq!(recycled.log_determinant(), fresh.log_determinant());
+    for n_columns in [1, 2, 70] {
+        let solve = |factor: &GramFactor| {
+            let mut columns = Mat::from_fn(1300, n_columns, |i, j| (0.1 * (i * (j + 1)) as f64).sin());
+            factor.solve_in_place(columns.as_mut());
+            factor.whiten_in_place(columns.as_mut()).unwrap();
+            columns
+        };
+        assert_eq!(solve(&recycled), solve(&fresh));
+    }
+}
