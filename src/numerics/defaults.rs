@@ -2,6 +2,8 @@
 //!
 //! Everything scales with the cloud: millimetres and kilometres get the same geometry.
 
+use rayon::prelude::*;
+
 use super::cloud::{Cloud, squared_distance};
 use super::error::NumericsError;
 use super::kernel::{Family, Kernel};
@@ -63,7 +65,8 @@ pub struct Scales {
 impl Scales {
     pub fn of(cloud: &Cloud, neighbours: &Neighbours) -> Self {
         let n = cloud.n_points();
-        let spacings = (0..n).filter_map(|point| neighbours.mean_spacing(cloud, point, 4)).collect();
+        let spacings =
+            (0..n).into_par_iter().filter_map(|point| neighbours.mean_spacing(cloud, point, 4)).collect();
         match (median(neighbours.spacings(cloud)), median(spacings)) {
             (Some(nearest), Some(spacing)) => {
                 Self { radius: cloud.radius(), extent: extent(cloud), nearest, spacing }

@@ -101,7 +101,7 @@ impl Deref for Buffer {
         match &self.pages {
             Pages::Heap(numbers) => numbers,
             // Mappings begin at a page, so they are aligned for numbers.
-            Pages::Mapped(map) => &bytemuck::cast_slice(&map[..self.n_numbers * size_of::<f64>()])[..],
+            Pages::Mapped(map) => bytemuck::cast_slice(&map[..self.n_numbers * size_of::<f64>()]),
             Pages::Gone => &[],
         }
     }

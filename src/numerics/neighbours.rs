@@ -1,5 +1,7 @@
 //! Nearest neighbours in a cloud, by a k-d tree.
 
+use rayon::prelude::*;
+
 use super::cloud::{Cloud, squared_distance};
 
 /// Points per leaf: scanning 12 points costs about what two more levels of descent do.
@@ -111,9 +113,10 @@ impl Neighbours {
 
     /// Distance from every point to the nearest point elsewhere, unit L; empty if all points coincide.
     pub fn spacings(&self, cloud: &Cloud) -> Vec<f64> {
-        cloud
-            .points()
-            .filter_map(|x| self.nearest_elsewhere(cloud, x, 1).first().map(|n| n.squared_distance.sqrt()))
+        let nearest = |point: usize| self.nearest_elsewhere(cloud, cloud.point(point), 1).first().copied();
+        (0..cloud.n_points())
+            .into_par_iter()
+            .filter_map(|p| Some(nearest(p)?.squared_distance.sqrt()))
             .collect()
     }
 

@@ -9,8 +9,10 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::cloud::Cloud;
-use super::neighbours::Neighbours;
+use super::neighbours::{Neighbour, Neighbours};
 use super::vector::dot;
 
 /// Cosine of neighbouring normals above which they belong to one region.
@@ -123,24 +125,22 @@ struct Edge {
 /// On one sheet `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b` for consistent normals; two sheets at a distance t have `D·ν_a ≈ D·ν_b ≈ t`.
 fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<Edge> {
     let d = cloud.dimension();
-    let mut edges = Vec::new();
-    for a in 0..cloud.n_points() {
-        let normal_a = &normals[a * d..][..d];
-        for found in neighbours.nearest_elsewhere(cloud, cloud.point(a), n_neighbours(cloud)) {
-            let b = found.point;
-            let normal_b = &normals[b * d..][..d];
-            let cosine = dot(normal_a, normal_b);
-            let step = |normal: &[f64]| -> f64 {
-                (0..d).map(|c| (cloud.point(b)[c] - cloud.point(a)[c]) * normal[c]).sum()
-            };
-            let across = (step(normal_a) + cosine.signum() * step(normal_b)).abs();
-            let weight = cosine * cosine * (1.0 - 2.0 * across / found.squared_distance.sqrt());
-            if weight > 0.01 {
-                edges.push(Edge { a, b, cosine, weight });
-            }
-        }
-    }
-    edges
+    let edge = |a: usize, found: &Neighbour| {
+        let b = found.point;
+        let (normal_a, normal_b) = (&normals[a * d..][..d], &normals[b * d..][..d]);
+        let cosine = dot(normal_a, normal_b);
+        let step = |normal: &[f64]| -> f64 {
+            (0..d).map(|c| (cloud.point(b)[c] - cloud.point(a)[c]) * normal[c]).sum()
+        };
+        let across = (step(normal_a) + cosine.signum() * step(normal_b)).abs();
+        let weight = cosine * cosine * (1.0 - 2.0 * across / found.squared_distance.sqrt());
+        (weight > 0.01).then_some(Edge { a, b, cosine, weight })
+    };
+    let edges_of = |a: usize| {
+        let nearest = neighbours.nearest_elsewhere(cloud, cloud.point(a), n_neighbours(cloud));
+        nearest.into_iter().filter_map(move |found| edge(a, &found))
+    };
+    (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
 }
 
 /// Pairs of regions with the relative sign that most of their common edges vote for, surest first.
