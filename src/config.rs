@@ -23,7 +23,7 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 256 << 20)]
     pub cloud_bytes: u64,
 
-    /// Points a cloud may have; a dense factorization takes 8 n² bytes and n³/3 flops.
+    /// Points a cloud may have; a dense factorization takes 4 n² bytes and n³/3 flops.
     #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 20_000)]
     pub max_points: usize,
 

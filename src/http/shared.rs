@@ -94,7 +94,7 @@ pub enum SolverChoice {
     /// The service chooses.
     #[default]
     Auto,
-    /// Cholesky factorization of the full matrix: n³/3 flops, 8n² bytes.
+    /// Cholesky factorization of the full matrix: n³/3 flops, 4n² bytes.
     Dense,
 }
 

@@ -1,5 +1,7 @@
 //! Gram and cross-Gram matrices, assembled in parallel, column by column.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -16,8 +18,7 @@ const COLUMNS_PER_TASK: usize = 16;
 
 /// Writes the lower triangle of `K + αI` into a column-major buffer of n columns, `stride` apart.
 ///
-/// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j; what lies above the diagonal is left untouched, so pages of
-/// a fresh buffer that hold nothing else are never mapped.
+/// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j; what lies above the diagonal is left untouched.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -29,18 +30,27 @@ pub(crate) fn fill_lower_gram(
     stride: usize,
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
-    let nodes = Nodes::of(cloud);
-    let arch = pulp::Arch::new();
+    let (nodes, n) = (Nodes::of(cloud), cloud.n_points());
     gram.par_chunks_mut(stride * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, columns)| {
         observer.checkpoint()?;
         for (k, column) in columns.chunks_mut(stride).enumerate() {
             let point = task * COLUMNS_PER_TASK + k;
-            let column = &mut column[..cloud.n_points()];
-            arch.dispatch(KernelColumn { nodes: &nodes, kernel, x: cloud.point(point), from: point, column });
+            fill_kernel_column(&nodes, kernel, cloud.point(point), point..n, &mut column[point..n]);
             column[point] += regularization.at(point);
         }
         Ok(())
     })
+}
+
+/// Writes `out[i − points.start] = k(x_i, x)` for a range of points.
+pub(crate) fn fill_kernel_column(
+    nodes: &Nodes,
+    kernel: &Kernel,
+    x: &[f64],
+    points: Range<usize>,
+    out: &mut [f64],
+) {
+    pulp::Arch::new().dispatch(KernelColumn { nodes, kernel, x, points, out });
 }
 
 /// Writes `cross[j·n + i] = k(x_i, q_j)`, the cross-Gram matrix `[m, n]` row by row, i.e. one query after the other.
@@ -54,25 +64,24 @@ pub(crate) fn fill_cross_gram(
     cross: &mut [f64],
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
-    let arch = pulp::Arch::new();
     let n = nodes.n_points();
     cross.par_chunks_mut(n * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, rows)| {
         observer.checkpoint()?;
         for (k, column) in rows.chunks_mut(n).enumerate() {
             let x = queries.point(task * COLUMNS_PER_TASK + k);
-            arch.dispatch(KernelColumn { nodes, kernel, x, from: 0, column });
+            fill_kernel_column(nodes, kernel, x, 0..n, column);
         }
         Ok(())
     })
 }
 
-/// `column[i] = k(x_i, x)` for i ≥ `from`.
+/// The work of [`fill_kernel_column`].
 struct KernelColumn<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
     x: &'a [f64],
-    from: usize,
-    column: &'a mut [f64],
+    points: Range<usize>,
+    out: &'a mut [f64],
 }
 
 impl WithSimd for KernelColumn<'_> {
@@ -82,15 +91,16 @@ impl WithSimd for KernelColumn<'_> {
     fn with_simd<S: Simd>(self, _simd: S) {
         let variance = self.kernel.variance();
         let (mut q, mut phi) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
-        for block in self.from / BLOCK..self.nodes.n_blocks() {
+        let (from, to) = (self.points.start, self.points.end);
+        for block in from / BLOCK..to.div_ceil(BLOCK) {
             self.nodes.scaled_distances::<S>(block, self.x, self.kernel, &mut q);
             self.kernel.profile_block::<S, 0>(&q, &mut phi);
             for value in &mut phi[0] {
                 *value *= variance;
             }
             let start = block * BLOCK;
-            let (first, end) = (self.from.max(start), (start + BLOCK).min(self.column.len()));
-            self.column[first..end].copy_from_slice(&phi[0][first - start..end - start]);
+            let (first, end) = (from.max(start), to.min(start + BLOCK));
+            self.out[first - from..end - from].copy_from_slice(&phi[0][first - start..end - start]);
         }
     }
 }

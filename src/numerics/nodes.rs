@@ -38,10 +38,6 @@ impl Nodes {
         self.dimension
     }
 
-    pub(crate) fn n_blocks(&self) -> usize {
-        self.coordinates.len() / self.dimension
-    }
-
     /// Writes `differences[c] = x[c] − y[c]` and `q = |x − y|²/ℓ²` for the points y of a block.
     #[inline(always)]
     pub(crate) fn differences<S: Simd>(

@@ -198,8 +198,8 @@ mod tests {
 
     #[tokio::test]
     async fn the_bytes_of_all_factors_stay_within_the_budget() {
-        // 100 points take 100 · 104 · 8 bytes = 81 KiB, and up to 20 KiB for their surface; the budget holds two, not three.
-        let store = FactorStore::<&str>::new(240 << 10);
+        // 100 points take 50 · 112 · 8 bytes = 44 KiB, and up to 20 KiB for their surface; the budget holds two, not three.
+        let store = FactorStore::<&str>::new(160 << 10);
         for alpha in [1.0, 2.0, 3.0] {
             store.get_or_factorize(key(alpha), || factorize(100)).await.map(|_| ()).unwrap();
         }

@@ -1,20 +1,24 @@
-//! Cholesky factorization in place: one n×n buffer, one triangle of it used.
+//! Cholesky factorization in place, in half the memory of the matrix.
 
 use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, MatMut, MatRef};
-use rayon::prelude::*;
+use faer::{Accum, Mat, MatMut, MatRef};
 
+use super::packed::Packed;
 use super::parallelism;
-use super::substitution::LowerTriangle;
+use super::substitution::{solve_backward, solve_forward};
+use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
-use crate::numerics::memory::{Buffer, SpareBuffer};
+use crate::numerics::kernel::Kernel;
+use crate::numerics::memory::SpareBuffer;
 use crate::numerics::observer::Observer;
+use crate::numerics::regularization::Regularization;
 
 /// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
 ///
@@ -22,67 +26,38 @@ use crate::numerics::observer::Observer;
 /// blocked factorization of the whole 75–78 %.
 const LEAF_SIZE: usize = 512;
 
-/// A lower triangle, column by column, of `K + αI` first and of its factor L after [`Cholesky::factorize`].
+/// `K + αI` first, and its factor L after [`Cholesky::factorize`].
 pub(super) struct Cholesky {
-    buffer: Buffer,
-    n: usize,
-    stride: usize,
+    packed: Packed,
 }
 
 impl Cholesky {
-    /// Distance between columns: full cache lines, and not a multiple of 4 KiB, where all columns would compete for the
-    /// same cache sets.
-    pub(super) fn stride_for(n: usize) -> usize {
-        let stride = n.next_multiple_of(8);
-        if stride.is_multiple_of(512) { stride + 8 } else { stride }
+    /// Bytes of n points; `None` beyond what can be counted.
+    pub(super) fn n_bytes_needed(n: usize) -> Option<usize> {
+        Packed::n_numbers(n)?.checked_mul(size_of::<f64>())
     }
 
-    /// A matrix whose entries are still to be written.
+    /// Assembles `K + αI`, still to be factorized.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`].
-    pub(super) fn allocate(n: usize, spare: &Arc<SpareBuffer>) -> Result<Self, NumericsError> {
-        let stride = Self::stride_for(n);
-        Ok(Self { buffer: spare.take(n.saturating_mul(stride))?, n, stride })
-    }
-
-    pub(super) fn stride(&self) -> usize {
-        self.stride
-    }
-
-    pub(super) fn buffer_mut(&mut self) -> &mut [f64] {
-        &mut self.buffer
+    /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
+    pub(super) fn assemble(
+        spare: &Arc<SpareBuffer>,
+        cloud: &Cloud,
+        kernel: &Kernel,
+        regularization: &Regularization,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        Ok(Self { packed: Packed::gram(spare, cloud, kernel, regularization, observer)? })
     }
 
     pub(super) fn n_bytes(&self) -> usize {
-        self.buffer.n_bytes()
+        self.packed.n_bytes()
     }
 
-    fn lower(&self) -> MatRef<'_, f64> {
-        MatRef::from_column_major_slice_with_stride(&self.buffer, self.n, self.n, self.stride)
-    }
-
-    /// `‖A‖₁` of the symmetric matrix whose lower triangle is stored, before it is factorized.
+    /// `‖A‖₁`, before A is factorized.
     pub(super) fn norm1(&self) -> f64 {
-        let n = self.n;
-        let sums = self
-            .buffer
-            .par_chunks(self.stride)
-            .enumerate()
-            .fold(
-                || vec![0.0; n],
-                |mut sums, (j, column)| {
-                    let mut below = column[j].abs();
-                    for i in j + 1..n {
-                        below += column[i].abs();
-                        sums[i] += column[i].abs();
-                    }
-                    sums[j] += below;
-                    sums
-                },
-            )
-            .reduce(|| vec![0.0; n], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
-        sums.into_iter().fold(0.0, f64::max)
+        self.packed.norm1()
     }
 
     /// `A = LLᵀ` in place. The inner error is the index of the first point whose pivot is not above `floor`.
@@ -94,46 +69,58 @@ impl Cholesky {
         floor: f64,
         observer: &dyn Observer,
     ) -> Result<Result<Self, usize>, NumericsError> {
-        let a =
-            MatMut::from_column_major_slice_with_stride_mut(&mut self.buffer, self.n, self.n, self.stride);
-        match factorize_in_place(a, floor, observer)? {
+        match factorize_packed(&mut self.packed, floor, observer) {
             Ok(()) => Ok(Ok(self)),
-            Err(point) => {
-                // What comes next needs as much memory as this has.
-                self.buffer.discard();
+            Err(Stop::NotPositive(point)) => {
+                // What comes next needs more memory than this has.
+                self.packed.discard();
                 Ok(Err(point))
             }
+            Err(Stop::Cancelled(error)) => Err(error),
         }
-    }
-
-    fn triangle(&self) -> LowerTriangle<'_> {
-        LowerTriangle { columns: &self.buffer, n: self.n, stride: self.stride }
     }
 
     /// `rhs ← (LLᵀ)⁻¹ rhs`.
     pub(super) fn solve_in_place(&self, mut rhs: MatMut<'_, f64>) {
+        self.whiten_in_place(rhs.rb_mut());
         if let Some(x) = only_column(rhs.rb_mut()) {
-            self.triangle().solve_forward(x);
-            self.triangle().solve_backward(x);
-            return;
+            return solve_backward(&self.packed, x);
         }
-        let par = parallelism((self.n * self.n * rhs.ncols()) as f64);
-        solve_lower_triangular_in_place(self.lower(), rhs.rb_mut(), par);
-        solve_upper_triangular_in_place(self.lower().transpose(), rhs, par);
+        let par = self.parallelism(rhs.ncols());
+        let (l11, l21, l22) = self.parts();
+        let (mut first, mut second) = rhs.split_at_row_mut(l11.nrows());
+        solve_upper_triangular_in_place(l22.transpose(), second.rb_mut(), par);
+        matmul(first.rb_mut(), Accum::Add, l21.transpose(), second.rb(), -1.0, par);
+        solve_upper_triangular_in_place(l11.transpose(), first, par);
     }
 
     /// `rhs ← L⁻¹ rhs`.
     pub(super) fn whiten_in_place(&self, mut rhs: MatMut<'_, f64>) {
         if let Some(x) = only_column(rhs.rb_mut()) {
-            return self.triangle().solve_forward(x);
+            return solve_forward(&self.packed, x);
         }
-        let par = parallelism((self.n * self.n * rhs.ncols()) as f64);
-        solve_lower_triangular_in_place(self.lower(), rhs, par);
+        let par = self.parallelism(rhs.ncols());
+        let (l11, l21, l22) = self.parts();
+        let (mut first, mut second) = rhs.split_at_row_mut(l11.nrows());
+        solve_lower_triangular_in_place(l11, first.rb_mut(), par);
+        matmul(second.rb_mut(), Accum::Add, l21, first.rb(), -1.0, par);
+        solve_lower_triangular_in_place(l22, second, par);
     }
 
     /// `ln det A = 2 Σ ln L_ii`.
     pub(super) fn log_determinant(&self) -> f64 {
-        (0..self.n).map(|i| 2.0 * self.buffer[i * self.stride + i].ln()).sum()
+        self.packed.diagonal().map(|pivot| 2.0 * pivot.ln()).sum()
+    }
+
+    /// `L = [L₁₁ 0; L₂₁ L₂₂]`; what lies above the diagonals is not zero.
+    fn parts(&self) -> (MatRef<'_, f64>, MatRef<'_, f64>, MatRef<'_, f64>) {
+        let first = self.packed.first();
+        let (l11, l21) = first.split_at_row(first.ncols());
+        (l11, l21, self.packed.second_transposed().transpose())
+    }
+
+    fn parallelism(&self, n_columns: usize) -> faer::Par {
+        parallelism((self.packed.n_points() * self.packed.n_points() * n_columns) as f64)
     }
 }
 
@@ -145,8 +132,27 @@ fn only_column(rhs: MatMut<'_, f64>) -> Option<&mut [f64]> {
     rhs.col_mut(0).try_as_col_major_mut().map(faer::ColMut::as_slice_mut)
 }
 
-/// Overwrites the lower triangle of A by that of L, `A = LLᵀ`. The inner error is the first index whose pivot `L_ii²` is not
-/// above `floor`.
+enum Stop {
+    NotPositive(usize),
+    Cancelled(NumericsError),
+}
+
+/// Factorizes the first triangle, solves for the square below it, updates the second triangle, and factorizes that.
+fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Result<(), Stop> {
+    let mut leaf = Leaf::new(a.n_points());
+    let mut parts = a.parts_mut();
+    let n_first = parts.first().nrows();
+    recurse(parts.first(), 0, floor, &mut leaf, observer)?;
+    let (first, square) = parts.first_and_square();
+    solve_below(first, square);
+    observer.checkpoint().map_err(Stop::Cancelled)?;
+    let (second, square) = parts.second_and_square();
+    update(second, square);
+    recurse(parts.second(), n_first, floor, &mut leaf, observer)
+}
+
+/// Overwrites the lower triangle of A by that of L, `A = LLᵀ`, whatever lies above the diagonal. The inner error is the first
+/// index whose pivot `L_ii²` is not above `floor`.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -155,22 +161,12 @@ pub(super) fn factorize_in_place(
     floor: f64,
     observer: &dyn Observer,
 ) -> Result<Result<(), usize>, NumericsError> {
-    let requirement = llt::factor::cholesky_in_place_scratch::<f64>(
-        a.nrows().min(LEAF_SIZE),
-        parallelism(f64::INFINITY),
-        Default::default(),
-    );
-    let mut scratch = MemBuffer::new(requirement);
-    match recurse(a, 0, floor, MemStack::new(&mut scratch), observer) {
+    let mut leaf = Leaf::new(a.nrows());
+    match recurse(a, 0, floor, &mut leaf, observer) {
         Ok(()) => Ok(Ok(())),
         Err(Stop::NotPositive(point)) => Ok(Err(point)),
         Err(Stop::Cancelled(error)) => Err(error),
     }
-}
-
-enum Stop {
-    NotPositive(usize),
-    Cancelled(NumericsError),
 }
 
 /// Factorizes the leading half, solves for the block below it, updates the trailing half, and goes on there.
@@ -181,44 +177,79 @@ fn recurse(
     mut a: MatMut<'_, f64>,
     first: usize,
     floor: f64,
-    scratch: &mut MemStack,
+    leaf: &mut Leaf,
     observer: &dyn Observer,
 ) -> Result<(), Stop> {
     observer.checkpoint().map_err(Stop::Cancelled)?;
     let n = a.nrows();
-    let flops = (n as f64).powi(3) / 3.0;
     if n <= LEAF_SIZE {
-        let outcome = llt::factor::cholesky_in_place(
-            a.rb_mut(),
-            Default::default(),
-            parallelism(flops),
-            scratch,
-            Default::default(),
-        );
-        return match outcome {
-            Ok(_) => match (0..n).find(|&i| a[(i, i)] * a[(i, i)] <= floor) {
-                None => Ok(()),
-                Some(index) => Err(Stop::NotPositive(first + index)),
-            },
-            Err(llt::factor::LltError::NonPositivePivot { index }) => Err(Stop::NotPositive(first + index)),
-        };
+        return leaf.factorize(a, floor).map_err(|index| Stop::NotPositive(first + index));
     }
     let half = (n / 2).next_multiple_of(64).min(n - 1);
     let (mut leading, _, mut below, mut trailing) = a.rb_mut().split_at_mut(half, half);
-    recurse(leading.rb_mut(), first, floor, scratch, observer)?;
-    let par = parallelism(flops);
-    solve_lower_triangular_in_place(leading.rb(), below.rb_mut().transpose_mut(), par);
+    recurse(leading.rb_mut(), first, floor, leaf, observer)?;
+    solve_below(leading.rb(), below.rb_mut());
     observer.checkpoint().map_err(Stop::Cancelled)?;
+    update(trailing.rb_mut(), below.rb());
+    recurse(trailing, first + half, floor, leaf, observer)
+}
+
+/// `below ← below·L⁻ᵀ`.
+fn solve_below(l: MatRef<'_, f64>, below: MatMut<'_, f64>) {
+    let par = parallelism((l.nrows() * l.nrows() * below.nrows()) as f64);
+    solve_lower_triangular_in_place(l, below.transpose_mut(), par);
+}
+
+/// `trailing ← trailing − below·belowᵀ`, lower triangle.
+fn update(trailing: MatMut<'_, f64>, below: MatRef<'_, f64>) {
+    let par = parallelism((below.nrows() * below.nrows() * below.ncols()) as f64);
     triangular::matmul(
-        trailing.rb_mut(),
+        trailing,
         BlockStructure::TriangularLower,
         Accum::Add,
-        below.rb(),
+        below,
         BlockStructure::Rectangular,
-        below.rb().transpose(),
+        below.transpose(),
         BlockStructure::Rectangular,
         -1.0,
         par,
     );
-    recurse(trailing, first + half, floor, scratch, observer)
+}
+
+/// Factorizes small diagonal blocks in a buffer of their own: column-major whichever way the block lies, and what shares the
+/// block's columns above its diagonal stays as it is.
+struct Leaf {
+    block: Mat<f64>,
+    scratch: MemBuffer,
+}
+
+impl Leaf {
+    fn new(n: usize) -> Self {
+        let size = n.min(LEAF_SIZE);
+        let par = parallelism(f64::INFINITY);
+        let requirement = llt::factor::cholesky_in_place_scratch::<f64>(size, par, Default::default());
+        Self { block: Mat::zeros(size, size), scratch: MemBuffer::new(requirement) }
+    }
+
+    /// The inner error is the first index whose pivot is not above `floor`.
+    fn factorize(&mut self, mut a: MatMut<'_, f64>, floor: f64) -> Result<(), usize> {
+        let n = a.nrows();
+        let mut block = self.block.as_mut().submatrix_mut(0, 0, n, n);
+        block.copy_from_triangular_lower(a.rb());
+        let outcome = llt::factor::cholesky_in_place(
+            block.rb_mut(),
+            Default::default(),
+            parallelism((n as f64).powi(3) / 3.0),
+            MemStack::new(&mut self.scratch),
+            Default::default(),
+        );
+        if let Err(llt::factor::LltError::NonPositivePivot { index }) = outcome {
+            return Err(index);
+        }
+        if let Some(index) = (0..n).find(|&i| block[(i, i)] * block[(i, i)] <= floor) {
+            return Err(index);
+        }
+        a.copy_from_triangular_lower(block.rb());
+        Ok(())
+    }
 }

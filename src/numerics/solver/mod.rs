@@ -2,6 +2,7 @@
 
 mod cholesky;
 mod condition;
+mod packed;
 mod pivoted_cholesky;
 mod pivoting;
 mod solution;
@@ -14,7 +15,6 @@ use faer::{Mat, MatMut, Par};
 use super::cloud::Cloud;
 use super::duplicates::coinciding_points;
 use super::error::{NotDefinite, NumericsError};
-use super::gram::fill_lower_gram;
 use super::kernel::Kernel;
 use super::memory::SpareBuffer;
 use super::observer::{Observer, Stage};
@@ -53,10 +53,11 @@ enum Factorization {
 }
 
 impl GramFactor {
-    /// Bytes that a factorization of n points needs at its peak, checked: one n×n buffer, for Cholesky and, when that has
-    /// failed and given it back, for the fallback. O(n) numbers per thread come on top.
+    /// Bytes that a factorization of n points needs at its peak, checked: half an n×n buffer for Cholesky, and, when that has
+    /// failed and given it back, up to a whole one for the fallback. O(n) numbers per thread come on top.
     pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
-        n_points.checked_mul(Cholesky::stride_for(n_points))?.checked_mul(size_of::<f64>())
+        let fallback = n_points.checked_mul(n_points)?.checked_mul(size_of::<f64>())?;
+        Some(fallback.max(Cholesky::n_bytes_needed(n_points)?))
     }
 
     /// Flops that a factorization of n points takes at most: n³/3 for Cholesky, and where that fails up to 0.54 n³ for the
@@ -101,9 +102,7 @@ impl GramFactor {
             return Err(NumericsError::DuplicatePoints { points: twins });
         }
         observer.enter(Stage::Gram);
-        let mut gram = Cholesky::allocate(cloud.n_points(), spare)?;
-        let stride = gram.stride();
-        fill_lower_gram(&cloud, &kernel, &regularization, gram.buffer_mut(), stride, observer)?;
+        let gram = Cholesky::assemble(spare, &cloud, &kernel, &regularization, observer)?;
         let norm1 = gram.norm1();
         observer.enter(Stage::Factor);
         let factorization = match gram.factorize(SMALLEST_PIVOT * kernel.at_zero(), observer)? {

@@ -179,7 +179,7 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
     let kernel = Kernel::new(Family::Matern { order: 2 }, 0.5, 1.0).unwrap();
     let alpha = Regularization::uniform(1e-6).unwrap();
     let spare = SpareBuffer::up_to(1 << 30);
-    let mut poisoned = spare.take(1300 * 1304).unwrap();
+    let mut poisoned = spare.take(1312 * 650).unwrap();
     poisoned.fill(f64::NAN);
     drop(poisoned);
     let recycled =
