@@ -14,8 +14,8 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0)]
     pub threads: usize,
 
-    /// Bytes of factorizations and weights kept in memory; requests under way may hold as much again, and an eighth of it is
-    /// kept for the next factorization when one is let go.
+    /// Bytes of factorizations and weights kept in memory, an eighth of it for the next factorization; requests under way may
+    /// hold as much again.
     #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value_t = 4 << 30)]
     pub cache_bytes: u64,
 

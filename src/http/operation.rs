@@ -178,6 +178,9 @@ async fn factorize(app: Arc<App>, plan: FitPlan) -> Result<StoredFactor, FactorF
         GramFactor::factorize_with(&spare, plan.fitted, plan.kernel, plan.regularization, observer)
     };
     let (outcome, times) = app.compute.run(flops, job).await.map_err(FactorFailure::Broken)?;
-    let factor = outcome.map_err(FactorFailure::Refused)?;
-    Ok(StoredFactor::new(factor, times.gram, times.factor))
+    let stored = StoredFactor::new(outcome.map_err(FactorFailure::Refused)?, times.gram, times.factor);
+    let factor = stored.factor.clone();
+    // Nobody waits for it, and the work is the operating system's.
+    tokio::task::spawn_blocking(move || factor.prepare_another(app.factors.spare()));
+    Ok(stored)
 }

@@ -15,7 +15,7 @@ use crate::numerics::surface::Surface;
 /// The share of the cache that weights may take: they are n numbers beside the n² of a factor.
 const WEIGHTS_SHARE: u64 = 16;
 
-/// The share of the cache's budget, beside it, up to which the memory of a factor that was let go is kept for the next one.
+/// The share of the cache that memory kept for the next factorization may take.
 const SPARE_SHARE: u64 = 8;
 
 /// A factorization with the surface of its cloud, once that was asked for, and the time it took.
@@ -73,13 +73,14 @@ pub struct FactorStore<E> {
 impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
     pub fn new(max_bytes: u64) -> Self {
         let max_solution_bytes = max_bytes / WEIGHTS_SHARE;
-        let max_factor_bytes = max_bytes - max_solution_bytes;
+        let max_spare_bytes = max_bytes / SPARE_SHARE;
+        let max_factor_bytes = max_bytes - max_solution_bytes - max_spare_bytes;
         Self {
             factors: bounded_cache(max_factor_bytes, |f: &Arc<StoredFactor>| f.n_bytes()).build(),
             solutions: bounded_cache(max_solution_bytes, |s: &Arc<Solution>| s.n_bytes() + 256).build(),
             flights: SingleFlight::new(),
             max_factor_bytes,
-            spare: SpareBuffer::up_to(usize::try_from(max_bytes / SPARE_SHARE).unwrap_or(usize::MAX)),
+            spare: SpareBuffer::up_to(usize::try_from(max_spare_bytes).unwrap_or(usize::MAX)),
         }
     }
 
@@ -199,7 +200,7 @@ mod tests {
     #[tokio::test]
     async fn the_bytes_of_all_factors_stay_within_the_budget() {
         // 100 points take 50 · 112 · 8 bytes = 44 KiB, and up to 20 KiB for their surface; the budget holds two, not three.
-        let store = FactorStore::<&str>::new(160 << 10);
+        let store = FactorStore::<&str>::new(180 << 10);
         for alpha in [1.0, 2.0, 3.0] {
             store.get_or_factorize(key(alpha), || factorize(100)).await.map(|_| ()).unwrap();
         }

@@ -32,9 +32,9 @@ pub(super) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Bytes of n points; `None` beyond what can be counted.
-    pub(super) fn n_bytes_needed(n: usize) -> Option<usize> {
-        Packed::n_numbers(n)?.checked_mul(size_of::<f64>())
+    /// Numbers that n points take; `None` beyond what can be counted.
+    pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
+        Packed::n_numbers(n)
     }
 
     /// Assembles `K + αI`, still to be factorized.

@@ -57,7 +57,7 @@ impl GramFactor {
     /// failed and given it back, up to a whole one for the fallback. O(n) numbers per thread come on top.
     pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
         let fallback = n_points.checked_mul(n_points)?.checked_mul(size_of::<f64>())?;
-        Some(fallback.max(Cholesky::n_bytes_needed(n_points)?))
+        Some(fallback.max(Cholesky::n_numbers_needed(n_points)?.checked_mul(size_of::<f64>())?))
     }
 
     /// Flops that a factorization of n points takes at most: n³/3 for Cholesky, and where that fails up to 0.54 n³ for the
@@ -125,6 +125,13 @@ impl GramFactor {
         let product = norm1 * inverse_norm1;
         this.reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
         Ok(this)
+    }
+
+    /// Makes memory ready for another factorization of as many points.
+    pub fn prepare_another(&self, spare: &SpareBuffer) {
+        if self.method() == Method::Cholesky {
+            spare.prepare(Cholesky::n_numbers_needed(self.n_points()).unwrap_or(usize::MAX));
+        }
     }
 
     pub fn cloud(&self) -> &Cloud {
