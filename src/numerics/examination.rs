@@ -110,10 +110,10 @@ impl<'a> Examination<'a> {
             let fit = surface.fit(query).map(Cow::Borrowed);
             return Site { x, nearest, spacing: surface.spacing(query), fit };
         }
-        let found = surface.neighbours().nearest(cloud, x, 1);
-        let nearest = found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 });
         let count = n_quadric_neighbours(cloud.dimension());
-        let fit = LocalFit::around(cloud, surface.neighbours(), x, count).map(Cow::Owned);
+        let found = surface.neighbours().nearest_positions(cloud, x, count);
+        let nearest = found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 });
+        let fit = LocalFit::of(cloud, x, &found).map(Cow::Owned);
         Site { x, nearest, spacing: surface.spacing(nearest.point), fit }
     }
 

@@ -175,7 +175,7 @@ impl Search<'_> {
 
     fn offer(&mut self, candidate: Neighbour) {
         let key = |n: &Neighbour| (n.squared_distance, n.point);
-        if candidate.squared_distance < self.at_least {
+        if candidate.squared_distance < self.at_least || candidate.squared_distance > self.reach() {
             return;
         }
         let place = self.found.partition_point(|n| key(n) < key(&candidate));

@@ -5,7 +5,7 @@
 
 use super::cloud::Cloud;
 use super::eigen::symmetric_eigen;
-use super::neighbours::Neighbours;
+use super::neighbours::{Neighbour, Neighbours};
 use super::vector::{dot, norm};
 
 /// Neighbours per coefficient of a quadric: 18 for surfaces in space.
@@ -61,9 +61,8 @@ impl Patch {
         }
         differences.iter_mut().for_each(|c| *c /= radius);
         let (frame, breadth) = principal_axes(&differences, d);
-        let mut patch = Self { frame, breadth, coordinates: Vec::new(), radius, points };
-        patch.coordinates = differences.chunks_exact(d).flat_map(|v| patch.to_frame(v)).collect();
-        Some(patch)
+        let coordinates = in_frame(&frame, &differences, d);
+        Some(Self { frame, breadth, coordinates, radius, points })
     }
 
     pub(crate) fn dimension(&self) -> usize {
@@ -221,12 +220,12 @@ impl LocalFit {
         self.radius * self.curvatures.iter().fold(0.0, |a: f64, k| a.max(k.abs()))
     }
 
-    /// Fits the `count` points nearest to x; `None` if they do not determine a quadric.
+    /// Fits the given points, nearest to x first; `None` if they do not determine a quadric.
     ///
     /// The frame of the principal axes is tilted by cubic terms of the surface; a second fit over the tangent plane of the
     /// first is not.
-    pub(crate) fn around(cloud: &Cloud, neighbours: &Neighbours, x: &[f64], count: usize) -> Option<Self> {
-        let mut patch = Patch::around(cloud, neighbours, x, count)?;
+    pub(crate) fn of(cloud: &Cloud, x: &[f64], nearest: &[Neighbour]) -> Option<Self> {
+        let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point).collect())?;
         let first = patch.quadric()?;
         patch.tilt(&first.slope);
         let quadric = patch.quadric()?;
@@ -260,10 +259,20 @@ impl Patch {
         let normal = self.in_space(&normal);
         let tangents = super::vector::tangent_basis(&normal);
         let frame: Vec<f64> = tangents.into_iter().flatten().chain(normal).collect();
-        let vectors: Vec<Vec<f64>> = self.coordinates.chunks_exact(d).map(|c| self.in_space(c)).collect();
+        // The new axes in the old frame turn coordinates in that into the new ones.
+        let turn = in_frame(&self.frame, &frame, d);
+        self.coordinates = in_frame(&turn, &self.coordinates, d);
         self.frame = frame;
-        self.coordinates = vectors.iter().flat_map(|v| self.to_frame(v)).collect();
     }
+}
+
+/// Components of vectors `[k, d]` along the axes of a frame `[d, d]`.
+fn in_frame(frame: &[f64], vectors: &[f64], d: usize) -> Vec<f64> {
+    let mut components = Vec::with_capacity(vectors.len());
+    for v in vectors.chunks_exact(d) {
+        components.extend(frame.chunks_exact(d).map(|axis| dot(axis, v)));
+    }
+    components
 }
 
 /// Orthonormal principal axes of differences `[k, d]` about their mean, the direction of least variance last; and the standard
@@ -327,12 +336,16 @@ mod tests {
     use super::*;
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
+    fn fit_around(cloud: &Cloud, x: &[f64], count: usize) -> Option<LocalFit> {
+        LocalFit::of(cloud, x, &Neighbours::of(cloud).nearest_positions(cloud, x, count))
+    }
+
     #[test]
     fn a_quadric_is_recovered_exactly() {
         let height = |x: f64, y: f64| 0.3 - 0.2 * x + 0.1 * y + 0.7 * x * x - 0.4 * x * y - 0.5 * y * y;
         let grid = (0..25).map(|i| [(i % 5) as f64 * 0.01 - 0.02, (i / 5) as f64 * 0.01 - 0.02]);
         let cloud = Cloud::new(grid.flat_map(|[x, y]| [x, y, height(x, y)]).collect(), 3).unwrap();
-        let fit = LocalFit::around(&cloud, &Neighbours::of(&cloud), cloud.point(12), 25).unwrap();
+        let fit = fit_around(&cloud, cloud.point(12), 25).unwrap();
         // At the origin: unit normal (0.2, −0.1, 1)/|·|, shape operator by the first and second fundamental forms.
         let length = (1.0f64 + 0.04 + 0.01).sqrt();
         let cosine = dot(&fit.normal, &[0.2 / length, -0.1 / length, 1.0 / length]).abs();
@@ -342,7 +355,7 @@ mod tests {
         let exact = (-1.4 - 0.16) / length.powi(4);
         assert!((gaussian - exact).abs() < 1e-3 * exact.abs(), "{gaussian} against {exact}");
         assert!(!fit.is_at_rim);
-        assert!(LocalFit::around(&cloud, &Neighbours::of(&cloud), cloud.point(0), 18).unwrap().is_at_rim);
+        assert!(fit_around(&cloud, cloud.point(0), 18).unwrap().is_at_rim);
     }
 
     #[test]
@@ -350,7 +363,7 @@ mod tests {
         for (cloud, count) in [(circle(64), 9), (fibonacci_sphere(800), 18)] {
             let neighbours = Neighbours::of(&cloud);
             for x in cloud.points() {
-                let fit = LocalFit::around(&cloud, &neighbours, x, count).unwrap();
+                let fit = LocalFit::of(&cloud, x, &neighbours.nearest_positions(&cloud, x, count)).unwrap();
                 assert!(dot(&fit.normal, x).abs() > 0.999);
                 assert!(fit.curvatures.iter().all(|k| (k.abs() - 1.0).abs() < 0.05), "{:?}", fit.curvatures);
                 assert!(!fit.is_at_rim);
@@ -361,6 +374,6 @@ mod tests {
     #[test]
     fn points_on_a_line_determine_no_surface() {
         let cloud = Cloud::new((0..30).flat_map(|i| [i as f64, 0.0, 0.0]).collect(), 3).unwrap();
-        assert!(LocalFit::around(&cloud, &Neighbours::of(&cloud), cloud.point(15), 18).is_none());
+        assert!(fit_around(&cloud, cloud.point(15), 18).is_none());
     }
 }

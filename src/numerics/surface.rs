@@ -59,6 +59,26 @@ pub struct SurfaceOrientation {
     pub is_given: bool,
 }
 
+/// What the nearest positions say about a point.
+struct Surroundings {
+    /// Mean distance to those that define the sampling distance; 0 for one position alone.
+    spacing: f64,
+    nearest: Option<f64>,
+    fit: Option<LocalFit>,
+}
+
+impl Surroundings {
+    fn of(cloud: &Cloud, neighbours: &Neighbours, point: usize) -> Self {
+        let x = cloud.point(point);
+        let found = neighbours.nearest_positions(cloud, x, n_quadric_neighbours(cloud.dimension()));
+        let squared_distances = found.iter().map(|found| found.squared_distance);
+        let elsewhere = squared_distances.filter(|&squared| squared > 0.0).take(SPACING_NEIGHBOURS);
+        let distances: Vec<f64> = elsewhere.map(f64::sqrt).collect();
+        let spacing = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
+        Self { spacing, nearest: distances.first().copied(), fit: LocalFit::of(cloud, x, &found) }
+    }
+}
+
 impl Surface {
     /// Examines the surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
     ///
@@ -75,20 +95,19 @@ impl Surface {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
         let neighbours = Neighbours::of(cloud);
-        let spacing = |point| neighbours.mean_spacing(cloud, point, SPACING_NEIGHBOURS).unwrap_or(0.0);
-        let spacings: Vec<f64> = (0..cloud.n_points()).into_par_iter().map(spacing).collect();
-        let count = n_quadric_neighbours(cloud.dimension());
-        let fit = |point: usize| {
+        let look_around = |point: usize| {
             observer.checkpoint()?;
-            Ok(LocalFit::around(cloud, &neighbours, cloud.point(point), count))
+            Ok(Surroundings::of(cloud, &neighbours, point))
         };
-        let fits = (0..cloud.n_points()).into_par_iter().map(fit).collect::<Result<_, NumericsError>>()?;
+        let surroundings: Vec<Surroundings> =
+            (0..cloud.n_points()).into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
+        let nearest = median(surroundings.iter().filter_map(|found| found.nearest).collect()).unwrap_or(0.0);
+        let (spacings, fits) = surroundings.into_iter().map(|found| (found.spacing, found.fit)).unzip();
         let jets = match factor.kernel().has_kink() {
             true => None,
             false => Some(signature.at(cloud, JetOrder::HessianWithMagnitudes, observer)?),
         };
         let orientation = SurfaceOrientation { n_flipped: 0, is_open: false, is_given: given.is_some() };
-        let nearest = median(neighbours.spacings(cloud)).unwrap_or(0.0);
         let is_too_rough = is_too_rough(factor.kernel(), nearest);
         let (normals, left_out_misses) = (Vec::new(), OnceLock::new());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
