@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::error::NumericsError;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, Pairs};
 use super::nodes::Nodes;
 use super::observer::Observer;
 use super::regularization::Regularization;
-use super::simd::BLOCK;
+use super::simd::{BLOCK, Block, Pack};
 
 /// Columns per task: enough work to outweigh scheduling, few enough to balance a triangle over many threads.
 const COLUMNS_PER_TASK: usize = 16;
@@ -30,13 +30,18 @@ pub(crate) fn fill_lower_gram(
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
     let nodes = Nodes::of(cloud);
-    let arch = pulp::Arch::new();
     gram.par_chunks_mut(stride * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, columns)| {
         observer.checkpoint()?;
         for (k, column) in columns.chunks_mut(stride).enumerate() {
             let point = task * COLUMNS_PER_TASK + k;
             let column = &mut column[..cloud.n_points()];
-            arch.dispatch(KernelColumn { nodes: &nodes, kernel, x: cloud.point(point), from: point, column });
+            nodes.dispatch(KernelColumn {
+                nodes: &nodes,
+                kernel,
+                x: cloud.point(point),
+                from: point,
+                column,
+            });
             column[point] += regularization.at(point);
         }
         Ok(())
@@ -47,20 +52,19 @@ pub(crate) fn fill_lower_gram(
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
-pub(crate) fn fill_cross_gram(
+pub fn fill_cross_gram(
     nodes: &Nodes,
     kernel: &Kernel,
     queries: &Cloud,
     cross: &mut [f64],
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
-    let arch = pulp::Arch::new();
     let n = nodes.n_points();
     cross.par_chunks_mut(n * COLUMNS_PER_TASK).enumerate().try_for_each(|(task, rows)| {
         observer.checkpoint()?;
         for (k, column) in rows.chunks_mut(n).enumerate() {
             let x = queries.point(task * COLUMNS_PER_TASK + k);
-            arch.dispatch(KernelColumn { nodes, kernel, x, from: 0, column });
+            nodes.dispatch(KernelColumn { nodes, kernel, x, from: 0, column });
         }
         Ok(())
     })
@@ -79,19 +83,37 @@ impl WithSimd for KernelColumn<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let variance = self.kernel.variance();
-        let (mut q, mut phi) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut values = Block::ZERO;
         for block in self.from / BLOCK..self.nodes.n_blocks() {
-            self.nodes.scaled_distances::<S>(block, self.x, self.kernel, &mut q);
-            self.kernel.profile_block::<S, 0>(&q, &mut phi);
-            for value in &mut phi[0] {
-                *value *= variance;
-            }
+            self.kernel.profiles(Values { simd, column: &self, block, values: &mut values });
             let start = block * BLOCK;
             let (first, end) = (self.from.max(start), (start + BLOCK).min(self.column.len()));
-            self.column[first..end].copy_from_slice(&phi[0][first - start..end - start]);
+            self.column[first..end].copy_from_slice(&values.0[first - start..end - start]);
         }
+    }
+}
+
+/// Writes the kernel's values for a block.
+struct Values<'a, S> {
+    simd: S,
+    column: &'a KernelColumn<'a>,
+    block: usize,
+    values: &'a mut Block,
+}
+
+impl<S: Simd> Pairs<S> for Values<'_, S> {
+    type Others = ();
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
+        let KernelColumn { nodes, kernel, x, .. } = self.column;
+        (nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |_, _| ()), ())
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (): (), [phi, ..]: [Pack<S>; 3]) {
+        (phi * self.column.kernel.variance()).store(self.values, at);
     }
 }
 

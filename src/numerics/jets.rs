@@ -6,10 +6,11 @@ use rayon::prelude::*;
 use super::cloud::Cloud;
 use super::duplicates::Positions;
 use super::error::NumericsError;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, Pairs};
 use super::nodes::{Nodes, blocked};
 use super::observer::Observer;
-use super::simd::{BLOCK, Block, LANES, Lanes, add_products, multiply, sum_lanes};
+use super::simd::{Block, Pack};
+use super::tiles::{Sum, add_gradient, add_hessian};
 
 /// Queries per task; a task of one query at n = 2,000 is about 5 µs of work.
 const QUERIES_PER_TASK: usize = 8;
@@ -51,39 +52,6 @@ impl Layout {
         self.hessian() + self.dimension * (self.dimension + 1) / 2
     }
 
-    /// Turns raw sums into a jet: factors `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
-    ///
-    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
-    fn finish(self, sums: &[Lanes], kernel: &Kernel, jet: &mut [f64]) {
-        for (number, lanes) in jet.iter_mut().zip(sums) {
-            *number = kernel.variance() * sum_lanes(lanes);
-        }
-        if self.order == JetOrder::Value {
-            return;
-        }
-        let inverse = 1.0 / kernel.length_scale();
-        for slope in &mut jet[self.gradient()..self.hessian()] {
-            *slope = 2.0 * *slope * inverse * inverse;
-        }
-        if self.order == JetOrder::Gradient {
-            return;
-        }
-        let trace_term = 2.0 * kernel.variance() * sum_lanes(&sums[sums.len() - 1]) * inverse * inverse;
-        let mut at = self.hessian();
-        for a in 0..self.dimension {
-            for b in a..self.dimension {
-                jet[at] = 4.0 * jet[at] * inverse * inverse * inverse * inverse;
-                if a == b {
-                    jet[at] += trace_term;
-                }
-                at += 1;
-            }
-        }
-        if self.order == JetOrder::HessianWithMagnitudes {
-            jet[at + 1] *= 2.0 * inverse;
-        }
-    }
-
     fn width(self) -> usize {
         match self.order {
             JetOrder::Value => 1,
@@ -110,15 +78,29 @@ impl Jets {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        debug_assert_eq!(cloud.dimension(), queries.dimension());
-        let layout = Layout { order, dimension: cloud.dimension() };
-        let (nodes, weights, width) = (Nodes::of(cloud), blocked(weights), layout.width());
+        Self::over(&Nodes::of(cloud), kernel, weights, queries, order, observer)
+    }
+
+    /// The same over points that are laid out already.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn over(
+        nodes: &Nodes,
+        kernel: &Kernel,
+        weights: &[f64],
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        debug_assert_eq!(nodes.dimension(), queries.dimension());
+        let layout = Layout { order, dimension: nodes.dimension() };
+        let (weights, width) = (blocked(weights), layout.width());
         let mut packed = vec![0.0; queries.n_points() * width];
-        let arch = pulp::Arch::new();
         packed.par_chunks_mut(width * QUERIES_PER_TASK).enumerate().try_for_each(|(task, jets)| {
             observer.checkpoint()?;
             let first = task * QUERIES_PER_TASK;
-            arch.dispatch(Pass { nodes: &nodes, kernel, weights: &weights, queries, first, jets, layout });
+            nodes.dispatch(Pass { nodes, kernel, weights: &weights, queries, first, jets, layout });
             match jets.iter().position(|x| !x.is_finite()) {
                 Some(at) => Err(NumericsError::Overflow { query: first + at / width }),
                 None => Ok(()),
@@ -207,87 +189,164 @@ impl WithSimd for Pass<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         match self.layout.order {
-            JetOrder::Value => self.run::<S, 0, false>(),
-            JetOrder::Gradient => self.run::<S, 1, false>(),
-            JetOrder::Hessian => self.run::<S, 2, false>(),
-            JetOrder::HessianWithMagnitudes => self.run::<S, 2, true>(),
+            JetOrder::Value => self.run::<S, 0, false>(simd),
+            JetOrder::Gradient => self.run::<S, 1, false>(simd),
+            JetOrder::Hessian => self.run::<S, 2, false>(simd),
+            JetOrder::HessianWithMagnitudes => self.run::<S, 2, true>(simd),
         }
     }
 }
 
 impl Pass<'_> {
     #[inline(always)]
-    fn run<S: Simd, const ORDER: usize, const MAGNITUDES: bool>(self) {
+    fn run<S: Simd, const ORDER: usize, const MAGNITUDES: bool>(mut self, simd: S) {
+        let jets = std::mem::take(&mut self.jets);
+        let mut sums = Sums::new(simd, self.layout.dimension);
         let width = self.layout.width();
-        // One accumulator more than a jet has numbers: Σ λφ′, which enters the whole diagonal of the Hessian.
-        let mut sums = vec![[0.0; LANES]; width + 1];
-        let mut differences = vec![[0.0; BLOCK]; self.nodes.dimension()];
-        for (k, jet) in self.jets.chunks_exact_mut(width).enumerate() {
+        for (k, jet) in jets.chunks_exact_mut(width).enumerate() {
             let x = self.queries.point(self.first + k);
-            sums.fill([0.0; LANES]);
+            sums.clear(simd);
             for (block, weights) in self.weights.iter().enumerate() {
-                let (mut q, mut phi) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
-                self.nodes.differences::<S>(block, x, self.kernel, &mut differences, &mut q);
-                self.kernel.profile_block::<S, ORDER>(&q, &mut phi);
-                if MAGNITUDES {
-                    let at = self.layout.magnitudes();
-                    add_magnitudes::<S>(&mut sums[at..], weights, &q, &phi);
+                let sums = &mut sums;
+                let pairs = Weighted::<S, ORDER, MAGNITUDES> { simd, pass: &self, block, x, weights, sums };
+                self.kernel.profiles(pairs);
+                if ORDER >= 1 {
+                    add_gradient(simd, &sums.first, &sums.differences, &mut sums.gradient);
                 }
-                add_block::<S, ORDER>(&mut sums, weights, &differences, &phi);
+                if ORDER >= 2 {
+                    add_hessian(simd, &sums.second, &sums.differences, &mut sums.hessian);
+                }
             }
-            self.layout.finish(&sums, self.kernel, jet);
+            sums.finish::<ORDER, MAGNITUDES>(self.kernel, jet);
         }
     }
 }
 
-/// Adds `λφ`, `λφ′D`, `λφ″D_aD_b` of a block in the layout of a jet, and `λφ′` to the last accumulator.
-#[inline(always)]
-fn add_block<S: Simd, const ORDER: usize>(
-    sums: &mut [Lanes],
-    weights: &Block,
-    differences: &[Block],
-    phi: &[Block; 3],
-) {
-    let d = differences.len();
-    add_products::<S>(&mut sums[0], weights, &phi[0]);
-    if ORDER == 0 {
-        return;
+/// What a pass has summed up for a query, and the block at hand.
+struct Sums<S: Simd> {
+    /// `Σλφ`.
+    value: Sum<S>,
+    /// `Σλφ′`, which enters the whole diagonal of the Hessian.
+    trace: Sum<S>,
+    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
+    magnitudes: [Sum<S>; 2],
+    /// `Σλφ′D_a`.
+    gradient: Vec<Sum<S>>,
+    /// `Σλφ″D_aD_b`, a ≤ b, row by row.
+    hessian: Vec<Sum<S>>,
+    /// `D_a`, `λφ′`, `λφ″` of the block.
+    differences: Vec<Block>,
+    first: Block,
+    second: Block,
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    fn new(simd: S, d: usize) -> Self {
+        let zero = Sum::splat(simd, 0.0);
+        Self {
+            value: zero,
+            trace: zero,
+            magnitudes: [zero; 2],
+            gradient: vec![zero; d],
+            hessian: vec![zero; d * (d + 1) / 2],
+            differences: vec![Block::ZERO; d],
+            first: Block::ZERO,
+            second: Block::ZERO,
+        }
     }
-    let mut first = [0.0; BLOCK];
-    multiply(&mut first, weights, &phi[1]);
-    for (sum, difference) in sums[1..].iter_mut().zip(differences) {
-        add_products::<S>(sum, &first, difference);
+
+    #[inline(always)]
+    fn clear(&mut self, simd: S) {
+        let zero = Sum::splat(simd, 0.0);
+        (self.value, self.trace, self.magnitudes) = (zero, zero, [zero; 2]);
+        self.gradient.fill(zero);
+        self.hessian.fill(zero);
     }
-    if ORDER == 1 {
-        return;
-    }
-    if let Some(last) = sums.last_mut() {
-        add_products::<S>(last, &first, &[1.0; BLOCK]);
-    }
-    let mut second = [0.0; BLOCK];
-    multiply(&mut second, weights, &phi[2]);
-    let mut at = 1 + d;
-    for a in 0..d {
-        let mut row = [0.0; BLOCK];
-        multiply(&mut row, &second, &differences[a]);
-        for difference in &differences[a..] {
-            add_products::<S>(&mut sums[at], &row, difference);
-            at += 1;
+
+    /// Turns the sums into a jet: factors `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
+    ///
+    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
+    #[inline(always)]
+    fn finish<const ORDER: usize, const MAGNITUDES: bool>(&self, kernel: &Kernel, jet: &mut [f64]) {
+        let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
+        let mut jet = jet.iter_mut();
+        let mut put = |number: f64| {
+            if let Some(slot) = jet.next() {
+                *slot = number;
+            }
+        };
+        put(variance * self.value.sum_lanes());
+        if ORDER == 0 {
+            return;
+        }
+        for sum in &self.gradient {
+            put(2.0 * (variance * sum.sum_lanes()) * inverse * inverse);
+        }
+        if ORDER == 1 {
+            return;
+        }
+        let d = self.gradient.len();
+        let trace_term = 2.0 * variance * self.trace.sum_lanes() * inverse * inverse;
+        let mut packed = self.hessian.iter();
+        for a in 0..d {
+            for (b, sum) in (a..d).zip(&mut packed) {
+                let entry = 4.0 * (variance * sum.sum_lanes()) * inverse * inverse * inverse * inverse;
+                put(if a == b { entry + trace_term } else { entry });
+            }
+        }
+        if MAGNITUDES {
+            put(variance * self.magnitudes[0].sum_lanes());
+            put(variance * self.magnitudes[1].sum_lanes() * 2.0 * inverse);
         }
     }
 }
 
-#[inline(always)]
-fn add_magnitudes<S: Simd>(sums: &mut [Lanes], weights: &Block, q: &Block, phi: &[Block; 3]) {
-    let (mut magnitude, mut slope) = ([0.0; BLOCK], [0.0; BLOCK]);
-    for i in 0..BLOCK {
-        magnitude[i] = weights[i].abs();
-        slope[i] = -phi[1][i] * q[i].sqrt();
+/// Computes a block's differences and weighted profiles, and adds up what needs no difference.
+struct Weighted<'a, S: Simd, const ORDER: usize, const MAGNITUDES: bool> {
+    simd: S,
+    pass: &'a Pass<'a>,
+    block: usize,
+    x: &'a [f64],
+    weights: &'a Block,
+    sums: &'a mut Sums<S>,
+}
+
+impl<S: Simd, const ORDER: usize, const MAGNITUDES: bool> Pairs<S> for Weighted<'_, S, ORDER, MAGNITUDES> {
+    type Others = Pack<S>;
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
+        let Pass { nodes, kernel, .. } = self.pass;
+        let differences = &mut self.sums.differences;
+        let q = nodes.scaled_distances(self.simd, (self.block, at), self.x, kernel, |c, difference| {
+            if ORDER >= 1 {
+                difference.store(&mut differences[c], at);
+            }
+        });
+        (q, q)
     }
-    add_products::<S>(&mut sums[0], &magnitude, &phi[0]);
-    add_products::<S>(&mut sums[1], &magnitude, &slope);
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, q: Pack<S>, [phi, slope, bend]: [Pack<S>; 3]) {
+        let weight = Pack::load(self.simd, self.weights, at);
+        let sums = &mut *self.sums;
+        sums.value = sums.value + (weight * phi).sum_registers();
+        if ORDER >= 1 {
+            (weight * slope).store(&mut sums.first, at);
+        }
+        if ORDER >= 2 {
+            sums.trace = sums.trace + (weight * slope).sum_registers();
+            (weight * bend).store(&mut sums.second, at);
+        }
+        if MAGNITUDES {
+            let weight = weight.abs();
+            sums.magnitudes[0] = sums.magnitudes[0] + (weight * phi).sum_registers();
+            sums.magnitudes[1] = sums.magnitudes[1] - (weight * slope * q.sqrt()).sum_registers();
+        }
+    }
 }
 
 #[cfg(test)]

@@ -9,10 +9,12 @@ pub mod degeneracy;
 pub mod duplicates;
 pub mod error;
 pub mod geometry;
+pub mod gram;
 pub mod interpolant;
 pub mod jets;
 pub mod kernel;
 pub mod neighbours;
+pub mod nodes;
 pub mod noise;
 pub mod observer;
 pub mod operators;
@@ -23,8 +25,7 @@ pub mod surface;
 
 mod eigen;
 mod examination;
-mod gram;
-mod nodes;
+mod exp;
 mod offset;
 mod orientation;
 mod patch;
@@ -34,22 +35,7 @@ mod shape;
 mod simd;
 #[cfg(test)]
 mod testing;
+mod tiles;
 mod vector;
 
-/// The instruction set that the kernel loops run on, chosen at run time.
-pub fn instruction_set() -> &'static str {
-    struct Name;
-    impl pulp::WithSimd for Name {
-        type Output = &'static str;
-        #[inline(always)]
-        fn with_simd<S: pulp::Simd>(self, _simd: S) -> &'static str {
-            match S::F64_LANES {
-                8 => "AVX-512",
-                4 => "AVX2 and FMA",
-                2 => "128-bit vectors",
-                _ => "portable",
-            }
-        }
-    }
-    pulp::Arch::new().dispatch(Name)
-}
+pub use simd::InstructionSet;
