@@ -15,7 +15,7 @@ use gramian::numerics::observer::Unobserved;
 
 const N_POINTS: usize = 4096;
 const N_QUERIES: usize = 500;
-const ROUNDS: usize = 9;
+const ROUNDS: usize = 15;
 
 const FAMILIES: [(&str, Family); 7] = [
     ("gauss", Family::Gauss),

