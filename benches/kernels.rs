@@ -1,62 +1,118 @@
-//! Kernel evaluations per second and core, by family: values alone, and value, gradient and Hessian summed over the points.
+//! Kernel evaluations per second and core, by instruction set and family: entries of the Gram matrix, and values,
+//! gradients and Hessians summed over the points; then by dimension, also in floating-point operations.
 //!
 //! `cargo bench --bench kernels`
 
 use std::time::Instant;
 
+use gramian::numerics::InstructionSet;
 use gramian::numerics::cloud::Cloud;
+use gramian::numerics::gram::fill_cross_gram;
 use gramian::numerics::jets::{JetOrder, Jets};
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
+use gramian::numerics::nodes::Nodes;
 use gramian::numerics::observer::Unobserved;
 
 const N_POINTS: usize = 4096;
 const N_QUERIES: usize = 500;
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 15;
+
+const FAMILIES: [(&str, Family); 7] = [
+    ("gauss", Family::Gauss),
+    ("laplace, epsilon 1", Family::Laplace { epsilon: 1.0 }),
+    ("matern, nu 1.5", Family::Matern { order: 1 }),
+    ("matern, nu 2.5", Family::Matern { order: 2 }),
+    ("matern, nu 8.5", Family::Matern { order: 8 }),
+    ("wendland, smoothness 4", Family::Wendland { smoothness: WendlandSmoothness::C4 }),
+    ("inverse multiquadric", Family::InverseMultiquadric),
+];
+
+const WORKS: [(&str, Work); 5] = [
+    ("gram", Work::Gram),
+    ("value", Work::Jets(JetOrder::Value)),
+    ("gradient", Work::Jets(JetOrder::Gradient)),
+    ("Hessian", Work::Jets(JetOrder::Hessian)),
+    ("magnitudes", Work::Jets(JetOrder::HessianWithMagnitudes)),
+];
+
+#[derive(Clone, Copy)]
+enum Work {
+    /// Rows of the cross-Gram matrix, into a warm buffer.
+    Gram,
+    /// Sums of everything up to an order.
+    Jets(JetOrder),
+}
 
 fn main() {
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    println!(
-        "d = 3, n = {N_POINTS}, G pairs/s on one core, best of {ROUNDS}, {}",
-        gramian::numerics::instruction_set()
-    );
-    println!("{:28} {:>8} {:>22}", "", "value", "value+gradient+Hessian");
-    let families = [
-        ("gauss", Family::Gauss),
-        ("laplace, epsilon 1", Family::Laplace { epsilon: 1.0 }),
-        ("matern, nu 1.5", Family::Matern { order: 1 }),
-        ("matern, nu 2.5", Family::Matern { order: 2 }),
-        ("matern, nu 8.5", Family::Matern { order: 8 }),
-        ("wendland, smoothness 4", Family::Wendland { smoothness: WendlandSmoothness::C4 }),
-        ("inverse multiquadric", Family::InverseMultiquadric),
-    ];
-    for (name, family) in families {
+    one_core.install(|| {
+        println!(
+            "n = {N_POINTS}, G pairs/s on one core, best of {ROUNDS}; each order includes the lower ones"
+        );
+        for set in InstructionSet::available() {
+            by_family(set);
+        }
+        by_dimension();
+    });
+}
+
+fn by_family(set: InstructionSet) {
+    print!("\n{:28}", format!("d = 3, {}", set.name()));
+    WORKS.iter().for_each(|(name, _)| print!(" {name:>10}"));
+    println!();
+    for (name, family) in FAMILIES {
+        print!("{name:28}");
+        WORKS.iter().for_each(|&(_, work)| print!(" {:10.3}", rate(set, family, work, 3)));
+        println!();
+    }
+}
+
+/// A multiplication or an addition of one pair is an operation; the profile itself is not counted.
+fn by_dimension() {
+    println!("\n{:28} {:>10} {:>10} {:>10}", "gauss, best set", "value", "Hessian", "G flop/s");
+    for d in [1, 2, 3, 4, 6, 8, 16] {
+        let set = InstructionSet::best();
         let [value, hessian] =
-            [JetOrder::Value, JetOrder::Hessian].map(|order| one_core.install(|| rate(family, order)));
-        println!("{name:28} {value:8.3} {hessian:22.3}");
+            [JetOrder::Value, JetOrder::Hessian].map(|order| rate(set, Family::Gauss, Work::Jets(order), d));
+        // Differences and their squares, gradient, weighted rows and their products.
+        let flops = 3 * d + 2 * d + d + d * (d + 1);
+        println!("{:28} {value:10.3} {hessian:10.3} {:10.1}", format!("d = {d}"), hessian * flops as f64);
     }
 }
 
 /// G pairs/s.
-fn rate(family: Family, order: JetOrder) -> f64 {
+fn rate(set: InstructionSet, family: Family, work: Work, d: usize) -> f64 {
     let kernel = Kernel::new(family, 1.5, 1.0).unwrap();
-    let (cloud, queries) = (scattered(N_POINTS, 1), scattered(N_QUERIES, 2));
+    let (nodes, queries) = (Nodes::on(set, &scattered(N_POINTS, d, 1)), scattered(N_QUERIES, d, 2));
     let weights = vec![1.0; N_POINTS];
+    let mut row = vec![0.0; 64 * N_POINTS];
+    let first_queries = Cloud::new(queries.coordinates()[..64 * d].to_vec(), d).unwrap();
     let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
         let began = Instant::now();
-        let jets = Jets::evaluate(&cloud, &kernel, &weights, &queries, order, &Unobserved).unwrap();
-        best = best.min(began.elapsed().as_secs_f64());
-        std::hint::black_box(jets.value(0));
+        let n_queries = match work {
+            Work::Gram => {
+                fill_cross_gram(&nodes, &kernel, &first_queries, &mut row, &Unobserved).unwrap();
+                std::hint::black_box(row[0]);
+                64
+            }
+            Work::Jets(order) => {
+                let jets = Jets::over(&nodes, &kernel, &weights, &queries, order, &Unobserved).unwrap();
+                std::hint::black_box(jets.value(0));
+                N_QUERIES
+            }
+        };
+        best = best.min(began.elapsed().as_secs_f64() / (n_queries * N_POINTS) as f64);
     }
-    (N_POINTS * N_QUERIES) as f64 / best / 1e9
+    1e-9 / best
 }
 
 /// n points in the unit cube.
-fn scattered(n: usize, seed: u64) -> Cloud {
+fn scattered(n: usize, d: usize, seed: u64) -> Cloud {
     let mut state = seed;
     let mut next = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    Cloud::new((0..3 * n).map(|_| next()).collect(), 3).unwrap()
+    Cloud::new((0..d * n).map(|_| next()).collect(), d).unwrap()
 }

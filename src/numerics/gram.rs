@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::error::NumericsError;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, Pairs};
 use super::nodes::Nodes;
 use super::observer::Observer;
 use super::regularization::Regularization;
-use super::simd::BLOCK;
+use super::simd::{BLOCK, Block, Pack};
 
 /// Columns per task: enough work to outweigh scheduling, few enough to balance a triangle over many threads.
 const COLUMNS_PER_TASK: usize = 16;
@@ -50,14 +50,14 @@ pub(crate) fn fill_kernel_column(
     points: Range<usize>,
     out: &mut [f64],
 ) {
-    pulp::Arch::new().dispatch(KernelColumn { nodes, kernel, x, points, out });
+    nodes.dispatch(KernelColumn { nodes, kernel, x, points, out });
 }
 
 /// Writes `cross[j·n + i] = k(x_i, q_j)`, the cross-Gram matrix `[m, n]` row by row, i.e. one query after the other.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
-pub(crate) fn fill_cross_gram(
+pub fn fill_cross_gram(
     nodes: &Nodes,
     kernel: &Kernel,
     queries: &Cloud,
@@ -88,20 +88,38 @@ impl WithSimd for KernelColumn<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let variance = self.kernel.variance();
-        let (mut q, mut phi) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut values = Block::ZERO;
         let (from, to) = (self.points.start, self.points.end);
         for block in from / BLOCK..to.div_ceil(BLOCK) {
-            self.nodes.scaled_distances::<S>(block, self.x, self.kernel, &mut q);
-            self.kernel.profile_block::<S, 0>(&q, &mut phi);
-            for value in &mut phi[0] {
-                *value *= variance;
-            }
+            self.kernel.profiles(Values { simd, column: &self, block, values: &mut values });
             let start = block * BLOCK;
             let (first, end) = (from.max(start), to.min(start + BLOCK));
-            self.out[first - from..end - from].copy_from_slice(&phi[0][first - start..end - start]);
+            self.out[first - from..end - from].copy_from_slice(&values.0[first - start..end - start]);
         }
+    }
+}
+
+/// Writes the kernel's values for a block.
+struct Values<'a, S> {
+    simd: S,
+    column: &'a KernelColumn<'a>,
+    block: usize,
+    values: &'a mut Block,
+}
+
+impl<S: Simd> Pairs<S> for Values<'_, S> {
+    type Others = ();
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
+        let KernelColumn { nodes, kernel, x, .. } = self.column;
+        (nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |_, _| ()), ())
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (): (), [phi, ..]: [Pack<S>; 3]) {
+        (phi * self.column.kernel.variance()).store(self.values, at);
     }
 }
 

@@ -9,11 +9,13 @@ pub mod degeneracy;
 pub mod duplicates;
 pub mod error;
 pub mod geometry;
+pub mod gram;
 pub mod interpolant;
 pub mod jets;
 pub mod kernel;
 pub mod memory;
 pub mod neighbours;
+pub mod nodes;
 pub mod noise;
 pub mod observer;
 pub mod operators;
@@ -24,8 +26,7 @@ pub mod surface;
 
 mod eigen;
 mod examination;
-mod gram;
-mod nodes;
+mod exp;
 mod offset;
 mod orientation;
 mod patch;
@@ -37,20 +38,4 @@ mod simd;
 mod testing;
 mod vector;
 
-/// The instruction set that the kernel loops run on, chosen at run time.
-pub fn instruction_set() -> &'static str {
-    struct Name;
-    impl pulp::WithSimd for Name {
-        type Output = &'static str;
-        #[inline(always)]
-        fn with_simd<S: pulp::Simd>(self, _simd: S) -> &'static str {
-            match S::F64_LANES {
-                8 => "AVX-512",
-                4 => "AVX2 and FMA",
-                2 => "128-bit vectors",
-                _ => "portable",
-            }
-        }
-    }
-    pulp::Arch::new().dispatch(Name)
-}
+pub use simd::InstructionSet;

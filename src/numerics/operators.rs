@@ -15,10 +15,10 @@ use super::error::NumericsError;
 use super::geometry::{Geometry, tangential_trace};
 use super::interpolant::Interpolant;
 use super::jets::{JetOrder, check_smooth_at};
-use super::kernel::Kernel;
+use super::kernel::{Kernel, Pairs};
 use super::nodes::Nodes;
 use super::observer::{Observer, Stage};
-use super::simd::{BLOCK, Block, fma};
+use super::simd::{BLOCK, Block, Pack};
 use super::solver::GramFactor;
 use super::vector::dot;
 
@@ -130,14 +130,14 @@ fn operator_matrix(
     observer.enter(Stage::Evaluate);
     let (n, m) = (cloud.n_points(), queries.n_points());
     let n_rows = operator.n_components(cloud.dimension()) * m;
-    let (nodes, arch) = (Nodes::of(cloud), pulp::Arch::new());
+    let nodes = Nodes::of(cloud);
     let mut matrix = vec![0.0; n_rows * n];
     matrix.par_chunks_mut(n).enumerate().try_for_each(|(index, row)| {
         observer.checkpoint()?;
         let (component, query) = (index / m, index % m);
         if !geometry.is_null()[query] {
             let x = queries.point(query);
-            arch.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
+            nodes.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
         }
         Ok(())
     })?;
@@ -178,51 +178,94 @@ impl WithSimd for Row<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let normal = self.geometry.normal(self.query);
-        let inverse = 1.0 / self.kernel.length_scale();
-        let first = 2.0 * self.kernel.variance() * inverse * inverse;
-        let second = 4.0 * self.kernel.variance() * inverse * inverse;
-        let tangent_dimension = (normal.len() - 1) as f64;
-        let trace = self.geometry.trace_of_shape_operator(self.query);
-        let mut differences = vec![[0.0; BLOCK]; normal.len()];
-        let (mut q, mut phi, mut out) = ([0.0; BLOCK], [[0.0; BLOCK]; 3], [0.0; BLOCK]);
-        for (block, row) in self.row.chunks_mut(BLOCK).enumerate() {
-            self.nodes.differences::<S>(block, self.x, self.kernel, &mut differences, &mut q);
-            let along = along_normal::<S>(normal, &differences);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut out = Block::ZERO;
+        for block in 0..self.row.len().div_ceil(BLOCK) {
+            let pairs = RowPairs { simd, row: &self, block, out: &mut out };
             match self.operator {
-                Operator::SurfaceGradient => {
-                    self.kernel.profile_block::<S, 1>(&q, &mut phi);
-                    let (difference, normal) = (&differences[self.component], normal[self.component]);
-                    for i in 0..BLOCK {
-                        out[i] = first * phi[1][i] * fma::<S>(-along[i], normal, difference[i]);
-                    }
-                }
-                Operator::LaplaceBeltrami => {
-                    self.kernel.profile_block::<S, 2>(&q, &mut phi);
-                    for i in 0..BLOCK {
-                        // (|D|² − a²)/ℓ², with |D|²/ℓ² = q.
-                        let tangential = q[i] - along[i] * along[i] * inverse * inverse;
-                        let slope = fma::<S>(-trace, along[i], tangent_dimension);
-                        out[i] = fma::<S>(second * phi[2][i], tangential, first * phi[1][i] * slope);
-                    }
-                }
+                Operator::SurfaceGradient => self.kernel.profiles(SurfaceGradientPairs(pairs)),
+                Operator::LaplaceBeltrami => self.kernel.profiles(LaplaceBeltramiPairs(pairs)),
             }
-            row.copy_from_slice(&out[..row.len()]);
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(self.row.len());
+            self.row[start..end].copy_from_slice(&out.0[..end - start]);
         }
     }
 }
 
-/// `a = ν·D` pair by pair.
-#[inline(always)]
-fn along_normal<S: Simd>(normal: &[f64], differences: &[Block]) -> Block {
-    let mut along = [0.0; BLOCK];
-    for (&normal, difference) in normal.iter().zip(differences) {
-        for i in 0..BLOCK {
-            along[i] = fma::<S>(normal, difference[i], along[i]);
-        }
+/// A block of a row.
+struct RowPairs<'a, S> {
+    simd: S,
+    row: &'a Row<'a>,
+    block: usize,
+    out: &'a mut Block,
+}
+
+impl<S: Simd> RowPairs<'_, S> {
+    /// q and a = ν·D of a pack; `each` sees the differences.
+    #[inline(always)]
+    fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
+        let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
+        let normal = geometry.normal(query);
+        let mut along = Pack::splat(self.simd, 0.0);
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+            along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
+            each(c, difference);
+        });
+        (q, along)
     }
-    along
+}
+
+struct SurfaceGradientPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for SurfaceGradientPairs<'_, S> {
+    type Others = Pack<S>;
+
+    /// Hands on component c of D − aν.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
+        let Self(pairs) = self;
+        let Row { component, geometry, query, .. } = *pairs.row;
+        let mut own = Pack::splat(pairs.simd, 0.0);
+        let (q, along) = pairs.along(at, |c, difference| {
+            if c == component {
+                own = difference;
+            }
+        });
+        (q, own - along * geometry.normal(query)[component])
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, tangential: Pack<S>, [_, slope, _]: [Pack<S>; 3]) {
+        let kernel = self.0.row.kernel;
+        let factor = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        (factor * slope * tangential).store(self.0.out, at);
+    }
+}
+
+struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
+    type Others = (Pack<S>, Pack<S>);
+
+    /// Hands on q and a.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
+        let (q, along) = self.0.along(at, |_, _| ());
+        (q, (q, along))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (q, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
+        let Row { kernel, geometry, query, x, .. } = *self.0.row;
+        let inverse_square = kernel.inverse_square_length();
+        let first = 2.0 * kernel.variance() * inverse_square;
+        let tangent_dimension = (x.len() - 1) as f64;
+        // (|D|² − a²)/ℓ², with |D|²/ℓ² = q.
+        let tangential = q - along * along * inverse_square;
+        let turned = tangent_dimension - along * geometry.trace_of_shape_operator(query);
+        (2.0 * first * bend).mul_add(tangential, first * slope * turned).store(self.0.out, at);
+    }
 }
 
 #[cfg(test)]

@@ -2,11 +2,17 @@
 
 use pulp::Simd;
 
-use crate::numerics::simd::exp_nonpositive;
+use super::Profile;
+use crate::numerics::exp::exp_minus;
+use crate::numerics::simd::Pack;
 
-/// φ, φ′, φ″ = e^{−q}, −e^{−q}, e^{−q}.
-#[inline(always)]
-pub(super) fn profile<S: Simd>(q: f64) -> [f64; 3] {
-    let e = exp_nonpositive::<S>(-q);
-    [e, -e, e]
+pub(super) struct Gauss;
+
+impl Profile for Gauss {
+    /// φ, φ′, φ″ = e^{−q}, −e^{−q}, e^{−q}.
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        let e = exp_minus(q);
+        [e, -e, e]
+    }
 }

@@ -3,16 +3,22 @@
 
 use pulp::Simd;
 
-use super::TINY;
-use crate::numerics::simd::exp_nonpositive;
+use super::{Profile, TINY};
+use crate::numerics::exp::exp_minus;
+use crate::numerics::simd::Pack;
 
-/// φ = e^{−t}, φ′ = −e^{−t}/(2t), φ″ = e^{−t}(1/t² + 1/t³)/4.
-#[inline(always)]
-pub(super) fn profile<S: Simd>(q: f64, epsilon: f64) -> [f64; 3] {
-    let t = (q + epsilon).sqrt();
-    let t = if t < TINY { TINY } else { t };
-    let inverse = 1.0 / t;
-    let e = exp_nonpositive::<S>(-t);
-    let first = 0.5 * e * inverse;
-    [e, -first, 0.5 * first * (inverse + inverse * inverse)]
+pub(super) struct Laplace {
+    pub(super) epsilon: f64,
+}
+
+impl Profile for Laplace {
+    /// φ = e^{−t}, φ′ = −e^{−t}/(2t), φ″ = e^{−t}(1/t² + 1/t³)/4.
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        let t = (q + self.epsilon).sqrt().at_least(TINY);
+        let inverse = 1.0 / t;
+        let e = exp_minus(t);
+        let first = -0.5 * e * inverse;
+        [e, first, -0.5 * first * inverse.mul_add(inverse, inverse)]
+    }
 }

@@ -13,7 +13,7 @@ mod wendland;
 use pulp::Simd;
 
 use super::error::NumericsError;
-use super::simd::{BLOCK, Block};
+use super::simd::Pack;
 
 /// The families, with the parameters that are theirs alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,26 +122,31 @@ impl Kernel {
         }
     }
 
-    /// φ, φ′ and φ″ (the first `ORDER + 1` of them) for a block of squared scaled distances.
+    /// 1/ℓ², between 1e-280 and 1e280.
+    pub(crate) fn inverse_square_length(&self) -> f64 {
+        1.0 / (self.length_scale * self.length_scale)
+    }
+
+    /// Runs over the pairs of a block with φ, φ′ and φ″. Derivatives that the loop body does not use are never computed.
     #[inline(always)]
-    pub(crate) fn profile_block<S: Simd, const ORDER: usize>(&self, q: &Block, phi: &mut [Block; 3]) {
+    pub(crate) fn profiles<S: Simd>(&self, pairs: impl Pairs<S>) {
         use WendlandSmoothness::{C2, C4, C6};
         match self.family {
-            Family::Gauss => fill::<ORDER>(q, phi, gauss::profile::<S>),
-            Family::Laplace { epsilon } => fill::<ORDER>(q, phi, |q| laplace::profile::<S>(q, epsilon)),
-            Family::Matern { order: 0 } => fill::<ORDER>(q, phi, matern::profile::<S, 0>),
-            Family::Matern { order: 1 } => fill::<ORDER>(q, phi, matern::profile::<S, 1>),
-            Family::Matern { order: 2 } => fill::<ORDER>(q, phi, matern::profile::<S, 2>),
-            Family::Matern { order: 3 } => fill::<ORDER>(q, phi, matern::profile::<S, 3>),
-            Family::Matern { order: 4 } => fill::<ORDER>(q, phi, matern::profile::<S, 4>),
-            Family::Matern { order: 5 } => fill::<ORDER>(q, phi, matern::profile::<S, 5>),
-            Family::Matern { order: 6 } => fill::<ORDER>(q, phi, matern::profile::<S, 6>),
-            Family::Matern { order: 7 } => fill::<ORDER>(q, phi, matern::profile::<S, 7>),
-            Family::Matern { .. } => fill::<ORDER>(q, phi, matern::profile::<S, 8>),
-            Family::Wendland { smoothness: C2 } => fill::<ORDER>(q, phi, wendland::profile_c2),
-            Family::Wendland { smoothness: C4 } => fill::<ORDER>(q, phi, wendland::profile_c4),
-            Family::Wendland { smoothness: C6 } => fill::<ORDER>(q, phi, wendland::profile_c6),
-            Family::InverseMultiquadric => fill::<ORDER>(q, phi, inverse_multiquadric::profile),
+            Family::Gauss => each(pairs, gauss::Gauss),
+            Family::Laplace { epsilon } => each(pairs, laplace::Laplace { epsilon }),
+            Family::Matern { order: 0 } => each(pairs, matern::Matern::<0>),
+            Family::Matern { order: 1 } => each(pairs, matern::Matern::<1>),
+            Family::Matern { order: 2 } => each(pairs, matern::Matern::<2>),
+            Family::Matern { order: 3 } => each(pairs, matern::Matern::<3>),
+            Family::Matern { order: 4 } => each(pairs, matern::Matern::<4>),
+            Family::Matern { order: 5 } => each(pairs, matern::Matern::<5>),
+            Family::Matern { order: 6 } => each(pairs, matern::Matern::<6>),
+            Family::Matern { order: 7 } => each(pairs, matern::Matern::<7>),
+            Family::Matern { .. } => each(pairs, matern::Matern::<8>),
+            Family::Wendland { smoothness: C2 } => each(pairs, wendland::C2),
+            Family::Wendland { smoothness: C4 } => each(pairs, wendland::C4),
+            Family::Wendland { smoothness: C6 } => each(pairs, wendland::C6),
+            Family::InverseMultiquadric => each(pairs, inverse_multiquadric::InverseMultiquadric),
         }
     }
 }
@@ -150,19 +155,33 @@ impl Kernel {
 /// unbounded at 0 divide by at least this, so that they stay finite and D = 0 annihilates them there.
 const TINY: f64 = 1e-100;
 
-/// Writes the profile of every pair; what `ORDER` leaves out is never computed.
+/// A family's formula.
+trait Profile {
+    /// φ, φ′, φ″ at q, branch-free.
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3];
+}
+
+/// The body of a loop over the pairs of one query and a block of points.
+///
+/// Two methods of a trait and not two closures, because only a method can be made to inline: what is not compiled into
+/// the function that has the instruction set falls back to a call per instruction.
+pub(crate) trait Pairs<S: Simd> {
+    /// What [`Pairs::take`] wants to know of the pairs beside their profile.
+    type Others;
+
+    /// q of pack `at`.
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others);
+
+    /// Takes φ, φ′, φ″ at that q.
+    fn take(&mut self, at: usize, others: Self::Others, profile: [Pack<S>; 3]);
+}
+
+/// The loop of [`Kernel::profiles`], compiled with one profile.
 #[inline(always)]
-fn fill<const ORDER: usize>(q: &Block, phi: &mut [Block; 3], profile: impl Fn(f64) -> [f64; 3]) {
-    let [phi0, phi1, phi2] = phi;
-    for i in 0..BLOCK {
-        let [p0, p1, p2] = profile(q[i]);
-        phi0[i] = p0;
-        if ORDER >= 1 {
-            phi1[i] = p1;
-        }
-        if ORDER >= 2 {
-            phi2[i] = p2;
-        }
+fn each<S: Simd>(mut pairs: impl Pairs<S>, profile: impl Profile) {
+    for at in 0..Pack::<S>::PER_BLOCK {
+        let (q, others) = pairs.pack(at);
+        pairs.take(at, others, profile.at(q));
     }
 }
 
