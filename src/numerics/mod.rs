@@ -24,6 +24,7 @@ pub mod surface;
 mod eigen;
 mod examination;
 mod gram;
+pub(crate) mod heap;
 mod nodes;
 mod offset;
 mod orientation;

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::parallelism;
 use crate::numerics::error::NumericsError;
+use crate::numerics::heap::vec_bytes;
 use crate::numerics::observer::Observer;
 
 /// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
@@ -48,7 +49,7 @@ impl Cholesky {
     }
 
     pub(super) fn n_bytes(&self) -> usize {
-        size_of_val(self.buffer.as_slice())
+        vec_bytes(&self.buffer)
     }
 
     fn lower(&self) -> MatRef<'_, f64> {
