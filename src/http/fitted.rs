@@ -101,12 +101,17 @@ impl Fitted {
 
     /// The surface of the signature function, with the client's normals if there are any.
     fn surface(&self, app: &App, observer: &JobObserver) -> Result<Arc<Surface>, Problem> {
-        self.stored.surface(|| {
+        let is_new = !self.stored.has_surface();
+        let surface = self.stored.surface(|| {
             let ones = vec![1.0; self.plan.stored.cloud.n_points()];
             let signature = self.interpolant(app, &ones, observer)?;
             let given = self.plan.fitted_normals();
             Surface::of(signature, given.as_deref(), observer).map_err(|error| self.refused(error))
-        })
+        })?;
+        if is_new {
+            app.factors.reweigh(self.plan.key);
+        }
+        Ok(surface)
     }
 
     /// Values at the points that are factorized: means over merged duplicates.

@@ -1,8 +1,8 @@
 //! HTTP: every route on this page, middleware beneath.
 
-mod array;
+pub mod array;
 pub mod auth;
-mod body;
+pub mod body;
 pub mod compute;
 mod fit;
 mod fitted;

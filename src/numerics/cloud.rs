@@ -1,6 +1,7 @@
 //! Points in space: finite, rectangular, flat. Clouds and queries are both of this type.
 
 use super::error::NumericsError;
+use super::heap::vec_bytes;
 
 /// Coordinates up to here have squared distances, and length scales chosen from them, well inside float64.
 pub const MAX_COORDINATE: f64 = 1e100;
@@ -66,6 +67,21 @@ impl Cloud {
     /// All coordinates, row-major `[n, d]`.
     pub fn coordinates(&self) -> &[f64] {
         &self.coordinates
+    }
+
+    /// The same cloud without what a parser reserved beyond its points: for clouds that are kept.
+    ///
+    /// `Vec::shrink_to_fit` may leave a block as it is; a copy is the size of the points.
+    pub(crate) fn compact(mut self) -> Self {
+        if self.coordinates.capacity() > self.coordinates.len() {
+            self.coordinates = self.coordinates.as_slice().to_vec();
+        }
+        self
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        vec_bytes(&self.coordinates)
     }
 
     /// The coordinates of one point.

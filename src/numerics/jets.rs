@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::cloud::Cloud;
 use super::duplicates::Positions;
 use super::error::NumericsError;
+use super::heap::vec_bytes;
 use super::kernel::Kernel;
 use super::nodes::{Nodes, blocked};
 use super::observer::Observer;
@@ -117,6 +118,11 @@ impl Jets {
 
     pub fn dimension(&self) -> usize {
         self.layout.dimension
+    }
+
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.packed)
     }
 
     fn jet(&self, query: usize) -> &[f64] {

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use memmap2::MmapMut;
 
 use super::error::NumericsError;
+use super::heap::vec_bytes;
 
 /// Buffers from this size on are mapped: below it the allocator recycles memory by itself, and no huge page is filled.
 const MAPPED_BYTES: usize = 4 << 20;
@@ -103,7 +104,7 @@ impl Buffer {
     /// Bytes that it takes, whether or not they are used.
     pub(crate) fn n_bytes(&self) -> usize {
         match &self.pages {
-            Pages::Heap(numbers) => size_of_val(numbers.as_slice()),
+            Pages::Heap(numbers) => vec_bytes(numbers),
             Pages::Mapped(map) => map.len(),
             Pages::Gone => 0,
         }

@@ -27,6 +27,7 @@ pub mod surface;
 mod eigen;
 mod examination;
 mod exp;
+pub(crate) mod heap;
 mod offset;
 mod orientation;
 mod patch;

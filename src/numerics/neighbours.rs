@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
+use super::heap::vec_bytes;
 
 /// Points per leaf: scanning 12 points costs about what two more levels of descent do.
 const LEAF_SIZE: usize = 12;
@@ -153,7 +154,7 @@ impl Neighbours {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        self.order.len() * size_of::<u32>() + self.nodes.len() * size_of::<Node>()
+        vec_bytes(&self.order) + vec_bytes(&self.nodes)
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::cloud::Cloud;
 use super::eigen::symmetric_eigen;
+use super::heap::vec_bytes;
 use super::neighbours::{Neighbour, Neighbours};
 use super::vector::{dot, norm};
 
@@ -197,6 +198,11 @@ const SMOOTH_RESIDUAL: f64 = 0.01;
 const DISC_ERROR: f64 = 8.5;
 
 impl LocalFit {
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.normal) + vec_bytes(&self.curvatures)
+    }
+
     /// Whether the neighbours look like a piece of one smooth surface.
     pub(crate) fn is_reliable(&self) -> bool {
         self.residual < RELIABLE_RESIDUAL * self.radius && self.bend() < RELIABLE_BEND

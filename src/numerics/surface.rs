@@ -9,6 +9,7 @@ use super::defaults::median;
 use super::degeneracy::{is_rounding, is_too_rough, turns_within_spacing};
 use super::duplicates::count_duplicates;
 use super::error::NumericsError;
+use super::heap::{arc_payload, block_bytes, vec_bytes};
 use super::interpolant::Interpolant;
 use super::jets::{JetOrder, Jets};
 use super::neighbours::Neighbours;
@@ -317,13 +318,20 @@ impl Surface {
 
     /// Bytes held on the heap beside the factor.
     pub fn n_bytes(&self) -> usize {
-        Self::n_bytes_needed(self.cloud().n_points(), self.cloud().dimension())
-    }
-
-    /// Bytes that n points of dimension d take: tree, jets, fits with their vectors, normals.
-    pub fn n_bytes_needed(n_points: usize, dimension: usize) -> usize {
-        let jet = 1 + dimension + dimension * (dimension + 1) / 2 + 2;
-        let numbers = jet + 3 * dimension + 1;
-        n_points * (16 + 8 * numbers + size_of::<Option<LocalFit>>())
+        let n = self.cloud().n_points();
+        let jets = self.jets.as_ref().map_or(0, Jets::n_bytes);
+        // Their small vectors lie among short-lived ones, which leave about as much unused.
+        let fits: usize = self.fits.iter().flatten().map(|fit| 2 * fit.n_bytes()).sum();
+        // Asked for later, if at all.
+        let left_out_misses = if n <= MAX_LEFT_OUT { block_bytes(n * size_of::<f64>()) } else { 0 };
+        self.signature.solution.n_bytes()
+            + self.neighbours.n_bytes()
+            + jets
+            + vec_bytes(&self.spacings)
+            + vec_bytes(&self.fits)
+            + fits
+            + vec_bytes(&self.normals)
+            + left_out_misses
+            + block_bytes(arc_payload::<Self>())
     }
 }

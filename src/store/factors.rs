@@ -3,11 +3,13 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+use moka::ops::compute::Op;
 use moka::sync::Cache;
 
 use super::key::{CloudId, FactorKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
-use super::{Owner, bounded_cache};
+use super::{Owner, bounded_cache, n_bytes_of};
+use crate::numerics::heap::{arc_payload, block_bytes};
 use crate::numerics::memory::SpareBuffer;
 use crate::numerics::solver::{GramFactor, Solution};
 use crate::numerics::surface::Surface;
@@ -43,9 +45,15 @@ impl StoredFactor {
         Ok(self.surface.get_or_init(|| made).clone())
     }
 
+    /// Whether the surface was made.
+    pub fn has_surface(&self) -> bool {
+        self.surface.get().is_some()
+    }
+
+    /// Bytes held on the heap, those of the surface once there is one.
     fn n_bytes(&self) -> usize {
-        let (n, d) = (self.factor.n_points(), self.factor.cloud().dimension());
-        self.factor.n_bytes() + Surface::n_bytes_needed(n, d) + size_of::<Self>()
+        let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<GramFactor>());
+        own + self.factor.n_bytes() + self.surface.get().map_or(0, |surface| surface.n_bytes())
     }
 }
 
@@ -77,7 +85,10 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         let max_factor_bytes = max_bytes - max_solution_bytes - max_spare_bytes;
         Self {
             factors: bounded_cache(max_factor_bytes, |f: &Arc<StoredFactor>| f.n_bytes()).build(),
-            solutions: bounded_cache(max_solution_bytes, |s: &Arc<Solution>| s.n_bytes() + 256).build(),
+            solutions: bounded_cache(max_solution_bytes, |solution: &Arc<Solution>| {
+                block_bytes(arc_payload::<Solution>()) + solution.n_bytes()
+            })
+            .build(),
             flights: SingleFlight::new(),
             max_factor_bytes,
             spare: SpareBuffer::up_to(usize::try_from(max_spare_bytes).unwrap_or(usize::MAX)),
@@ -147,6 +158,20 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         self.solutions.insert((key, values), solution);
     }
 
+    /// Weighs a factor again, whose surface was made since it was kept.
+    pub fn reweigh(&self, key: FactorKey) {
+        // Putting the value back is how moka weighs again; what was evicted or forgotten meanwhile stays away.
+        self.factors.entry(key).and_compute_with(|kept| match kept {
+            Some(entry) => Op::Put(entry.into_value()),
+            None => Op::Nop,
+        });
+    }
+
+    /// Bytes of all factors and weights that are kept.
+    pub fn n_bytes(&self) -> u64 {
+        n_bytes_of(&self.factors) + n_bytes_of(&self.solutions) + self.spare.n_bytes() as u64
+    }
+
     /// Forgets everything that was computed from a cloud.
     pub fn forget_cloud(&self, owner: Owner, id: CloudId) {
         let is_of_cloud = move |key: &FactorKey| key.owner == owner && key.cloud_id == id;
@@ -199,8 +224,8 @@ mod tests {
 
     #[tokio::test]
     async fn the_bytes_of_all_factors_stay_within_the_budget() {
-        // 100 points take 50 · 112 · 8 bytes = 44 KiB, and up to 20 KiB for their surface; the budget holds two, not three.
-        let store = FactorStore::<&str>::new(180 << 10);
+        // 100 points take 50 · 112 · 8 bytes = 44 KiB in a block of 48; the budget holds two, not three.
+        let store = FactorStore::<&str>::new(150 << 10);
         for alpha in [1.0, 2.0, 3.0] {
             store.get_or_factorize(key(alpha), || factorize(100)).await.map(|_| ()).unwrap();
         }

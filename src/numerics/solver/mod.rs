@@ -15,6 +15,7 @@ use faer::{Mat, MatMut, Par};
 use super::cloud::Cloud;
 use super::duplicates::coinciding_points;
 use super::error::{NotDefinite, NumericsError};
+use super::heap::{arc_payload, block_bytes, vec_bytes};
 use super::kernel::Kernel;
 use super::memory::SpareBuffer;
 use super::observer::{Observer, Stage};
@@ -175,7 +176,7 @@ impl GramFactor {
         self.norm1
     }
 
-    /// Bytes held on the heap.
+    /// Bytes held on the heap, those of the cloud included: the factor may outlive whoever shares it.
     pub fn n_bytes(&self) -> usize {
         let factor = match &self.factorization {
             Factorization::Cholesky(factor) => factor.n_bytes(),
@@ -183,9 +184,9 @@ impl GramFactor {
         };
         let noise = match &self.regularization {
             Regularization::Uniform(_) => 0,
-            Regularization::PerPoint(variances) => size_of_val(variances.as_slice()),
+            Regularization::PerPoint(variances) => vec_bytes(variances),
         };
-        factor + noise + size_of_val(self.cloud.coordinates())
+        factor + noise + block_bytes(arc_payload::<Cloud>()) + self.cloud.n_bytes()
     }
 
     /// Overwrites the columns of `[n, k]` values by weights, `Λ = W Y` with `W = (K + αI)⁻¹` (its least-squares

@@ -15,6 +15,7 @@ use super::parallelism;
 use super::pivoting::{Pivoting, Pivots};
 use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
+use crate::numerics::heap::vec_bytes;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::observer::Observer;
 use crate::numerics::regularization::Regularization;
@@ -103,7 +104,7 @@ impl PivotedCholesky {
     }
 
     pub(super) fn n_bytes(&self) -> usize {
-        self.buffer.capacity() * size_of::<f64>() + size_of_val(self.order.as_slice())
+        vec_bytes(&self.buffer) + vec_bytes(&self.order)
     }
 
     /// `Λ_Z = (L₁₁L₁₁ᵀ)⁻¹ (Y_Z + C(Y₂ − MY_Z))`, zero elsewhere, column by column, in place.

@@ -4,6 +4,7 @@ use faer::MatMut;
 
 use super::GramFactor;
 use crate::numerics::error::{NotDefinite, NumericsError};
+use crate::numerics::heap::vec_bytes;
 use crate::numerics::jets::{JetOrder, Jets};
 use crate::numerics::observer::{Observer, Stage};
 
@@ -60,7 +61,7 @@ impl Solution {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        size_of_val(self.weights.as_slice())
+        vec_bytes(&self.weights)
     }
 }
 

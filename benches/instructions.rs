@@ -1,0 +1,170 @@
+//! The hot parts, one at a time, for counting their instructions: `benches/instructions.py` runs this under callgrind.
+//!
+//! `cargo bench --bench instructions -- PART` runs one part once; without a name all of them, and lists their names. Only
+//! what happens inside [`measured`] is counted. Everything runs on one thread, the calling one, so that callgrind sees it.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use gramian::http::array::Array;
+use gramian::http::body::Points;
+use gramian::numerics::cloud::Cloud;
+use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::jets::{JetOrder, Jets};
+use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::neighbours::Neighbours;
+use gramian::numerics::observer::{Observer, Stage, Unobserved};
+use gramian::numerics::posterior;
+use gramian::numerics::regularization::Regularization;
+use gramian::numerics::solver::{GramFactor, Solution};
+use gramian::numerics::surface::Surface;
+use gramian::store::key::CloudId;
+
+const GAUSS: Family = Family::Gauss;
+const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
+const MATERN: Family = Family::Matern { order: 2 };
+
+/// A name and what it runs.
+type Part = (&'static str, fn());
+
+const PARTS: [Part; 16] = [
+    ("gram_gauss_1024", || gram(GAUSS)),
+    ("gram_matern_1024", || gram(MATERN)),
+    ("jets_value_gauss", || jets(GAUSS, JetOrder::Value)),
+    ("jets_value_matern", || jets(MATERN, JetOrder::Value)),
+    ("jets_hessian_gauss", || jets(GAUSS, JetOrder::Hessian)),
+    ("jets_hessian_laplace", || jets(LAPLACE, JetOrder::Hessian)),
+    ("jets_hessian_matern", || jets(MATERN, JetOrder::Hessian)),
+    ("factorize_512", || factorize(512)),
+    ("factorize_1024", || factorize(1024)),
+    ("weights_1024", weights),
+    ("variances_1024", variances),
+    ("neighbours_2000", neighbours),
+    ("surface_600", surface),
+    ("json_points", json_points),
+    ("json_array", json_array),
+    ("cloud_id", cloud_id),
+];
+
+fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
+    pool.expect("no pool is there yet");
+    let asked: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    println!("instruction set: {}", gramian::numerics::InstructionSet::best().name());
+    for (name, run) in PARTS.iter().filter(|(name, _)| asked.is_empty() || asked.iter().any(|a| a == name)) {
+        println!("part: {name}");
+        run();
+    }
+}
+
+/// What callgrind counts. It must stay a function of its own.
+#[inline(never)]
+fn measured<T>(part: impl FnOnce() -> T) -> T {
+    black_box(part())
+}
+
+/// Stops a factorization behind the Gram matrix.
+#[derive(Default)]
+struct UpToGram(AtomicBool);
+
+impl Observer for UpToGram {
+    fn enter(&self, stage: Stage) {
+        self.0.store(stage == Stage::Factor, Ordering::Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+fn gram(family: Family) {
+    let (cloud, kernel) = (Arc::new(scattered(1024, 1)), kernel(family));
+    let observer = UpToGram::default();
+    let outcome =
+        measured(|| GramFactor::factorize(cloud, kernel, Regularization::Uniform(1e-6), &observer).map(drop));
+    assert!(outcome.is_err(), "it stops behind the Gram matrix");
+}
+
+fn jets(family: Family, order: JetOrder) {
+    let (cloud, queries, kernel) = (scattered(1024, 1), scattered(256, 2), kernel(family));
+    let weights = vec![1.0; 1024];
+    measured(|| Jets::evaluate(&cloud, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
+}
+
+fn factorized(n: usize) -> GramFactor {
+    let cloud = Arc::new(scattered(n, 1));
+    GramFactor::factorize(cloud, kernel(MATERN), Regularization::Uniform(1e-6), &Unobserved).unwrap()
+}
+
+fn factorize(n: usize) {
+    measured(|| factorized(n));
+}
+
+fn weights() {
+    let factor = factorized(1024);
+    let values: Vec<f64> = factor.cloud().points().map(|x| x[0] * x[1] + x[2]).collect();
+    measured(|| Solution::of(&factor, &values, &Unobserved)).unwrap();
+}
+
+fn variances() {
+    let (factor, queries) = (factorized(1024), scattered(64, 2));
+    measured(|| posterior::variances(&factor, &queries, &Unobserved)).unwrap();
+}
+
+/// The k-d tree and a search for every point.
+fn neighbours() {
+    let cloud = scattered(2000, 1);
+    measured(|| Neighbours::of(&cloud).spacings(&cloud));
+}
+
+/// Tree, local fits, jets with magnitudes and orientation.
+fn surface() {
+    let cloud = Arc::new(sphere(600));
+    let factor = GramFactor::factorize(cloud, kernel(MATERN), Regularization::Uniform(1e-6), &Unobserved);
+    let signature = Interpolant::signature(Arc::new(factor.unwrap()), &Unobserved).unwrap();
+    measured(|| Surface::of(signature, None, &Unobserved)).unwrap();
+}
+
+fn json_points() {
+    let cloud = scattered(5000, 3);
+    let rows: Vec<&[f64]> = cloud.points().collect();
+    let text = serde_json::to_vec(&rows).unwrap();
+    let points = measured(|| serde_json::from_slice::<Points>(&text)).unwrap();
+    assert_eq!(points.coordinates, cloud.coordinates());
+}
+
+fn json_array() {
+    let array = Array::new(scattered(5000, 3).coordinates().to_vec(), &[5000, 3]);
+    measured(|| serde_json::to_vec(&array)).unwrap();
+}
+
+fn cloud_id() {
+    let cloud = scattered(20_000, 3);
+    measured(|| CloudId::of(&cloud, None));
+}
+
+fn kernel(family: Family) -> Kernel {
+    Kernel::new(family, 0.5, 1.0).unwrap()
+}
+
+/// n points in the unit cube.
+fn scattered(n: usize, seed: u64) -> Cloud {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    Cloud::new((0..3 * n).map(|_| next()).collect(), 3).unwrap()
+}
+
+/// n points on the unit sphere.
+fn sphere(n: usize) -> Cloud {
+    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    let point = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
+        [r * t.cos(), r * t.sin(), z]
+    };
+    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
+}

@@ -1,0 +1,157 @@
+//! The bytes that the stores count against those that the process takes, with the allocator of the server.
+//!
+//! One test alone in its process: the resident set is everybody's.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use gramian::numerics::cloud::Cloud;
+use gramian::numerics::geometry::{Geometry, GeometryRequest};
+use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::observer::Unobserved;
+use gramian::numerics::regularization::Regularization;
+use gramian::numerics::solver::{GramFactor, Solution};
+use gramian::numerics::surface::Surface;
+use gramian::store::Owner;
+use gramian::store::clouds::CloudStore;
+use gramian::store::factors::{FactorStore, StoredFactor};
+use gramian::store::key::{CloudId, FactorKey, ValuesKey};
+
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// How far the count may be from the resident set.
+const TOLERANCE: f64 = 0.05;
+
+/// Enough for every store here: nothing is evicted.
+const BUDGET: u64 = 1 << 34;
+
+type Factors = FactorStore<&'static str>;
+
+#[tokio::test]
+async fn what_the_stores_count_is_what_they_take() {
+    let scattered = |k: usize, from: usize, to: usize| from + k * 7919 % (to - from);
+    let factors = |with_surface: bool, from: usize, to: usize| {
+        async move |store: &Factors, k: usize| {
+            keep_factor(store, scattered(k, from, to), k, with_surface).await
+        }
+    };
+    let clouds = |from: usize, to: usize| {
+        async move |store: &CloudStore, k: usize| keep_cloud(store, scattered(k, from, to), k)
+    };
+    let (new_factors, new_clouds) = (|| Factors::new(BUDGET), || CloudStore::new(BUDGET));
+    let measurements = [
+        growth("weights of 64 to 1,000 values", new_factors(), Factors::n_bytes, 60_000, keep_weights).await,
+        growth("clouds of 10 to 300 points", new_clouds(), CloudStore::n_bytes, 40_000, clouds(10, 300))
+            .await,
+        growth("clouds of 1,000 to 20,000", new_clouds(), CloudStore::n_bytes, 900, clouds(1000, 20_000))
+            .await,
+        growth("factors of 64 to 512 points", new_factors(), Factors::n_bytes, 500, factors(false, 64, 512))
+            .await,
+        growth("with their surfaces", new_factors(), Factors::n_bytes, 400, factors(true, 64, 512)).await,
+        growth("factors of 700 to 2,600", new_factors(), Factors::n_bytes, 30, factors(false, 700, 2600))
+            .await,
+    ];
+    for (name, counted, resident) in measurements {
+        let ratio = counted / resident;
+        println!("{name}: counted {counted:.1} MB, resident {resident:.1} MB, {ratio:.3}");
+        // Where huge pages are switched off, what was never written is not resident: the count is an upper bound.
+        let highest = if huge_pages_are_off() { f64::INFINITY } else { 1.0 + TOLERANCE };
+        assert!((1.0 - TOLERANCE..=highest).contains(&ratio), "{name}: {counted:.1} MB of {resident:.1} MB");
+    }
+}
+
+/// By how many megabytes a store and the resident set grow over the last two thirds of `n` entries. The first third pays what
+/// is paid once: threads, their scratch space, and the pages that the allocator has begun for every size of block.
+async fn growth<S>(
+    name: &'static str,
+    store: S,
+    n_bytes: impl Fn(&S) -> u64,
+    n: usize,
+    keep: impl AsyncFn(&S, usize),
+) -> (&'static str, f64, f64) {
+    for k in 0..n / 3 {
+        keep(&store, k).await;
+    }
+    let (counted, resident) = (n_bytes(&store) as f64, resident_bytes());
+    for k in n / 3..n {
+        keep(&store, k).await;
+    }
+    let growth = (name, (n_bytes(&store) as f64 - counted) / 1e6, (resident_bytes() - resident) / 1e6);
+    // The next store must not find its memory.
+    std::mem::forget(store);
+    growth
+}
+
+async fn keep_weights(store: &Factors, k: usize) {
+    let cloud = sphere(2);
+    let key = key(&cloud, &kernel(0), &Regularization::Uniform(1.0));
+    let solution = Solution {
+        weights: vec![1.0; 64 + k * 7919 % 936],
+        relative_residual: 0.0,
+        residual_max: 0.0,
+        native_norm_squared: 0.0,
+        misfit: 0.0,
+        refined: false,
+    };
+    store.keep_solution(key, ValuesKey::of(&[k as f64]), Arc::new(solution));
+}
+
+fn keep_cloud(store: &CloudStore, n: usize, k: usize) {
+    // As a parser leaves them: grown by doubling.
+    let mut coordinates = Vec::new();
+    (0..3 * n).for_each(|i| coordinates.push((k * 7 + i) as f64));
+    let (stored, is_new) = store.register(Owner(0), Cloud::new(coordinates, 3).unwrap(), None);
+    assert!(is_new);
+    if k.is_multiple_of(20) {
+        stored.scales();
+    }
+}
+
+async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
+    let (cloud, kernel, alpha) = (sphere(n), kernel(k), Regularization::Uniform(1e-6));
+    let key = key(&cloud, &kernel, &alpha);
+    let factorize = move || async move {
+        let factor = GramFactor::factorize(Arc::new(cloud), kernel, alpha, &Unobserved).unwrap();
+        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO))
+    };
+    let (stored, _) = store.get_or_factorize(key, factorize).await.unwrap();
+    if with_surface {
+        let signature = Interpolant::signature(stored.factor.clone(), &Unobserved).unwrap();
+        let surface = stored.surface(|| Surface::of(signature, None, &Unobserved)).unwrap();
+        Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
+        store.reweigh(key);
+    }
+}
+
+/// A kernel of its own for every k, so that no fit is like another.
+fn kernel(k: usize) -> Kernel {
+    Kernel::new(Family::Matern { order: 2 }, 0.3 + 1e-6 * k as f64, 1.0).unwrap()
+}
+
+fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FactorKey {
+    FactorKey::of_dense(Owner(0), CloudId::of(cloud, None), kernel, alpha, false)
+}
+
+fn resident_bytes() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() * 1024.0
+}
+
+fn huge_pages_are_off() -> bool {
+    let setting = std::fs::read_to_string("/sys/kernel/mm/transparent_hugepage/enabled");
+    setting.map_or(true, |setting| setting.contains("[never]"))
+}
+
+/// n points on the unit sphere.
+fn sphere(n: usize) -> Cloud {
+    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    let point = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
+        [r * t.cos(), r * t.sin(), z]
+    };
+    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
+}
