@@ -51,7 +51,7 @@ fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
     pool.expect("no pool is there yet");
     let asked: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    println!("instruction set: {}", gramian::numerics::InstructionSet::best().name());
+    println!("instruction set: {}", gramian::numerics::instruction_set::InstructionSet::best().name());
     for (name, run) in PARTS.iter().filter(|(name, _)| asked.is_empty() || asked.iter().any(|a| a == name)) {
         println!("part: {name}");
         run();

@@ -5,9 +5,9 @@
 
 use std::time::Instant;
 
-use gramian::numerics::InstructionSet;
 use gramian::numerics::cloud::Cloud;
 use gramian::numerics::gram::fill_cross_gram;
+use gramian::numerics::instruction_set::InstructionSet;
 use gramian::numerics::jets::{JetOrder, Jets};
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
 use gramian::numerics::nodes::Nodes;

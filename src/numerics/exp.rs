@@ -59,7 +59,7 @@ mod tests {
     use pulp::WithSimd;
 
     use super::*;
-    use crate::numerics::InstructionSet;
+    use crate::numerics::instruction_set::InstructionSet;
     use crate::numerics::simd::{BLOCK, Block};
 
     struct Exponentials<'a>(&'a [f64]);

@@ -10,6 +10,7 @@ pub mod duplicates;
 pub mod error;
 pub mod geometry;
 pub mod gram;
+pub mod instruction_set;
 pub mod interpolant;
 pub mod jets;
 pub mod kernel;
@@ -38,5 +39,3 @@ mod simd;
 #[cfg(test)]
 mod testing;
 mod vector;
-
-pub use simd::InstructionSet;

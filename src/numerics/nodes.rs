@@ -3,8 +3,9 @@
 use pulp::{Simd, WithSimd};
 
 use super::cloud::Cloud;
+use super::instruction_set::InstructionSet;
 use super::kernel::Kernel;
-use super::simd::{BLOCK, Block, InstructionSet, Pack};
+use super::simd::{BLOCK, Block, Pack};
 
 /// Points in blocks of [`BLOCK`], each block coordinate by coordinate: `[n / BLOCK][d][BLOCK]`, with the instruction set
 /// that the loops over them run on.

@@ -55,6 +55,10 @@ impl WeightedBlock {
     }
 
     /// The gradient's entries `a..a + N` and the Hessian's between them.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "a slice of the sums would keep them in memory, half as fast"
+    )]
     #[inline(always)]
     fn add_diagonal_tile<S: Simd, const ORDER: usize, const N: usize>(
         &self,
@@ -83,12 +87,18 @@ impl WeightedBlock {
         for i in 0..N {
             gradient[a + i] = gradient[a + i] + slopes[i];
             if ORDER >= 2 {
-                hessian.add(a + i, a + i, &products[i][i..]);
+                for j in i..N {
+                    hessian.add(a + i, a + j, products[i][j]);
+                }
             }
         }
     }
 
     /// The Hessian's rows `a..a + 3`, columns `b..b + N`.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "a slice of the sums would keep them in memory, half as fast"
+    )]
     #[inline(always)]
     fn add_tile<S: Simd, const N: usize>(&self, simd: S, a: usize, b: usize, hessian: &mut Triangle<Sum<S>>) {
         let mut products = [[Sum::splat(simd, 0.0); N]; TILE];
@@ -102,8 +112,10 @@ impl WeightedBlock {
                 }
             }
         }
-        for (i, row) in products.iter().enumerate() {
-            hessian.add(a + i, b, row);
+        for i in 0..TILE {
+            for j in 0..N {
+                hessian.add(a + i, b + j, products[i][j]);
+            }
         }
     }
 }
@@ -115,12 +127,9 @@ struct Triangle<'a, T> {
 }
 
 impl<S: Simd> Triangle<'_, Sum<S>> {
-    /// Adds to row a from column b on.
     #[inline(always)]
-    fn add(&mut self, a: usize, b: usize, sums: &[Sum<S>]) {
-        let entries = &mut self.packed[a * self.dimension - a * (a + 1) / 2 + b..];
-        for (entry, &sum) in entries.iter_mut().zip(sums) {
-            *entry = *entry + sum;
-        }
+    fn add(&mut self, a: usize, b: usize, sum: Sum<S>) {
+        let entry = &mut self.packed[a * self.dimension - a * (a + 1) / 2 + b];
+        *entry = *entry + sum;
     }
 }

@@ -12,27 +12,44 @@ use crate::numerics::simd::Pack;
 /// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
 const FAR: f64 = 1e3;
 
-/// ν = P + ½.
-pub(super) struct Matern<const P: usize>;
+/// ν = P + ½ for the orders that are used most, P of 1 or 2.
+pub(super) struct Matern<const P: u8>;
 
-impl<const P: usize> Profile for Matern<P> {
-    /// φ, φ′, φ″ with θ_{−1} = 1/s and θ_{−2} = (1 + s)/s³, which only the orders 0 and 1 meet.
+impl<const P: u8> Profile for Matern<P> {
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let nu = P as f64 + 0.5;
-        let s = (2.0 * nu * q).sqrt().at_least(TINY).at_most(FAR);
-        let s_squared = s * s;
-        let inverse = 1.0 / s;
-        // θ_{p−2}, θ_{p−1}, θ_p, raised one by one by θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
-        let mut lowest = (1.0 + s) * inverse * inverse * inverse;
-        let (mut lower, mut theta) = (inverse, Pack::splat(q.simd(), 1.0));
-        let mut at_zero = 1.0;
-        for p in 0..P {
-            let odd = (2 * p + 1) as f64;
-            (lowest, lower, theta) = (lower, theta, s_squared.mul_add(lower, odd * theta));
-            at_zero *= odd;
-        }
-        let e = exp_minus(s) * (1.0 / at_zero);
-        [e * theta, -nu * e * lower, nu * nu * e * lowest]
+        profile(q, P)
     }
+}
+
+/// ν = order + ½ for any order: its loop is not unrolled.
+pub(super) struct SmoothMatern {
+    pub(super) order: u8,
+}
+
+impl Profile for SmoothMatern {
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        profile(q, self.order)
+    }
+}
+
+/// φ, φ′, φ″ with θ_{−1} = 1/s and θ_{−2} = (1 + s)/s³, which only order 1 meets.
+#[inline(always)]
+fn profile<S: Simd>(q: Pack<S>, order: u8) -> [Pack<S>; 3] {
+    let nu = f64::from(order) + 0.5;
+    let s = (2.0 * nu * q).sqrt().at_least(TINY).at_most(FAR);
+    let s_squared = s * s;
+    let inverse = 1.0 / s;
+    // θ_{p−2}, θ_{p−1}, θ_p, raised one by one by θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
+    let mut lowest = (1.0 + s) * inverse * inverse * inverse;
+    let (mut lower, mut theta) = (inverse, Pack::splat(q.simd(), 1.0));
+    let mut at_zero = 1.0;
+    for p in 0..order {
+        let odd = f64::from(2 * p + 1);
+        (lowest, lower, theta) = (lower, theta, s_squared.mul_add(lower, odd * theta));
+        at_zero *= odd;
+    }
+    let e = exp_minus(s) * (1.0 / at_zero);
+    [e * theta, -nu * e * lower, nu * nu * e * lowest]
 }

@@ -3,7 +3,7 @@
 use pulp::WithSimd;
 
 use super::*;
-use crate::numerics::InstructionSet;
+use crate::numerics::instruction_set::InstructionSet;
 use crate::numerics::simd::{BLOCK, Block};
 
 /// Every family at parameters that a user might choose.

@@ -1,0 +1,54 @@
+//! Which instructions the kernel loops use, chosen at run time.
+//!
+//! Everything here is safe code: [`pulp`] compiles a loop that is generic over [`pulp::Simd`] for AVX-512, for AVX2 with
+//! FMA, for NEON and for the portable baseline.
+
+use pulp::WithSimd;
+
+/// What the kernel loops are compiled for.
+#[derive(Debug, Clone, Copy)]
+pub struct InstructionSet(pulp::Arch);
+
+/// The portable baseline: two lanes, for which every 64-bit processor has registers. 1.2 to 1.7 times as fast as single
+/// numbers where sums of Hessians prevail.
+pub(crate) type Portable = pulp::Scalar128b;
+
+impl InstructionSet {
+    /// The best one of this machine.
+    pub fn best() -> Self {
+        Self(pulp::Arch::new())
+    }
+
+    /// All that this machine has, the best first, the portable one last.
+    pub fn available() -> Vec<Self> {
+        let mut sets = vec![Self::best()];
+        #[cfg(target_arch = "x86_64")]
+        if let (pulp::Arch::V4(_), Some(v3)) = (sets[0].0, pulp::x86::V3::try_new()) {
+            sets.push(Self(pulp::Arch::V3(v3)));
+        }
+        if !matches!(sets[0].0, pulp::Arch::Scalar) {
+            sets.push(Self(pulp::Arch::Scalar));
+        }
+        sets
+    }
+
+    /// As `GET /version` says it.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            pulp::Arch::Scalar => "portable",
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V3(_) => "AVX2 and FMA",
+            #[cfg(target_arch = "x86_64")]
+            pulp::Arch::V4(_) => "AVX-512",
+            _ => "128-bit vectors",
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn dispatch<Op: WithSimd>(self, op: Op) -> Op::Output {
+        match self.0 {
+            pulp::Arch::Scalar => op.with_simd(Portable {}),
+            arch => arch.dispatch(op),
+        }
+    }
+}
