@@ -57,9 +57,9 @@ def write_results(groups: list[Group], facts: list[tuple[str, str]]) -> None:
     summary = f"Of {len(bounded)} bounds {held} hold, {short} fall short, {len(bounded) - held - short} are not measured."
     notes = (ROOT / "bench" / "notes.md").read_text().strip()
     parts = [
-        "# Results\n\nWritten by `bench/run`; [README.md](README.md) says how to read it. Times are the best of "
-        "several rounds in which ours and the reference take turns, with the median in brackets; the ratio is that of the best. "
-        f"{summary}",
+        "# Results\n\nWritten by `bench/run`; [README.md](README.md) says how to read it. Times are the best of several "
+        "rounds in which ours and the reference take turns, and in brackets the median; the ratio is that of the best, and in "
+        f"brackets that of the medians. {summary}",
         "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in facts)]),
         markdown(groups).strip(),
         f"## Where a figure does not hold\n\n{notes}",

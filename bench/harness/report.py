@@ -161,6 +161,14 @@ def plain(group: Group) -> str:
 
 
 def _cells(row: Row) -> list[str]:
-    ratio = "" if row.ratio is None else significant(row.ratio)
     figures = ["" if figure is None else str(figure) for figure in (row.ours, row.reference)]
-    return [row.what, *figures, ratio, "" if row.bound is None else str(row.bound), row.verdict, row.remark]
+    return [row.what, *figures, _ratios(row), "" if row.bound is None else str(row.bound), row.verdict, row.remark]
+
+
+def _ratios(row: Row) -> str:
+    """The ratio, that of the medians in brackets."""
+    if row.ratio is None or row.ours is None or row.reference is None:
+        return ""
+    if row.ours.median is None or not row.reference.median:
+        return significant(row.ratio)
+    return f"{significant(row.ratio)} ({significant(row.ours.median / row.reference.median)})"

@@ -14,14 +14,19 @@ from ..timing import Times, alternate, timed
 PATH = "/v1/laplace-beltrami/matrix"
 KERNEL = {"family": "matern", "nu": 2.5, "length_scale": 0.2}
 
-#: Smallest rates in MB/s per core, by what the name of a figure must match.
-BOUNDS = {r"parse|read": 350.0, r"writ|encod|print": 500.0}
+UNIT = "MB/s"
+
+#: Smallest rates by the first word of their name.
+BOUNDS = {"read": 350.0, "write": 500.0}
+
+#: How the benchmark names what it compares with.
+SAME = "the same"
 
 FORMATS = {
     "npy": {"Accept": "application/x-npy"},
+    "safetensors": {"Accept": "application/x-safetensors"},
     "JSON": {"Accept": "application/json"},
     "JSON, zstd": {"Accept": "application/json", "Accept-Encoding": "zstd"},
-    "npy, zstd": {"Accept": "application/x-npy", "Accept-Encoding": "zstd"},
 }
 
 
@@ -31,21 +36,32 @@ def measure(setting: Setting) -> Iterable[Row]:
 
 
 def in_process(setting: Setting) -> Iterable[Row]:
-    """The lines `name<TAB>figure<TAB>unit` of `cargo bench --bench bodies`."""
+    """What `cargo bench --bench bodies` prints in MB/s; a line `the same by …` is the reference of the line before."""
     if "bodies" not in setting.benches:
-        yield Row("JSON parsed, floats written", None, remark="there is no benchmark `bodies`")
+        yield Row("JSON read, floats written, one core", None, remark="there is no benchmark `bodies`")
         return
-    for line in setting.output_of_bench("bodies", ["--machine"]).splitlines():
-        if line.count("\t") == 2:
-            name, figure, unit = line.split("\t")
-            yield Row(name, Figure(float(figure), unit), bound=bound(name, unit))
+    rates = parse(setting.output_of_bench("bodies"))
+    for index, (name, rate) in enumerate(rates):
+        if name.startswith(SAME):
+            continue
+        following = rates[index + 1] if index + 1 < len(rates) else ("", 0.0)
+        reference = Figure(following[1], UNIT) if following[0].startswith(SAME) else None
+        remark = f"reference: {following[0]}" if reference else ""
+        limit = next((Bound("figure", "≥", limit) for word, limit in BOUNDS.items() if name.startswith(word)), None)
+        yield Row(f"JSON, one core: {name}", Figure(rate, UNIT), reference, limit, remark, more_is_better=True)
 
 
-def bound(name: str, unit: str) -> Bound | None:
-    """Only plain JSON on one core has a bound."""
-    if unit != "MB/s" or re.search(r"cores|threads|parallel|zstd|gzip|npy|safetensors", name):
-        return None
-    return next((Bound("figure", "≥", limit) for pattern, limit in BOUNDS.items() if re.search(pattern, name)), None)
+def parse(output: str) -> list[tuple[str, float]]:
+    """The lines `name  rate` below a heading in MB/s."""
+    rates = []
+    is_rate = False
+    for line in output.splitlines():
+        row = re.fullmatch(r"(.*\S)\s{2,}(\d+(?:\.\d+)?)", line)
+        if row is None:
+            is_rate = UNIT in line
+        elif is_rate:
+            rates.append((row[1], float(row[2])))
+    return rates
 
 
 def over_http(setting: Setting) -> Iterable[Row]:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from ..report import Bound, Figure, Row
 from ..setting import Setting
@@ -12,36 +13,51 @@ UNIT = "G pairs/s"
 BOUNDS = {("gauss", "gram"): 0.8, ("laplace", "hessian"): 0.45, ("gauss", "hessian"): 0.7}
 
 
+@dataclass(frozen=True)
+class Rate:
+    """`instruction_set` is empty where the benchmark ran on the best one only."""
+
+    instruction_set: str
+    family: str
+    quantity: str
+    value: float
+
+
 def measure(setting: Setting) -> Iterable[Row]:
-    rates = parse(setting.output_of_bench("kernels", ["--machine"]))
+    rates = parse(setting.output_of_bench("kernels"))
     with setting.gramian() as server:
-        has_avx512 = server.version()["instruction_set"] == "AVX-512"
-    for (family, quantity), rate in rates.items():
-        limit = bound(family, quantity, has_avx512, any("gram" in name.lower() for _, name in rates))
-        yield Row(f"{family}: {quantity}", Figure(rate, UNIT), bound=None if limit is None else Bound("figure", "≥", limit))
+        best_set = server.version()["instruction_set"]
+    for rate in rates:
+        limit = bound(rate, best_set, has_gram=any(other.quantity == "gram" for other in rates))
+        where = f", {rate.instruction_set}" if rate.instruction_set else ""
+        bounded = None if limit is None else Bound("figure", "≥", limit)
+        yield Row(f"{rate.family}: {rate.quantity}{where}", Figure(rate.value, UNIT), bound=bounded)
 
 
-def parse(output: str) -> dict[tuple[str, str], float]:
-    """Rates by family and quantity: from lines `family: quantity<TAB>figure<TAB>unit`, or from a table with a header."""
-    tabbed = [line.split("\t") for line in output.splitlines() if line.count("\t") == 2]
-    if tabbed:
-        named = ((name.rpartition(":"), float(figure)) for name, figure, _unit in tabbed)
-        return {(family.strip(), quantity.strip()): rate for (family, _, quantity), rate in named}
-    header: list[str] = []
-    rates = {}
+def parse(output: str) -> list[Rate]:
+    """Tables of `family  rate…` below a heading `d = 3, SET  quantity…`, or one without title; others are left out."""
+    rates: list[Rate] = []
+    heading = ""
     for line in output.splitlines():
-        family, *cells = line.rsplit(maxsplit=len(header)) if header else [""]
-        if line.startswith(" "):
-            header = line.split()
-        elif header and len(cells) == len(header):
-            rates.update({(family.strip(), quantity): float(cell) for quantity, cell in zip(header, cells, strict=True)})
+        row = re.fullmatch(r"(.*?\S)(\s{2,}\d+\.\d+(?:\s+\d+\.\d+)*)", line)
+        if row is None:
+            heading = line
+            continue
+        values = [float(cell) for cell in row[2].split()]
+        words = heading.split()
+        title, quantities = " ".join(words[: -len(values)]), words[-len(values) :]
+        if title == "" or title.startswith("d = 3"):
+            name = title.partition(", ")[2]
+            rates += [Rate(name, row[1], quantity, value) for quantity, value in zip(quantities, values, strict=True)]
     return rates
 
 
-def bound(family: str, quantity: str, has_avx512: bool, has_gram: bool) -> float | None:
-    """The bound of a rate; sums of values stand for the Gram matrix where that is not measured by itself."""
-    asks = quantity.lower()
-    kind = "hessian" if "hessian" in asks else "gram" if "gram" in asks or (asks == "value" and not has_gram) else ""
-    if kind == "hessian" and not has_avx512:
+def bound(rate: Rate, best_set: str, has_gram: bool) -> float | None:
+    """The bound of a rate on the best set; sums of values stand for the Gram matrix where that is not measured by itself."""
+    if rate.instruction_set not in ("", best_set):
         return None
-    return BOUNDS.get((re.split(r"[ ,]", family.lower())[0], kind))
+    quantity = rate.quantity.lower()
+    kind = "hessian" if "hessian" in quantity else "gram" if quantity == ("gram" if has_gram else "value") else ""
+    if kind == "hessian" and best_set != "AVX-512":
+        return None
+    return BOUNDS.get((re.split(r"[ ,]", rate.family.lower())[0], kind))

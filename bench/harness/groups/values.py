@@ -153,12 +153,14 @@ def encode_by_standard_library(request: Any) -> bytes:
 
 def by_safetensors(client: Client, points: Floats, values: Floats, queries: Floats) -> tuple[Floats, Floats]:
     fields = {"kernel": MATERN, "alpha": ALPHA, "include": ["variance"]}
-    body = save_safetensors({"points": points, "values": values, "queries": queries}, {"request": json.dumps(fields)})
+    body = save_safetensors({"cloud.points": points, "values": values, "queries": queries}, {"request": json.dumps(fields)})
     headers = {"Content-Type": SAFETENSORS, "Accept": SAFETENSORS}
     answer = client.request("POST", "/v1/posterior", body, headers)
     if answer.status != 200:
         raise RuntimeError(f"{answer.status} {answer.body[:300]!r}")
     tensors = load_safetensors(answer.body)
+    n_header = int.from_bytes(answer.body[:8], "little")
+    forgotten(client, json.loads(json.loads(answer.body[8 : 8 + n_header])["__metadata__"]["response"]))
     return tensors["means"], np.sqrt(tensors["variances"])
 
 
