@@ -12,12 +12,16 @@ from .groups import GROUPS
 from .report import Group, markdown, plain
 from .setting import Setting
 
+#: Beyond this load before the run somebody else was using the cores.
+IDLE_LOAD = 1.0
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def main() -> None:
     arguments = parse()
     setting = Setting.of(ROOT, arguments.quick, arguments.with_gpytorch)
+    load_before = machine.load()
     facts = machine.describe(setting)
     groups = []
     for name in arguments.group or GROUPS:
@@ -26,9 +30,10 @@ def main() -> None:
         group = Group(name, title, tuple(measure(setting)))
         groups.append(group)
         print(plain(group), f"   ({time.monotonic() - began:.0f} s)", sep="\n", flush=True)
+    facts.append(("load before and after", f"{load_before:.1f}, {machine.load():.1f}"))
     write_json(groups, facts)
     if not arguments.group and not arguments.quick:
-        write_results(groups, facts)
+        write_results(groups, facts, is_disturbed=load_before > IDLE_LOAD)
 
 
 def parse() -> argparse.Namespace:
@@ -49,12 +54,14 @@ def write_json(groups: list[Group], facts: list[tuple[str, str]]) -> None:
     (ROOT / "bench" / "results.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
 
-def write_results(groups: list[Group], facts: list[tuple[str, str]]) -> None:
+def write_results(groups: list[Group], facts: list[tuple[str, str]], is_disturbed: bool) -> None:
     rows = [row for group in groups for row in group.rows]
     bounded = [row for row in rows if row.bound is not None]
     held = sum(row.holds is True for row in bounded)
     short = sum(row.holds is False for row in bounded)
     summary = f"Of {len(bounded)} bounds {held} hold, {short} fall short, {len(bounded) - held - short} are not measured."
+    if is_disturbed:
+        summary += " **The machine was not idle: all times are disturbed, and verdicts may be chance.**"
     notes = (ROOT / "bench" / "notes.md").read_text().strip()
     parts = [
         "# Results\n\nWritten by `bench/run`; [README.md](README.md) says how to read it. Times are the best of several "

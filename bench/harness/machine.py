@@ -35,7 +35,6 @@ def describe(setting: Setting) -> list[tuple[str, str]]:
         ("CPU", f"{cpu.get('model name', 'unknown')}, {os.cpu_count()} cores, {N_THREADS} used; {flags}"),
         ("caches", _caches()),
         ("memory", f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"),
-        ("load before the run", f"{os.getloadavg()[0]:.1f}"),
         (
             "gramian",
             f"{version['version']}, commit {_commit(setting.root)}, kernel loops on {version['instruction_set']}",
@@ -44,6 +43,11 @@ def describe(setting: Setting) -> list[tuple[str, str]]:
         ("OpenBLAS", f"the one of SciPy's wheel, kernels for {openblas_core()}"),
         ("peers", ", ".join(_python_versions() + _debian_versions())),
     ]
+
+
+def load() -> float:
+    """Processes that wanted a core during the last minute."""
+    return os.getloadavg()[0]
 
 
 def _cpu() -> dict[str, str]:

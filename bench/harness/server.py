@@ -35,6 +35,10 @@ class Answer:
         return orjson.loads(self.body)
 
 
+class Refused(RuntimeError):
+    """A status that is not of success."""
+
+
 class Client:
     """One keep-alive connection. Bodies are given encoded: encoding is the caller's to time or to leave out."""
 
@@ -59,7 +63,7 @@ class Client:
         """Posts JSON; the status must be one of success."""
         answer = self.request("POST", path, encode(request), headers)
         if answer.status >= 300:
-            raise RuntimeError(f"{path}: {answer.status} {answer.body[:300]!r}")
+            raise Refused(f"{answer.status} {answer.body[:300].decode(errors='replace')}")
         return answer
 
     def forget(self, answer: Answer) -> None:

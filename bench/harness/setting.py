@@ -74,7 +74,7 @@ class Setting:
 
 
 def _bench_executables(root: Path) -> dict[str, Path]:
-    command = ["cargo", "bench", "--locked", "--no-run", "--benches", "--message-format=json", "--quiet"]
+    command = ["cargo", "bench", "--locked", "--no-run", "--bench", "*", "--message-format=json", "--quiet"]
     output = subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout
     messages = [json.loads(line) for line in output.splitlines() if line.startswith("{")]
     artifacts = [message for message in messages if message["reason"] == "compiler-artifact" and message["executable"]]

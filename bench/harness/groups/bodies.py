@@ -7,7 +7,7 @@ import numpy as np
 
 from ..clouds import sphere
 from ..report import Bound, Figure, Row
-from ..server import STAGES_OF_COMPUTATION, Answer, Client, Server
+from ..server import STAGES_OF_COMPUTATION, Answer, Client, Refused, Server
 from ..setting import Setting
 from ..timing import Times, alternate, timed
 
@@ -38,7 +38,8 @@ def measure(setting: Setting) -> Iterable[Row]:
 def in_process(setting: Setting) -> Iterable[Row]:
     """What `cargo bench --bench bodies` prints in MB/s; a line `the same by …` is the reference of the line before."""
     if "bodies" not in setting.benches:
-        yield Row("JSON read, floats written, one core", None, remark="there is no benchmark `bodies`")
+        for word, limit in BOUNDS.items():
+            yield Row(f"JSON, one core: {word}", None, None, Bound("figure", "≥", limit), "there is no benchmark `bodies`")
         return
     rates = parse(setting.output_of_bench("bodies"))
     for index, (name, rate) in enumerate(rates):
@@ -87,13 +88,14 @@ def one_format(
     n_bytes: int,
 ) -> Iterable[Row]:
     what = f"matrix of {n_bytes / 1e6:.0f} MB as {name}"
+    limit = Bound("ratio", "≤", 1.2) if name == "npy" else None
     try:
         server.reset_peak_bytes()
         before = server.memory_bytes("VmRSS")
         probe = client.post(PATH, request, headers)
         peak = server.memory_bytes("VmHWM") - before
-    except RuntimeError as refusal:
-        yield Row(f"{what}: encode and send", None, remark=f"not served: {str(refusal)[:80]}")
+    except Refused as refusal:
+        yield Row(f"{what}: encode and send", None, None, limit, f"not served: {str(refusal)[:3]}")
         return
     if "zstd" in name and probe.headers.get("content-encoding") != "zstd":
         yield Row(f"{what}: encode and send", None, remark="not served: the answer is not compressed")
@@ -113,7 +115,6 @@ def one_format(
         f"{len(probe.body) / 1e6:.0f} MB sent; the time beyond {', '.join(STAGES_OF_COMPUTATION)}, until the last byte; "
         f"reference: {copied} to the same client"
     )
-    limit = Bound("ratio", "≤", 1.2) if name == "npy" else None
     yield Row(f"{what}: encode and send", Figure.of(times["ours"]), reference, limit, remark)
     yield Row(
         f"{what}: memory",

@@ -18,7 +18,7 @@ from sklearn.gaussian_process.kernels import Matern
 
 from ..clouds import Floats, cube, wave
 from ..report import Bound, Figure, Row
-from ..server import Client, encode
+from ..server import Client, Refused, encode
 from ..setting import Setting
 from ..timing import SPIN_SECONDS, alternate, timed
 
@@ -157,7 +157,7 @@ def by_safetensors(client: Client, points: Floats, values: Floats, queries: Floa
     headers = {"Content-Type": SAFETENSORS, "Accept": SAFETENSORS}
     answer = client.request("POST", "/v1/posterior", body, headers)
     if answer.status != 200:
-        raise RuntimeError(f"{answer.status} {answer.body[:300]!r}")
+        raise Refused(f"{answer.status}")
     tensors = load_safetensors(answer.body)
     n_header = int.from_bytes(answer.body[:8], "little")
     forgotten(client, json.loads(json.loads(answer.body[8 : 8 + n_header])["__metadata__"]["response"]))
@@ -167,7 +167,7 @@ def by_safetensors(client: Client, points: Floats, values: Floats, queries: Floa
 def serves_safetensors(client: Client) -> bool:
     try:
         by_safetensors(client, cube(10, 0), np.ones(10), cube(2, 1))
-    except RuntimeError:
+    except Refused:
         return False
     return True
 
