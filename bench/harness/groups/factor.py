@@ -51,7 +51,7 @@ def cholesky(setting: Setting) -> Iterable[Row]:
         Figure.of(factor),
         Figure.of(dpotrf),
         Bound("speedup", "≥", 0.95),
-        f"the `factor` stage in a process of its own, in turn with dpotrf on the same matrix, {threads} threads",
+        f"the `factor` stage in a process of its own, in turn with dpotrf on the same matrix; its threads: {threads}",
     )
     yield Row(f"Gram matrix, n = {n:,}", Figure.of(parts["gram"]), remark="lower triangle, 2 threads")
     yield Row(f"condition estimate, n = {n:,}", Figure.of(parts["condition"]), remark="part of every factorization")
