@@ -12,8 +12,8 @@ from .groups import GROUPS
 from .report import Group, markdown, plain
 from .setting import Setting
 
-#: Beyond this load before the run somebody else was using the cores.
-IDLE_LOAD = 1.0
+#: Cores in use before or after the run beyond which its times are disturbed.
+MAX_BUSY_CORES = 0.2
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def main() -> None:
     arguments = parse()
     setting = Setting.of(ROOT, arguments.quick, arguments.with_gpytorch)
-    load_before = machine.load()
+    busy = [machine.busy_cores()]
     facts = machine.describe(setting)
     groups = []
     for name in arguments.group or GROUPS:
@@ -30,10 +30,11 @@ def main() -> None:
         group = Group(name, title, tuple(measure(setting)))
         groups.append(group)
         print(plain(group), f"   ({time.monotonic() - began:.0f} s)", sep="\n", flush=True)
-    facts.append(("load before and after", f"{load_before:.1f}, {machine.load():.1f}"))
+    busy.append(machine.busy_cores())
+    facts.append(("cores that others used", f"{busy[0]:.1f} before the run, {busy[1]:.1f} after it"))
     write_json(groups, facts)
     if not arguments.group and not arguments.quick:
-        write_results(groups, facts, is_disturbed=load_before > IDLE_LOAD)
+        write_results(groups, facts, is_disturbed=max(busy) > MAX_BUSY_CORES)
 
 
 def parse() -> argparse.Namespace:

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import time
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -45,9 +46,18 @@ def describe(setting: Setting) -> list[tuple[str, str]]:
     ]
 
 
-def load() -> float:
-    """Processes that wanted a core during the last minute."""
-    return os.getloadavg()[0]
+def busy_cores(seconds: float = 3.0) -> float:
+    """Cores that others use, on average over some seconds in which we sleep."""
+    before = _cpu_ticks()
+    time.sleep(seconds)
+    idle, total = (after - first for after, first in zip(_cpu_ticks(), before, strict=True))
+    return (os.cpu_count() or 1) * (1 - idle / total)
+
+
+def _cpu_ticks() -> tuple[int, int]:
+    """Idle ticks, those that wait for a disk included, and all ticks since the start of the machine."""
+    ticks = [int(word) for word in Path("/proc/stat").read_text().splitlines()[0].split()[1:]]
+    return ticks[3] + ticks[4], sum(ticks[:8])
 
 
 def _cpu() -> dict[str, str]:
