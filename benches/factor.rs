@@ -1,19 +1,20 @@
 //! The speed of the factorization against faer's matrix product of the same size, in one run.
 //!
-//! `cargo bench --bench factor [-- n]`; the two are measured in turn, so that a drifting machine disturbs both.
+//! `cargo bench --bench factor [-- n]`; the two are measured in turn, so that a drifting machine disturbs both. With
+//! `--lockstep` a round for each line on standard input.
+
+mod support;
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::{Observer, Stage};
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
-
-const ROUNDS: usize = 7;
+use support::{ROUNDS, measure, size_argument, sphere, timed};
 
 /// Time spent in each stage.
 #[derive(Default)]
@@ -38,59 +39,34 @@ impl Stopwatch {
 }
 
 fn main() {
-    let n = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(4000);
+    let n = size_argument(4000);
     let n_threads = rayon::current_num_threads();
-    println!("n = {n}, {n_threads} threads, best of {ROUNDS}");
-    let cloud = Arc::new(sphere(n));
+    let cloud = Arc::new(sphere(n, 0.0));
     let (a, mut c) = (Mat::from_fn(n, n, |i, j| ((i * 7 + j) % 13) as f64), Mat::zeros(n, n));
-    let (mut product, mut gram, mut factor, mut condition) =
-        (Best::new(), Best::new(), Best::new(), Best::new());
-    for _ in 0..ROUNDS {
-        let began = Instant::now();
-        matmul(c.as_mut(), Accum::Replace, a.as_ref(), a.as_ref(), 1.0, Par::rayon(n_threads));
-        product.offer(began.elapsed());
+    let bests = measure(|| {
+        let mut multiply =
+            || matmul(c.as_mut(), Accum::Replace, a.as_ref(), a.as_ref(), 1.0, Par::rayon(n_threads));
+        let product = timed(&mut multiply).1;
         let stopwatch = Stopwatch::default();
         let kernel = Kernel::new(Family::Matern { order: 2 }, 0.2, 1.0).unwrap();
         let alpha = Regularization::uniform(1e-6).unwrap();
         GramFactor::factorize(cloud.clone(), kernel, alpha, &stopwatch).unwrap();
         let end = Instant::now();
-        gram.offer(stopwatch.time(Stage::Gram, end));
-        factor.offer(stopwatch.time(Stage::Factor, end));
-        condition.offer(stopwatch.time(Stage::Condition, end));
-    }
-    let cubed = (n as f64).powi(3);
-    let (product_rate, factor_rate) = (2.0 * cubed / product.0 / 1e9, cubed / 3.0 / factor.0 / 1e9);
-    println!("matrix product  {:8.1} ms  {product_rate:6.1} GFLOP/s", product.0 * 1e3);
-    let percent = 100.0 * factor_rate / product_rate;
-    println!(
-        "factorization   {:8.1} ms  {factor_rate:6.1} GFLOP/s, {percent:.0} % of the product",
-        factor.0 * 1e3
-    );
-    let pairs = (n * (n + 1) / 2) as f64 / gram.0 / 1e9;
-    println!("Gram assembly   {:8.1} ms  {pairs:6.2} G pairs/s", gram.0 * 1e3);
-    println!("condition       {:8.1} ms", condition.0 * 1e3);
-}
-
-/// The least of some times, in seconds.
-struct Best(f64);
-
-impl Best {
-    fn new() -> Self {
-        Self(f64::INFINITY)
-    }
-
-    fn offer(&mut self, time: Duration) {
-        self.0 = self.0.min(time.as_secs_f64());
-    }
-}
-
-/// n points on the unit sphere.
-fn sphere(n: usize) -> Cloud {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
-        [r * t.cos(), r * t.sin(), z]
-    };
-    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
+        let stage = |stage| stopwatch.time(stage, end);
+        vec![
+            ("product", product),
+            ("gram", stage(Stage::Gram)),
+            ("factor", stage(Stage::Factor)),
+            ("condition", stage(Stage::Condition)),
+        ]
+    });
+    let Some(bests) = bests else { return };
+    println!("n = {n}, {n_threads} threads, best of {ROUNDS}");
+    bests.print();
+    let cubed = (n as f64).powi(3) / 1e9;
+    let (product, factor) = (2.0 * cubed / bests.seconds("product"), cubed / 3.0 / bests.seconds("factor"));
+    let percent = 100.0 * factor / product;
+    println!("product {product:.1} GFLOP/s, factor {factor:.1} GFLOP/s: {percent:.0} % of the product");
+    let pairs = (n * (n + 1) / 2) as f64 / 1e9;
+    println!("gram {:.2} G pairs/s", pairs / bests.seconds("gram"));
 }
