@@ -7,7 +7,7 @@ use super::instruction_set::InstructionSet;
 use super::kernel::Kernel;
 use super::simd::{BLOCK, Block, Pack};
 
-/// Points in blocks of [`BLOCK`], each block coordinate by coordinate: `[n / BLOCK][d][BLOCK]`, with the instruction set
+/// Points in blocks of `BLOCK`, each block coordinate by coordinate: `[n / BLOCK][d][BLOCK]`, with the instruction set
 /// that the loops over them run on.
 ///
 /// The last block is padded with copies of the last point; whoever sums over it gives them weight 0.
