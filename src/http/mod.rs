@@ -1,17 +1,17 @@
 //! HTTP: every route on this page, middleware beneath.
 
-mod answer;
-mod array;
+pub mod answer;
+pub mod array;
 pub mod auth;
-mod body;
+pub mod body;
 mod compression;
 pub mod compute;
-mod encode;
+pub mod encode;
 mod fit;
 mod fitted;
 mod kernel;
 mod middleware;
-mod negotiation;
+pub mod negotiation;
 pub mod openapi;
 pub mod operation;
 pub mod problem;
