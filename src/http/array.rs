@@ -9,8 +9,8 @@ use serde::ser::{Error, Serializer};
 /// Numbers that one thread looks through at a time.
 const NUMBERS_PER_TASK: usize = 1 << 16;
 
-/// Bytes of a number and its comma, as a first guess.
-const BYTES_PER_NUMBER: usize = 21;
+/// Bytes that a number with sign, 17 digits and a small exponent takes, its comma included: more are rare.
+const BYTES_PER_NUMBER: usize = 24;
 
 /// A row-major array of rank 1 or more in which whole entries along one axis may be null.
 #[derive(Debug, Clone)]

@@ -14,6 +14,7 @@ use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt, TryStreamExt, stream};
+use rayon::prelude::*;
 
 use super::answer::Answer;
 use super::array::Array;
@@ -22,11 +23,14 @@ use super::negotiation::{Coding, Format, Wanted};
 use super::problem::Problem;
 use crate::app::App;
 
-/// Numbers of a chunk: some 0.6 MB of JSON and a millisecond of one core, against some 20 µs to hand a job to the pool.
-const NUMBERS_PER_CHUNK: usize = 1 << 15;
+/// Numbers of a chunk: some 170 kB of JSON and 150 µs of one core, against some 10 µs to hand a job to the pool.
+const NUMBERS_PER_CHUNK: usize = 1 << 13;
+
+/// Chunks that are encoded at once, side by side; an answer of more is streamed.
+const CHUNKS_AT_ONCE: usize = 4;
 
 /// Bytes of a chunk of a binary body that is compressed.
-const BYTES_PER_CHUNK: usize = 8 * NUMBERS_PER_CHUNK;
+const BYTES_PER_CHUNK: usize = 1 << 18;
 
 /// Bodies below it are sent as they are: what compression saves of a packet or two is less than its header and its time.
 const LEAST_COMPRESSED_BYTES: usize = 1 << 10;
@@ -149,15 +153,16 @@ impl Encoded {
         }
         let failed = |_: io::Error| Problem::internal();
         let chunks = split_bytes(chunks);
-        if chunks.len() > 1 {
+        if chunks.len() > CHUNKS_AT_ONCE {
             return encoded(coding, Encoding::Chunks(chunks, Compressor::new(coding).map_err(failed)?));
         }
-        let plain: Vec<u8> = chunks.iter().flat_map(Chunk::to_bytes).collect();
-        if coding == Coding::Identity || plain.len() < LEAST_COMPRESSED_BYTES {
-            return encoded(Coding::Identity, Encoding::Whole(vec![plain.into()]));
+        let plain: Vec<Vec<u8>> = chunks.par_iter().map(Chunk::to_bytes).collect();
+        if coding == Coding::Identity || plain.iter().map(Vec::len).sum::<usize>() < LEAST_COMPRESSED_BYTES {
+            let frames = plain.into_iter().map(Bytes::from).collect();
+            return encoded(Coding::Identity, Encoding::Whole(frames));
         }
         let mut compressor = Compressor::new(coding).map_err(failed)?;
-        let mut body = compressor.write(plain).map_err(failed)?;
+        let mut body = compressor.write(plain.concat()).map_err(failed)?;
         body.extend(compressor.finish().map_err(failed)?);
         encoded(coding, Encoding::Whole(vec![body.into()]))
     }
