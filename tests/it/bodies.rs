@@ -335,20 +335,21 @@ async fn large_answers_are_streamed_to_the_same_text() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_client_that_reads_nothing_holds_no_thread() {
-    let server = Server::with_flags(&["--threads", "1", "--max-queue", "0"]).await;
-    let points = fibonacci_sphere(800);
+    // Two threads, so that a client has jobs waiting for one while others run.
+    let server = Server::with_flags(&["--threads", "2", "--max-queue", "0"]).await;
+    let points = fibonacci_sphere(1000);
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     let request = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6}).to_string();
     let mut stalled = Vec::new();
-    for accept_encoding in ["identity", "gzip", "zstd"] {
+    for accept_encoding in ["identity", "gzip", "identity", "gzip", "identity", "identity"] {
         let mut stream = TcpStream::connect(server.address).await.unwrap();
         let head = format!(
-            "POST /v1/surface-gradient/matrix HTTP/1.1\r\nHost: test\r\nContent-Type: {JSON}\r\nConnection: close\r\n\
+            "POST /v1/laplace-beltrami/matrix HTTP/1.1\r\nHost: test\r\nContent-Type: {JSON}\r\nConnection: close\r\n\
              Accept-Encoding: {accept_encoding}\r\nContent-Length: {}\r\n\r\n{request}",
             request.len()
         );
         stream.write_all(head.as_bytes()).await.unwrap();
-        // The answer, some 40 MB, has begun; the rest of it waits in the sockets and behind them.
+        // The answer, some 20 MB, has begun; the rest of it waits in the sockets and behind them.
         let mut status = [0; 12];
         stream.read_exact(&mut status).await.unwrap();
         assert_eq!(&status, b"HTTP/1.1 200");
@@ -361,7 +362,7 @@ async fn a_client_that_reads_nothing_holds_no_thread() {
     }
     let mut rest = Vec::new();
     stalled[0].read_to_end(&mut rest).await.unwrap();
-    assert!(rest.len() > 20 << 20 && rest.ends_with(b"\r\n0\r\n\r\n"), "{} bytes", rest.len());
+    assert!(rest.len() > 16 << 20 && rest.ends_with(b"\r\n0\r\n\r\n"), "{} bytes", rest.len());
 }
 
 #[tokio::test]
