@@ -24,6 +24,7 @@ use gramian::http::problem::Problem;
 const N_POINTS: usize = 1_000_000;
 const MATRIX_ROWS: usize = 4_000;
 const ROUNDS: usize = 9;
+const REQUEST: &[u8] = b"GET / HTTP/1.1\r\nHost: bench\r\nConnection: close\r\n\r\n";
 
 fn main() {
     let numbers = random(3 * N_POINTS);
@@ -86,7 +87,7 @@ fn plain_server(matrix: Vec<f64>) -> SocketAddr {
         for stream in listener.incoming() {
             let mut stream = stream.unwrap();
             // All of it: what is left unread would turn the end of the connection into a reset.
-            stream.read(&mut [0; 1024]).unwrap();
+            stream.read_exact(&mut [0; REQUEST.len()]).unwrap();
             copy.copy_from_slice(bytemuck::cast_slice(&matrix));
             stream.write_all(&copy).unwrap();
         }
@@ -138,7 +139,7 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
 fn download(address: SocketAddr, n_bytes: usize, buffer: &mut [u8]) -> f64 {
     let mut stream = TcpStream::connect(address).unwrap();
     let began = Instant::now();
-    stream.write_all(b"GET / HTTP/1.1\r\nHost: bench\r\nConnection: close\r\n\r\n").unwrap();
+    stream.write_all(REQUEST).unwrap();
     let mut n_received = 0;
     while let n @ 1.. = stream.read(buffer).unwrap() {
         n_received += n;

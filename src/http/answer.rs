@@ -18,7 +18,7 @@ use super::problem::Problem;
 use super::shared::Diagnostics;
 use super::slug::Slug;
 
-/// An answer of named members; [`answer!`] declares one.
+/// An answer of named members; the macro `answer!` declares one.
 pub trait Answer {
     /// Takes the members out, in the order of their declaration.
     ///
@@ -124,14 +124,14 @@ impl Parts {
     /// 500 `internal` if a format is asked for that the answer does not have.
     pub fn write(self, format: Format) -> Result<Vec<Chunk>, Problem> {
         match format {
-            Format::Json => Ok(self.to_json().finish()),
+            Format::Json => Ok(self.into_json().finish()),
             Format::Safetensors => self.write_safetensors().ok_or_else(Problem::internal),
             Format::Npy => self.write_npy().ok_or_else(Problem::internal),
         }
     }
 
     /// The members as one object.
-    fn to_json(self) -> ChunkBuilder {
+    fn into_json(self) -> ChunkBuilder {
         let mut chunks = ChunkBuilder::default();
         let mut separator = '{';
         for (name, part) in self.0 {
@@ -151,7 +151,7 @@ impl Parts {
         let (arrays, others): (Vec<_>, Vec<_>) =
             self.0.into_iter().partition(|(_, part)| matches!(part, Part::Numbers(_)));
         let mut response = Vec::new();
-        Parts(others).to_json().finish().iter().for_each(|chunk| chunk.write(&mut response));
+        Parts(others).into_json().finish().iter().for_each(|chunk| chunk.write(&mut response));
         let metadata = HashMap::from([("response".to_owned(), String::from_utf8(response).ok()?)]);
         let (mut tensors, mut bodies, mut start) = (Vec::new(), Vec::new(), 0);
         for (name, part) in arrays {

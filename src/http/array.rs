@@ -144,7 +144,7 @@ impl Array {
             return;
         }
         // The outermost axis on which an entry begins here stays open up to it.
-        let axis = (0..self.shape.len()).find(|&axis| at % self.block(axis) == 0);
+        let axis = (0..self.shape.len()).find(|&axis| at.is_multiple_of(self.block(axis)));
         let open = axis.map_or(self.shape.len(), |axis| axis + 1);
         out.extend((open..self.depth(at - 1)).map(|_| b']'));
         out.push(b',');

@@ -134,7 +134,7 @@ pub struct Encoded {
 
 enum Encoding {
     Whole(Vec<Bytes>),
-    Chunks(Vec<Chunk>, Compressor),
+    Chunks(Vec<Chunk>, Box<Compressor>),
 }
 
 impl Encoded {
@@ -154,7 +154,8 @@ impl Encoded {
         let failed = |_: io::Error| Problem::internal();
         let chunks = split_bytes(chunks);
         if chunks.len() > CHUNKS_AT_ONCE {
-            return encoded(coding, Encoding::Chunks(chunks, Compressor::new(coding).map_err(failed)?));
+            let compressor = Box::new(Compressor::new(coding).map_err(failed)?);
+            return encoded(coding, Encoding::Chunks(chunks, compressor));
         }
         let plain: Vec<Vec<u8>> = chunks.par_iter().map(Chunk::to_bytes).collect();
         if coding == Coding::Identity || plain.iter().map(Vec::len).sum::<usize>() < LEAST_COMPRESSED_BYTES {
@@ -221,15 +222,15 @@ fn written(chunks: Vec<Chunk>, app: Arc<App>) -> impl Stream<Item = io::Result<V
 /// The same, compressed: the compressor moves from job to job.
 fn compressed(
     plain: impl Stream<Item = io::Result<Vec<u8>>> + Send,
-    compressor: Compressor,
+    compressor: Box<Compressor>,
     app: Arc<App>,
 ) -> impl Stream<Item = io::Result<Bytes>> + Send {
-    let step = move |(mut plain, compressor): (std::pin::Pin<Box<_>>, Option<Compressor>)| {
+    let step = move |(mut plain, compressor): (std::pin::Pin<Box<_>>, Option<Box<Compressor>>)| {
         let app = app.clone();
         async move {
             let Some(mut compressor) = compressor else { return Ok(None) };
             let next: Option<io::Result<Vec<u8>>> = StreamExt::next(&mut plain).await;
-            let (bytes, compressor) = match (next.transpose()?, &compressor) {
+            let (bytes, compressor) = match (next.transpose()?, &*compressor) {
                 (Some(bytes), Compressor::Identity) => (bytes, Some(compressor)),
                 (Some(bytes), _) => {
                     on_pool(app, move || Ok((compressor.write(bytes)?, Some(compressor)))).await?

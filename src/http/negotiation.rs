@@ -99,7 +99,7 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
     let weight = |name: &str| given(name).or_else(|| given("*")).map_or(0.0, |(_, weight)| weight);
     let identity = match (given("identity"), given("*"), format) {
         (Some((_, weight)), ..) => weight,
-        (None, Some((_, weight)), _) if weight == 0.0 => 0.0,
+        (None, Some((_, 0.0)), _) => 0.0,
         (None, _, Format::Json) => f64::MIN_POSITIVE,
         (None, _, Format::Safetensors | Format::Npy) => 1.0,
     };
