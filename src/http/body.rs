@@ -13,6 +13,7 @@ use serde_json::error::Category;
 
 use super::compression::decompress;
 use super::negotiation::{Coding, Format, announced};
+use super::plain_json;
 use super::problem::Problem;
 use super::slug::Slug;
 use super::tensors::{parse_npy, parse_safetensors};
@@ -104,6 +105,9 @@ async fn drain(mut body: Body) {
 /// # Errors
 /// 400 `malformed-json` for what is not JSON, 422 `invalid-request` with a pointer for what is, but not this request.
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    if let Some(request) = plain_json::from_slice(bytes, |json| object(json)) {
+        return Ok(request);
+    }
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let parsed = object(&mut deserializer).and_then(|request| deserializer.end().map(|()| request));
     parsed.map_err(|error| match error.classify() {

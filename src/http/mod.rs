@@ -14,6 +14,7 @@ mod middleware;
 pub mod negotiation;
 pub mod openapi;
 pub mod operation;
+mod plain_json;
 pub mod problem;
 mod responses;
 mod routes;
