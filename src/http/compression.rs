@@ -9,8 +9,9 @@ use super::negotiation::Coding;
 use super::problem::Problem;
 use super::slug::Slug;
 
-/// Levels for floats in decimals: higher ones take many times as long for a few per cent.
-const GZIP_LEVEL: flate2::Compression = flate2::Compression::new(1);
+/// Levels for random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, 2 leaves 46 % at 127 MB/s, 6 as much at half the
+/// speed; zstd 1 leaves 42 % at 470 MB/s, 3 more at a third of the speed.
+const GZIP_LEVEL: flate2::Compression = flate2::Compression::new(2);
 const ZSTD_LEVEL: i32 = 1;
 
 /// Window that a client may ask the decoder to hold, as a power of 2: the 8 MiB of RFC 9659.

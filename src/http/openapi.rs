@@ -17,8 +17,8 @@ use super::problem::ProblemDocument;
                        factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface \
                        operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, \
                        lengths are in the client's unit, a null marks an entry without a meaningful value, and every error \
-                       is an RFC 9457 problem document. Bodies may be compressed, by Content-Encoding gzip or zstd, and \
-                       JSON answers are if Accept-Encoding asks for it.",
+                       is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so \
+                       are computed answers in JSON if Accept-Encoding asks for it.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/", description = "This server")),
