@@ -1,4 +1,4 @@
-//! Bodies in: bytes within the limit, JSON into types, refusals with pointers.
+//! Bodies in: bytes within the limit, into types, refusals with pointers.
 
 use std::marker::PhantomData;
 
@@ -11,8 +11,12 @@ use serde::de::{
 };
 use serde_json::error::Category;
 
+use super::compression::decompress;
+use super::negotiation::{Coding, Format, announced};
+use super::plain_json;
 use super::problem::Problem;
 use super::slug::Slug;
+use super::tensors::{parse_npy, parse_safetensors};
 
 /// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
 /// answer instead of a broken connection.
@@ -24,24 +28,58 @@ const MAX_TRUSTED_BYTES: usize = 1 << 20;
 /// Characters of a refused value or name that are repeated to the client.
 const MAX_SHOWN_CHARACTERS: usize = 200;
 
-/// Reads a JSON body of at most `limit` bytes.
+/// A request as it came.
+pub struct RequestBody {
+    format: Format,
+    coding: Coding,
+    bytes: Vec<u8>,
+    /// Bytes it may have once it is decompressed.
+    limit: usize,
+}
+
+impl RequestBody {
+    /// Decompresses and parses, on the pool.
+    ///
+    /// # Errors
+    /// 413 beyond the limit, 400 for what is not of its format, 422 with a pointer for what is, but not this request.
+    pub fn parse<T: DeserializeOwned>(self) -> Result<T, Problem> {
+        let bytes = decompress(self.bytes, self.coding, self.limit)?;
+        match self.format {
+            Format::Json => parse_json(&bytes),
+            Format::Safetensors => parse_safetensors(&bytes),
+            Format::Npy => parse_npy(&bytes),
+        }
+    }
+}
+
+/// Reads a body of at most `limit` bytes, in one of the formats.
 ///
 /// # Errors
-/// 415 unless the headers announce plain JSON, 413 beyond the limit, 400 if the connection breaks off.
-pub async fn read_json_body(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u8>, Problem> {
-    check_is_json(headers)?;
-    let announced = headers
+/// 415 unless the headers announce one of them, 413 beyond the limit, 400 if the connection breaks off.
+pub async fn read_body(
+    headers: &HeaderMap,
+    body: Body,
+    formats: &[Format],
+    limit: usize,
+) -> Result<RequestBody, Problem> {
+    let (format, coding) = announced(headers, formats)?;
+    let bytes = read_bytes(headers, body, limit).await?;
+    Ok(RequestBody { format, coding, bytes, limit })
+}
+
+async fn read_bytes(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u8>, Problem> {
+    let length = headers
         .get(header::CONTENT_LENGTH)
         .and_then(|length| length.to_str().ok())
         .and_then(|length| length.parse::<usize>().ok());
-    if let Some(required) = announced.filter(|&length| length > limit) {
+    if let Some(required) = length.filter(|&length| length > limit) {
         drain(body).await;
         return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, Some(required)));
     }
     let mut body = body;
-    let mut bytes = Vec::with_capacity(announced.unwrap_or(0).min(MAX_TRUSTED_BYTES));
+    let mut bytes = Vec::with_capacity(length.unwrap_or(0).min(MAX_TRUSTED_BYTES));
     while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|_| Problem::new(Slug::MalformedJson, "the body broke off"))?;
+        let frame = frame.map_err(|_| Problem::new(Slug::MalformedBody, "the body broke off"))?;
         let Ok(data) = frame.into_data() else { continue };
         if bytes.len() + data.len() > limit {
             drain(body).await;
@@ -62,51 +100,35 @@ async fn drain(mut body: Body) {
     }
 }
 
-fn check_is_json(headers: &HeaderMap) -> Result<(), Problem> {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let essence = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
-    if !essence.eq_ignore_ascii_case("application/json") {
-        let found = if essence.is_empty() { "no Content-Type" } else { essence };
-        let detail = format!("expected Content-Type: application/json, found {found:?}");
-        return Err(Problem::new(Slug::UnsupportedMediaType, detail));
-    }
-    match text(header::CONTENT_ENCODING) {
-        None => Ok(()),
-        Some(encoding) if encoding.eq_ignore_ascii_case("identity") => Ok(()),
-        Some(encoding) => {
-            let detail =
-                format!("Content-Encoding {encoding:?} is not supported; send the body uncompressed");
-            Err(Problem::new(Slug::UnsupportedMediaType, detail))
-        }
-    }
-}
-
 /// Parses JSON into a request.
 ///
 /// # Errors
 /// 400 `malformed-json` for what is not JSON, 422 `invalid-request` with a pointer for what is, but not this request.
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    if let Some(request) = plain_json::from_slice(bytes, |json| object(json)) {
+        return Ok(request);
+    }
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let parsed = object(&mut deserializer).and_then(|request| deserializer.end().map(|()| request));
     parsed.map_err(|error| match error.classify() {
-        Category::Syntax | Category::Eof | Category::Io => malformed(&error),
+        Category::Syntax | Category::Eof | Category::Io => malformed_json(&error),
         // The type error came first, but the rest may not even be JSON.
         Category::Data => match serde_json::from_slice::<IgnoredAny>(bytes) {
-            Err(error) => malformed(&error),
-            Ok(IgnoredAny) => invalid::<T>(bytes, &error),
+            Err(error) => malformed_json(&error),
+            Ok(IgnoredAny) => refusal::<T, _>(&mut serde_json::Deserializer::from_slice(bytes), &error),
         },
     })
 }
 
-fn malformed(error: &serde_json::Error) -> Problem {
+/// 400 for what is not JSON.
+pub fn malformed_json(error: &serde_json::Error) -> Problem {
     Problem::new(Slug::MalformedJson, error.to_string())
 }
 
-/// Parses again, this time tracking the path: only refused requests pay for it.
-fn invalid<T: DeserializeOwned>(bytes: &[u8], error: &serde_json::Error) -> Problem {
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+/// 422 with a pointer: parses again, this time tracking the path, so that only refused requests pay for it.
+pub fn refusal<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D, error: &D::Error) -> Problem {
     let mut track = serde_path_to_error::Track::new();
-    let tracked = serde_path_to_error::Deserializer::new(&mut deserializer, &mut track);
+    let tracked = serde_path_to_error::Deserializer::new(deserializer, &mut track);
     let (pointer, message) = match object::<T, _>(tracked) {
         Ok(_) => (String::new(), error.to_string()),
         Err(error) => (pointer_of(&track.path()), error.to_string()),

@@ -10,6 +10,7 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use super::slug::Slug;
 use crate::app::App;
@@ -103,32 +104,12 @@ pub fn recover(_panic: Box<dyn Any + Send + 'static>) -> Response {
     Problem::internal().into_response()
 }
 
-/// Refuses requests that accept no JSON.
+/// Refuses requests that accept no JSON, where there is nothing else.
 pub async fn negotiate(request: Request, next: Next) -> Response {
-    let accepts: Vec<&str> =
-        request.headers().get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok()).collect();
-    if accepts.is_empty() || accepts_json(&accepts.join(",")) {
-        return next.run(request).await;
+    match Wanted::of(request.headers(), &[Format::Json]) {
+        Ok(_) => next.run(request).await,
+        Err(problem) => problem.into_response(),
     }
-    Problem::new(Slug::NotAcceptable, "answers come as application/json; add it to Accept").into_response()
-}
-
-/// RFC 9110, section 12.5.1: the most specific media range that matches decides; weight 0 refuses.
-fn accepts_json(accept: &str) -> bool {
-    let weight = |range: &str| -> Option<(u8, f64)> {
-        let mut parts = range.split(';').map(str::trim);
-        let specificity = match parts.next()?.to_ascii_lowercase().as_str() {
-            "application/json" => 2,
-            "application/*" => 1,
-            "*/*" => 0,
-            _ => return None,
-        };
-        let q =
-            parts.find_map(|p| p.strip_prefix("q=").or(p.strip_prefix("Q="))).and_then(|q| q.parse().ok());
-        Some((specificity, q.unwrap_or(1.0)))
-    };
-    let best = accept.split(',').filter_map(weight).max_by(|a, b| a.0.cmp(&b.0));
-    best.is_some_and(|(_, q)| q > 0.0)
 }
 
 /// Answers 504 when the deadline passes; dropping the handler cancels its work.
@@ -146,17 +127,6 @@ pub async fn meet_deadline(State(app): State<Arc<App>>, request: Request, next: 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_most_specific_range_decides() {
-        for accept in ["application/json", "*/*", "text/html, application/*;q=0.1", "APPLICATION/JSON; q=0.5"]
-        {
-            assert!(accepts_json(accept), "{accept}");
-        }
-        for refuse in ["text/html", "application/json;q=0, */*", "application/x-npy", ""] {
-            assert!(!accepts_json(refuse), "{refuse}");
-        }
-    }
 
     #[test]
     fn only_harmless_request_ids_are_taken_over() {

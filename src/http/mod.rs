@@ -1,20 +1,26 @@
 //! HTTP: every route on this page, middleware beneath.
 
+pub mod answer;
 pub mod array;
 pub mod auth;
 pub mod body;
+mod compression;
 pub mod compute;
+pub mod encode;
 mod fit;
 mod fitted;
 mod kernel;
 mod middleware;
+pub mod negotiation;
 pub mod openapi;
 pub mod operation;
+mod plain_json;
 pub mod problem;
 mod responses;
 mod routes;
 mod shared;
 pub mod slug;
+mod tensors;
 
 use std::sync::Arc;
 
@@ -41,8 +47,7 @@ pub fn router(app: Arc<App>) -> Router {
     let document = Arc::<str>::from(to_json(&document));
     let v1 = v1
         .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
-        .layer(from_fn_with_state(app.clone(), auth::authenticate))
-        .layer(from_fn(middleware::negotiate));
+        .layer(from_fn_with_state(app.clone(), auth::authenticate));
     let serve_document =
         move || async move { ([(header::CONTENT_TYPE, "application/json")], document.to_string()) };
     v1.merge(probes)
@@ -69,9 +74,11 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     let v1 = OpenApiRouter::with_openapi(openapi::Document::openapi())
         .routes(routes!(clouds::create_cloud, clouds::list_clouds))
         .routes(routes!(clouds::get_cloud, clouds::check_cloud, clouds::delete_cloud))
+        .routes(routes!(kernels::list_kernels))
+        .layer(from_fn(middleware::negotiate))
+        // Whatever follows computes, and negotiates by itself.
         .routes(routes!(interpolation::compute_interpolation))
         .routes(routes!(posterior::compute_posterior))
-        .routes(routes!(kernels::list_kernels))
         .routes(routes!(surface::compute_normals))
         .routes(routes!(surface::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))
@@ -86,6 +93,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     let (v1, mut document) = v1.split_for_parts();
     let (probes, of_probes) = probes.split_for_parts();
     document.merge(of_probes);
+    openapi::add_binary_formats(&mut document);
     openapi::add_examples(&mut document);
     (v1, probes, document)
 }
@@ -106,6 +114,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
         .allow_headers([
             header::AUTHORIZATION,
             header::CONTENT_TYPE,
+            header::CONTENT_ENCODING,
             header::IF_NONE_MATCH,
             HeaderName::from_static("x-request-id"),
         ])

@@ -1,9 +1,11 @@
 //! The OpenAPI document: generated from the code, committed as openapi/openapi.json, tested against it.
 
+use utoipa::openapi::schema::{KnownFormat, SchemaFormat, SchemaType, Type};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
-use utoipa::openapi::{Content, RefOr};
+use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
 use utoipa::{Modify, OpenApi};
 
+use super::negotiation::Format;
 use super::problem::ProblemDocument;
 
 /// The parts of the document that no operation declares.
@@ -15,7 +17,8 @@ use super::problem::ProblemDocument;
                        factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface \
                        operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, \
                        lengths are in the client's unit, a null marks an entry without a meaningful value, and every error \
-                       is an RFC 9457 problem document.",
+                       is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so \
+                       are computed answers in JSON if Accept-Encoding asks for it.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/", description = "This server")),
@@ -61,6 +64,55 @@ pub const EXAMPLES: [(&str, &str); 9] = [
         include_str!("../../openapi/examples/assemble_laplace_beltrami_matrix.json"),
     ),
 ];
+
+/// What requests and answers may be beside JSON, by operation id.
+fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) {
+    match operation_id {
+        "create_cloud" => (&[Format::Safetensors, Format::Npy], &[]),
+        "assemble_surface_gradient_matrix" | "assemble_laplace_beltrami_matrix" => {
+            (&[Format::Safetensors], &[Format::Safetensors, Format::Npy])
+        }
+        _ => (&[Format::Safetensors], &[Format::Safetensors]),
+    }
+}
+
+/// Adds the binary media types of operations with a body. A test asks the service for every one.
+pub fn add_binary_formats(document: &mut utoipa::openapi::OpenApi) {
+    for operation in document.paths.paths.values_mut().filter_map(|item| item.post.as_mut()) {
+        let (requests, answers) = binary_formats(operation.operation_id.as_deref().unwrap_or_default());
+        if let Some(RefOr::T(body)) = operation.request_body.as_mut() {
+            for &format in requests {
+                let content = binary(match format {
+                    Format::Npy => "The points, `[n, d]`, as little- or big-endian float64 or float32.",
+                    Format::Json | Format::Safetensors => {
+                        "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other \
+                         fields as JSON text in the metadata entry `request`."
+                    }
+                });
+                body.content.insert(format.media_type().to_owned(), content);
+            }
+        }
+        let Some(RefOr::T(answer)) = operation.responses.responses.get_mut("200") else { continue };
+        for &format in answers {
+            let content = binary(match format {
+                Format::Npy => "The matrix as float64, row by row, NaN for null.",
+                Format::Json | Format::Safetensors => {
+                    "F64 tensors named as the JSON arrays, NaN for null; the other members as JSON text in the metadata \
+                     entry `response`."
+                }
+            });
+            answer.content.insert(format.media_type().to_owned(), content);
+        }
+    }
+}
+
+fn binary(description: &str) -> RefOr<Content> {
+    let schema = ObjectBuilder::new()
+        .schema_type(SchemaType::Type(Type::String))
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+        .description(Some(description));
+    RefOr::T(ContentBuilder::new().schema(Some(schema)).build())
+}
 
 /// Puts the examples where readers and generators look for them.
 pub fn add_examples(document: &mut utoipa::openapi::OpenApi) {

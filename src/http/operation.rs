@@ -5,17 +5,18 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::extract::Request;
-use axum::http::{HeaderValue, header};
-use axum::response::{IntoResponse, Response};
-use serde::Serialize;
+use axum::http::HeaderValue;
+use axum::response::Response;
 use serde::de::DeserializeOwned;
 
-use super::body::{parse_json, read_json_body};
+use super::answer::Answer;
+use super::body::read_body;
 use super::compute::{JobObserver, StageTimes};
+use super::encode::Encoded;
 use super::fit::{FitPlan, Planner};
 use super::fitted::{Fits, Fitted};
+use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
-use super::slug::Slug;
 use crate::app::App;
 use crate::numerics::error::NumericsError;
 use crate::numerics::solver::GramFactor;
@@ -26,7 +27,10 @@ use crate::store::factors::{CacheOutcome, StoredFactor};
 pub trait Operation: DeserializeOwned + Send + 'static {
     /// What is left of the request once it is checked.
     type Work: Send + 'static;
-    type Answer: Serialize;
+    type Answer: Answer;
+
+    /// What answers may be written as, the preferred one first; npy where there is one matrix.
+    const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
 
     /// Checks everything that can be checked without computing, the cost included.
     ///
@@ -40,6 +44,9 @@ pub trait Operation: DeserializeOwned + Send + 'static {
     /// The [`Problem`] that the client is told.
     fn compute(work: Self::Work, fits: &Fits, observer: &JobObserver) -> Result<Self::Answer, Problem>;
 }
+
+/// What requests that compute may be written as.
+pub const REQUEST_FORMATS: [Format; 2] = [Format::Json, Format::Safetensors];
 
 /// The factorizations that an operation needs, what it does with them, and the flops of that.
 pub struct Plan<W> {
@@ -57,12 +64,13 @@ pub struct Plan<W> {
 /// The [`Problem`] that the client is told.
 pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let bytes = read_json_body(&parts.headers, body, app.config.max_body_bytes).await?;
+    let wanted = Wanted::of(&parts.headers, O::FORMATS)?;
+    let body = read_body(&parts.headers, body, &REQUEST_FORMATS, app.config.max_body_bytes).await?;
     let _admission = app.compute.admit()?;
 
     let began = Instant::now();
     let shared = app.clone();
-    let prepare = move |_: &JobObserver| parse_json::<O>(&bytes)?.plan(&Planner { app: &shared, owner });
+    let prepare = move |_: &JobObserver| body.parse::<O>()?.plan(&Planner { app: &shared, owner });
     let plan = app.compute.run(0.0, prepare).await?.0?;
     let mut report = Report { parse: began.elapsed(), ..Report::default() };
 
@@ -78,13 +86,13 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
         let answer = O::compute(work, &fits, observer)?;
         let times = observer.times();
         let began = Instant::now();
-        let body = serde_json::to_vec(&answer).map_err(|_| beyond_float64())?;
-        Ok::<_, Problem>((body, times, began.elapsed()))
+        let encoded = Encoded::of(answer, wanted)?;
+        Ok::<_, Problem>((encoded, times, began.elapsed()))
     };
-    let (body, times, encode) = app.compute.run(flops, job).await?.0?;
+    let (encoded, times, encode) = app.compute.run(flops, job).await?.0?;
     report.add(times);
-    report.encode = encode;
-    Ok(report.respond(body))
+    report.encode = (!encoded.is_streamed()).then_some(encode);
+    Ok(report.head(encoded.into_response(&app)))
 }
 
 /// Bytes of the factorizations that this request would begin.
@@ -95,19 +103,13 @@ fn n_bytes_missing<W>(app: &App, plan: &Plan<W>) -> usize {
     missing.filter_map(|fit| GramFactor::n_bytes_needed(fit.fitted.n_points())).fold(0, usize::saturating_add)
 }
 
-/// The encoder's only objection is a number that JSON does not have.
-fn beyond_float64() -> Problem {
-    let detail =
-        "the answer is outside the range of float64; scale the points, the values or the length scale";
-    Problem::new(Slug::InvalidRequest, detail)
-}
-
 /// What the headers say of how the answer came about.
 #[derive(Default)]
 struct Report {
     parse: Duration,
     stages: StageTimes,
-    encode: Duration,
+    /// Absent if encoding goes on while the answer is sent.
+    encode: Option<Duration>,
     cache: Option<CacheOutcome>,
 }
 
@@ -133,10 +135,8 @@ impl Report {
         self.stages.evaluate += times.evaluate;
     }
 
-    fn respond(&self, body: Vec<u8>) -> Response {
-        let mut response = body.into_response();
+    fn head(&self, mut response: Response) -> Response {
         let headers = response.headers_mut();
-        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
         let cache = match self.cache {
             None | Some(CacheOutcome::Hit) => "gramian; hit",
             Some(CacheOutcome::Collapsed) => "gramian; fwd=miss; collapsed",
@@ -152,15 +152,17 @@ impl Report {
 
     fn server_timing(&self) -> String {
         let stages = [
-            ("parse", self.parse),
-            ("gram", self.stages.gram),
-            ("factor", self.stages.factor),
-            ("solve", self.stages.solve),
-            ("evaluate", self.stages.evaluate),
+            ("parse", Some(self.parse)),
+            ("gram", Some(self.stages.gram)),
+            ("factor", Some(self.stages.factor)),
+            ("solve", Some(self.stages.solve)),
+            ("evaluate", Some(self.stages.evaluate)),
             ("encode", self.encode),
         ];
-        let entry = |(name, time): (&str, Duration)| format!("{name};dur={:.3}", time.as_secs_f64() * 1e3);
-        stages.map(entry).join(", ")
+        let entry = |(name, time): (&str, Option<Duration>)| {
+            time.map(|time| format!("{name};dur={:.3}", time.as_secs_f64() * 1e3))
+        };
+        stages.into_iter().filter_map(entry).collect::<Vec<_>>().join(", ")
     }
 }
 

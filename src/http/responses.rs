@@ -24,13 +24,13 @@ macro_rules! problem_set {
 problem_set! {
     /// Operations with a body that compute.
     ComputeProblems {
-        400 MalformedJson "`malformed-json`: the body is not JSON",
+        400 Malformed "`malformed-json` or `malformed-body`: the body is not what its headers say",
         401 Unauthorized "`unauthorized`: no valid API key",
         404 UnknownCloud "`unknown-cloud`: no cloud is registered under the id",
-        406 NotAcceptable "`not-acceptable`: answers come as application/json",
+        406 NotAcceptable "`not-acceptable`: Accept names no media type that this operation answers with",
         413 TooLarge "`body-too-large` or `problem-too-large`: over a limit of this server",
-        415 UnsupportedMediaType "`unsupported-media-type`: the body is not announced as application/json",
-        422 Refused "`invalid-request`, `invalid-cloud`, `duplicate-points`, `dimension-mismatch`, `length-mismatch`, `kernel-not-smooth`, `kernel-not-positive-definite` or `not-positive-definite`: the body is JSON, but cannot be answered",
+        415 UnsupportedMediaType "`unsupported-media-type`: the body is announced as another media type or coding than this operation reads",
+        422 Refused "`invalid-request`, `invalid-cloud`, `duplicate-points`, `dimension-mismatch`, `length-mismatch`, `kernel-not-smooth`, `kernel-not-positive-definite` or `not-positive-definite`: the body is readable, but cannot be answered",
         500 Internal "`internal`: a bug",
         503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
         504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",

@@ -6,6 +6,7 @@ use axum::http::StatusCode;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Slug {
     MalformedJson,
+    MalformedBody,
     InvalidRequest,
     InvalidCloud,
     DuplicatePoints,
@@ -28,8 +29,9 @@ pub enum Slug {
 }
 
 impl Slug {
-    pub const ALL: [Slug; 20] = [
+    pub const ALL: [Slug; 21] = [
         Self::MalformedJson,
+        Self::MalformedBody,
         Self::InvalidRequest,
         Self::InvalidCloud,
         Self::DuplicatePoints,
@@ -81,6 +83,13 @@ impl Slug {
                 "The body is not JSON",
                 "The body ends early, has a syntax error, or holds a number that JSON or float64 does not have, such as NaN \
                  or 1e400. The detail names line and column.",
+            ),
+            Self::MalformedBody => (
+                "malformed-body",
+                StatusCode::BAD_REQUEST,
+                "The body is not what its headers say",
+                "The body is not safetensors or npy as its Content-Type says, cannot be decompressed as its Content-Encoding \
+                 says, or ends early.",
             ),
             Self::InvalidRequest => (
                 "invalid-request",
@@ -158,13 +167,15 @@ impl Slug {
                 "not-acceptable",
                 StatusCode::NOT_ACCEPTABLE,
                 "No acceptable media type",
-                "Answers come as application/json. Add it, or */*, to the Accept header.",
+                "Answers come as application/json, those of requests that compute also as application/x-safetensors, and single \
+                 matrices as application/x-npy. Add one of them, or */*, to the Accept header.",
             ),
             Self::UnsupportedMediaType => (
                 "unsupported-media-type",
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "The body has an unknown media type or encoding",
-                "Send application/json, not compressed, and say so in the Content-Type header.",
+                "Send application/json or application/x-safetensors, clouds also as application/x-npy, and say so in the \
+                 Content-Type header. Content-Encoding may be gzip or zstd.",
             ),
             Self::BodyTooLarge => (
                 "body-too-large",

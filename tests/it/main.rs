@@ -1,6 +1,7 @@
 //! The service over real sockets.
 
 mod access;
+mod bodies;
 mod cache;
 mod clouds;
 mod fits;

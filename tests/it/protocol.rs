@@ -47,7 +47,7 @@ async fn a_wrong_method_is_answered_with_the_right_ones() {
 }
 
 #[tokio::test]
-async fn answers_come_as_json_or_not_at_all() {
+async fn answers_come_as_what_there_is_or_not_at_all() {
     let server = Server::start().await;
     let clouds = ("/v1/clouds", json!({"points": [[1, 2]]}));
     for (path, body) in ROUTES.iter().map(|route| (route.path, route.request())).chain([clouds]) {
@@ -55,7 +55,9 @@ async fn answers_come_as_json_or_not_at_all() {
             let request = server.client.post(server.url(path)).json(&body).header("accept", accept);
             server.send(request).await
         };
-        for accept in ["text/html", "application/x-npy", "application/json;q=0", "image/*, text/*;q=0.5"] {
+        for accept in
+            ["text/html", "application/octet-stream", "application/json;q=0", "image/*, text/*;q=0.5"]
+        {
             let problem = send(accept).await.expect_problem(406, "not-acceptable");
             assert!(problem["detail"].as_str().unwrap().contains("application/json"));
         }
@@ -66,7 +68,7 @@ async fn answers_come_as_json_or_not_at_all() {
 }
 
 #[tokio::test]
-async fn bodies_come_as_plain_json_and_are_announced_so() {
+async fn bodies_are_announced_as_what_they_are() {
     let server = Server::start().await;
     let clouds = ("/v1/clouds", json!({"points": [[1, 2]]}));
     for (path, body) in ROUTES.iter().map(|route| (route.path, route.request())).chain([clouds]) {
@@ -82,13 +84,25 @@ async fn bodies_come_as_plain_json_and_are_announced_so() {
             &[][..],
             &[("content-type", "")],
             &[("content-type", "text/plain")],
-            &[("content-type", "application/x-npy")],
+            &[("content-type", "application/octet-stream")],
             &[("content-type", "application/problem+json")],
-            &[("content-type", "application/json"), ("content-encoding", "gzip")],
-            &[("content-type", "application/json"), ("content-encoding", "zstd")],
+            &[("content-type", "application/json"), ("content-encoding", "br")],
+            &[("content-type", "application/json"), ("content-encoding", "gzip, zstd")],
         ] {
             send(refused).await.expect_problem(415, "unsupported-media-type");
         }
+        for malformed in [
+            &[("content-type", "application/x-safetensors")][..],
+            &[("content-type", "application/json"), ("content-encoding", "gzip")],
+            &[("content-type", "application/json"), ("content-encoding", "zstd")],
+        ] {
+            send(malformed).await.expect_problem(400, "malformed-body");
+        }
+        let npy = send(&[("content-type", "application/x-npy")]).await;
+        match path {
+            "/v1/clouds" => npy.expect_problem(400, "malformed-body"),
+            _ => npy.expect_problem(415, "unsupported-media-type"),
+        };
         for accepted in [
             &[("content-type", "application/json")][..],
             &[("content-type", "Application/JSON; charset=utf-8")],

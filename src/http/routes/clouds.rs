@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::body::{Points, parse_json, present, read_json_body};
+use crate::http::body::{Points, present, read_body};
 use crate::http::fit::{Planner, unknown_cloud};
+use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
 use crate::http::responses::{ComputeProblems, ListProblems, LookUpProblems};
 use crate::store::Owner;
@@ -131,11 +132,12 @@ pub async fn create_cloud(
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let bytes = read_json_body(&parts.headers, body, app.config.max_body_bytes).await?;
+    let formats = [Format::Json, Format::Safetensors, Format::Npy];
+    let body = read_body(&parts.headers, body, &formats, app.config.max_body_bytes).await?;
     let _admission = app.compute.admit()?;
     let shared = app.clone();
     let job = move |_: &_| {
-        let request: CloudRequest = parse_json(&bytes)?;
+        let request: CloudRequest = body.parse()?;
         let planner = Planner { app: &shared, owner };
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
         Ok::<_, Problem>((Cloud::from(stored.as_ref()), is_new))

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use crate::app::App;
+use crate::http::answer::answer;
 use crate::http::array::Array;
 use crate::http::body::{Points, present};
 use crate::http::compute::JobObserver;
@@ -40,22 +39,21 @@ request! {
     }
 }
 
-/// The interpolant (regression function, if alpha > 0) at the queries.
-#[derive(Serialize, ToSchema)]
-pub struct InterpolationResponse {
-    /// u at each query.
-    #[schema(value_type = Vec<f64>)]
-    values: Array,
-    /// ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-    gradients: Option<Array>,
-    /// D²u at each query, unit of the values per length squared; with `derivatives` of 2.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
-    hessians: Option<Array>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// The interpolant (regression function, if alpha > 0) at the queries.
+    pub struct InterpolationResponse {
+        /// u at each query.
+        #[schema(value_type = Vec<f64>)]
+        values: Array,
+        /// ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradients: Option<Array>,
+        /// D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        hessians: Option<Array>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
 /// Interpolate values

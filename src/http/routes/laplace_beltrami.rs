@@ -5,16 +5,18 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::app::App;
+use crate::http::answer::answer;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::Fits;
+use crate::http::negotiation::Format;
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
@@ -66,29 +68,31 @@ request! {
     }
 }
 
-/// The Laplace–Beltrami operator of the values at the queries.
-#[derive(Serialize, ToSchema)]
-pub struct LaplaceBeltramiResponse {
-    /// Δu at each query, unit of the values per length squared; null where there is no normal.
-    #[schema(value_type = Vec<Option<f64>>)]
-    values: Array,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// The Laplace–Beltrami operator of the values at the queries.
+    pub struct LaplaceBeltramiResponse {
+        /// Δu at each query, unit of the values per length squared; null where there is no normal.
+        #[schema(value_type = Vec<Option<f64>>)]
+        values: Array,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
-/// The Laplace–Beltrami operator as a matrix.
-#[derive(Serialize, ToSchema)]
-pub struct LaplaceBeltramiMatrixResponse {
-    /// Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
-    /// in general.
-    #[schema(value_type = Vec<Option<Vec<f64>>>)]
-    matrix: Array,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// The Laplace–Beltrami operator as a matrix.
+    pub struct LaplaceBeltramiMatrixResponse {
+        /// Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
+        /// in general.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        matrix: Array,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
 /// Compute the Laplace–Beltrami operator
@@ -165,6 +169,7 @@ impl Operation for LaplaceBeltramiRequest {
 impl Operation for LaplaceBeltramiMatrixRequest {
     type Work = MatrixWork;
     type Answer = LaplaceBeltramiMatrixResponse;
+    const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let MatrixFormat::Dense = self.format.unwrap_or_default();

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::array::{Array, finite_if_present};
+use crate::http::answer::answer;
+use crate::http::array::Array;
 use crate::http::body::{Points, present, present_words};
 use crate::http::compute::JobObserver;
 use crate::http::fit::{FitPlan, Planner};
@@ -58,34 +59,30 @@ request! {
     }
 }
 
-/// The Gaussian process given the values.
-#[derive(Serialize, ToSchema)]
-pub struct PosteriorResponse {
-    /// The posterior mean at each query, unit of the values.
-    #[schema(value_type = Vec<f64>)]
-    means: Array,
-    /// The variance of the latent function at each query, no noise added, unit of the values squared.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-    variances: Option<Array>,
-    /// The variance of a new observation at each query.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<f64>>)]
-    observation_variances: Option<Array>,
-    /// The covariance of the latent function between queries.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-    covariance: Option<Array>,
-    /// The gradient of the mean at each query, unit of the values per length.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
-    gradients: Option<Array>,
-    /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_present")]
-    #[schema(nullable = false)]
-    log_marginal_likelihood: Option<f64>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// The Gaussian process given the values.
+    pub struct PosteriorResponse {
+        /// The posterior mean at each query, unit of the values.
+        #[schema(value_type = Vec<f64>)]
+        means: Array,
+        /// The variance of the latent function at each query, no noise added, unit of the values squared.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        variances: Option<Array>,
+        /// The variance of a new observation at each query.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        observation_variances: Option<Array>,
+        /// The covariance of the latent function between queries.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        covariance: Option<Array>,
+        /// The gradient of the mean at each query, unit of the values per length.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradients: Option<Array>,
+        /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        #[schema(nullable = false)]
+        log_marginal_likelihood: Option<f64>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
 /// Compute the Gaussian process posterior

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use crate::app::App;
+use crate::http::answer::answer;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_word};
 use crate::http::compute::JobObserver;
@@ -62,56 +61,58 @@ request! {
     }
 }
 
-/// Unit normals of the surface at the queries.
-#[derive(Serialize, ToSchema)]
-pub struct NormalsResponse {
-    /// The normal at each query, of length 1; null where there is none.
-    #[schema(value_type = Vec<Option<Vec<f64>>>)]
-    normals: Array,
-    /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
-    #[schema(value_type = Vec<f64>)]
-    gradient_norms: Array,
-    /// The signature function at each query: 1 on the surface, usually more inside a closed one.
-    #[schema(value_type = Vec<f64>)]
-    levels: Array,
-    /// The function whose level surface was used at each query; `signature` where there is no answer.
-    surfaces: Vec<SurfaceUsed>,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// Unit normals of the surface at the queries.
+    pub struct NormalsResponse {
+        /// The normal at each query, of length 1; null where there is none.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        normals: Array,
+        /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        #[schema(value_type = Vec<f64>)]
+        gradient_norms: Array,
+        /// The signature function at each query: 1 on the surface, usually more inside a closed one.
+        #[schema(value_type = Vec<f64>)]
+        levels: Array,
+        /// The function whose level surface was used at each query; `signature` where there is no answer.
+        surfaces: Vec<SurfaceUsed>,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
-/// Curvatures of the surface at the queries.
-#[derive(Serialize, ToSchema)]
-pub struct CurvaturesResponse {
-    /// The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
-    #[schema(value_type = Vec<Option<Vec<f64>>>)]
-    principal_curvatures: Array,
-    /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
-    #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
-    principal_directions: Array,
-    /// Their average at each query, 1/length; null where there are none.
-    #[schema(value_type = Vec<Option<f64>>)]
-    mean_curvatures: Array,
-    /// Their product at each query, 1/length to the d − 1; null where there are none.
-    #[schema(value_type = Vec<Option<f64>>)]
-    gaussian_curvatures: Array,
-    /// The normal at each query, of length 1; null where there is none.
-    #[schema(value_type = Vec<Option<Vec<f64>>>)]
-    normals: Array,
-    /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
-    #[schema(value_type = Vec<f64>)]
-    gradient_norms: Array,
-    /// The signature function at each query: 1 on the surface, usually more inside a closed one.
-    #[schema(value_type = Vec<f64>)]
-    levels: Array,
-    /// The function whose level surface was used at each query; `signature` where there is no answer.
-    surfaces: Vec<SurfaceUsed>,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// Curvatures of the surface at the queries.
+    pub struct CurvaturesResponse {
+        /// The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        principal_curvatures: Array,
+        /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
+        #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
+        principal_directions: Array,
+        /// Their average at each query, 1/length; null where there are none.
+        #[schema(value_type = Vec<Option<f64>>)]
+        mean_curvatures: Array,
+        /// Their product at each query, 1/length to the d − 1; null where there are none.
+        #[schema(value_type = Vec<Option<f64>>)]
+        gaussian_curvatures: Array,
+        /// The normal at each query, of length 1; null where there is none.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        normals: Array,
+        /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        #[schema(value_type = Vec<f64>)]
+        gradient_norms: Array,
+        /// The signature function at each query: 1 on the surface, usually more inside a closed one.
+        #[schema(value_type = Vec<f64>)]
+        levels: Array,
+        /// The function whose level surface was used at each query; `signature` where there is no answer.
+        surfaces: Vec<SurfaceUsed>,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
 /// Compute normals

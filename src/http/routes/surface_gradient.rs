@@ -5,16 +5,16 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::app::App;
+use crate::http::answer::answer;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_object};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::Fits;
+use crate::http::negotiation::Format;
 use crate::http::operation::{Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
@@ -53,29 +53,31 @@ request! {
     }
 }
 
-/// Surface gradients at the queries.
-#[derive(Serialize, ToSchema)]
-pub struct SurfaceGradientResponse {
-    /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
-    #[schema(value_type = Vec<Option<Vec<f64>>>)]
-    gradients: Array,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// Surface gradients at the queries.
+    pub struct SurfaceGradientResponse {
+        /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        gradients: Array,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
-/// The surface gradient as matrices.
-#[derive(Serialize, ToSchema)]
-pub struct SurfaceGradientMatrixResponse {
-    /// One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
-    /// is no normal.
-    #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
-    matrices: Array,
-    /// The queries where geometry has no meaning (null), or less accuracy than it seems.
-    degenerate: Vec<Degenerate>,
-    /// How the answer came about.
-    diagnostics: Diagnostics,
+answer! {
+    /// The surface gradient as matrices.
+    pub struct SurfaceGradientMatrixResponse {
+        /// One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
+        /// is no normal.
+        #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
+        matrices: Array,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
 }
 
 /// Compute surface gradients
@@ -151,6 +153,7 @@ impl Operation for SurfaceGradientRequest {
 impl Operation for SurfaceGradientMatrixRequest {
     type Work = MatrixWork;
     type Answer = SurfaceGradientMatrixResponse;
+    const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let fit = self.take_fit();

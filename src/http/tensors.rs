@@ -1,0 +1,487 @@
+//! Requests as safetensors or npy: tensors stand where JSON has arrays, and the same types read both, so that every check
+//! and every pointer is the same.
+//!
+//! A crate for npy was tried and left: its parser recurses on the brackets of the client and multiplies shapes unchecked.
+
+use serde::de::value::StrDeserializer;
+use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde::forward_to_deserialize_any;
+use serde_json::{Error, Value};
+
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+
+use super::body::{malformed_json, object, refusal};
+use super::problem::Problem;
+use super::slug::Slug;
+
+/// Names in the name of a tensor at most, as in `geometry.cloud.points`; whatever follows is part of the last one.
+const MAX_DEPTH: usize = 3;
+
+/// Parses tensors named as the arrays, `cloud.points` within objects, with the other fields as JSON text in the metadata
+/// entry `request`.
+///
+/// # Errors
+/// 400 for what is not safetensors or not JSON, 422 with a pointer for what is, but not this request.
+pub fn parse_safetensors<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    let malformed =
+        |error| Problem::new(Slug::MalformedBody, format!("the body is not safetensors: {error}"));
+    let tensors = SafeTensors::deserialize(bytes).map_err(malformed)?;
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(malformed)?;
+    let text = metadata.metadata().as_ref().and_then(|entries| entries.get("request"));
+    let fields = text.map_or("{}", String::as_str);
+    let mut request = Node::Json(serde_json::from_str(fields).map_err(|error| malformed_json(&error))?);
+    for (name, tensor) in tensors.iter() {
+        let path: Vec<&str> = name.splitn(MAX_DEPTH, '.').collect();
+        request.insert(&path, Node::of(&tensor)).map_err(|Occupied| {
+            let detail = "this is given twice, as a tensor and as a field of the metadata entry request";
+            Problem::invalid_request(format!("/{}", path.join("/")), detail)
+        })?;
+    }
+    request.parse()
+}
+
+/// Parses one array into the field `points`.
+///
+/// # Errors
+/// 400 for what is not npy, 422 with a pointer for what is, but not this request.
+pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    let array = Npy::parse(bytes).and_then(Npy::into_node);
+    let array =
+        array.ok_or_else(|| Problem::new(Slug::MalformedBody, "the body is not npy, or ends early"))?;
+    Node::Object(vec![("points".to_owned(), array)]).parse()
+}
+
+/// A request: JSON with tensors in it.
+enum Node<'a> {
+    Json(Value),
+    Object(Vec<(String, Node<'a>)>),
+    Tensor(Tensor<'a>),
+    /// A tensor that no field takes, and why.
+    Refused(String),
+}
+
+/// A tensor has no place where something else is.
+struct Occupied;
+
+impl<'a> Node<'a> {
+    fn of(view: &TensorView<'a>) -> Self {
+        let width = match view.dtype() {
+            Dtype::F64 => 8,
+            Dtype::F32 => 4,
+            other => return Self::Refused(format!("the tensor has dtype {other:?}, not F64 or F32")),
+        };
+        Tensor::node(view.data(), view.shape(), Layout { width, is_big_endian: false, is_transposed: false })
+    }
+
+    fn insert(&mut self, path: &[&str], tensor: Self) -> Result<(), Occupied> {
+        if let Node::Json(Value::Object(members)) = self {
+            let members = std::mem::take(members);
+            *self = Node::Object(members.into_iter().map(|(name, json)| (name, Node::Json(json))).collect());
+        }
+        let (Node::Object(members), Some((name, rest))) = (self, path.split_first()) else {
+            return Err(Occupied);
+        };
+        let known = members.iter().position(|(known, _)| known == name);
+        let at = match known {
+            Some(at) => at,
+            None if rest.is_empty() => {
+                members.push(((*name).to_owned(), tensor));
+                return Ok(());
+            }
+            None => {
+                members.push(((*name).to_owned(), Node::Object(Vec::new())));
+                members.len() - 1
+            }
+        };
+        members[at].1.insert(rest, tensor)
+    }
+
+    fn parse<T: DeserializeOwned>(&self) -> Result<T, Problem> {
+        object(self).map_err(|error| refusal::<T, _>(self, &error))
+    }
+}
+
+impl<'de> Deserializer<'de> for &'de Node<'_> {
+    type Error = Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        match self {
+            Node::Json(value) => value.deserialize_any(visitor),
+            Node::Object(members) => visitor.visit_map(Members { rest: members.iter(), value: None }),
+            Node::Tensor(tensor) => visitor.visit_seq(Rows { tensor, next: 0 }),
+            Node::Refused(reason) => Err(Error::custom(reason)),
+        }
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
+    }
+}
+
+struct Members<'de, 'a> {
+    rest: std::slice::Iter<'de, (String, Node<'a>)>,
+    value: Option<&'de Node<'a>>,
+}
+
+impl<'de> MapAccess<'de> for Members<'de, '_> {
+    type Error = Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Error> {
+        let Some((name, value)) = self.rest.next() else { return Ok(None) };
+        self.value = Some(value);
+        seed.deserialize(StrDeserializer::new(name)).map(Some)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Error> {
+        let value = self.value.take().ok_or_else(|| Error::custom("a value without its name"))?;
+        seed.deserialize(value)
+    }
+}
+
+/// Numbers of shape `[n]` or `[n, d]` in the bytes of a request.
+struct Tensor<'a> {
+    data: &'a [u8],
+    n_rows: usize,
+    /// Numbers of a row; `None` for a list of numbers.
+    row: Option<usize>,
+    layout: Layout,
+}
+
+#[derive(Clone, Copy)]
+struct Layout {
+    /// Bytes of a number.
+    width: usize,
+    is_big_endian: bool,
+    /// Column by column, as Fortran has it.
+    is_transposed: bool,
+}
+
+impl<'a> Tensor<'a> {
+    fn node(data: &'a [u8], shape: &[usize], layout: Layout) -> Node<'a> {
+        match *shape {
+            [n_rows] => Node::Tensor(Self { data, n_rows, row: None, layout }),
+            // Rows without numbers could be any number of them.
+            [n_rows, row] if row > 0 => Node::Tensor(Self { data, n_rows, row: Some(row), layout }),
+            _ => Node::Refused(format!("the tensor has shape {shape:?}, not [n] or [n, d]")),
+        }
+    }
+
+    /// A number in the order of rows; one of 32 bits is widened exactly.
+    fn number(&self, row: usize, column: usize) -> Result<f64, Error> {
+        let Layout { width, is_big_endian, is_transposed } = self.layout;
+        let at =
+            if is_transposed { column * self.n_rows + row } else { row * self.row.unwrap_or(1) + column };
+        let bytes = self.data.get(at * width..(at + 1) * width).unwrap_or_default();
+        let x = match (<[u8; 8]>::try_from(bytes), <[u8; 4]>::try_from(bytes), is_big_endian) {
+            (Ok(bytes), _, false) => f64::from_le_bytes(bytes),
+            (Ok(bytes), _, true) => f64::from_be_bytes(bytes),
+            (_, Ok(bytes), false) => f32::from_le_bytes(bytes).into(),
+            (_, Ok(bytes), true) => f32::from_be_bytes(bytes).into(),
+            (Err(_), Err(_), _) => return Err(Error::custom("the tensor ends early")),
+        };
+        if x.is_finite() { Ok(x) } else { Err(Error::custom(format!("{x} is not finite"))) }
+    }
+}
+
+struct Rows<'t, 'a> {
+    tensor: &'t Tensor<'a>,
+    next: usize,
+}
+
+impl<'de> SeqAccess<'de> for Rows<'_, '_> {
+    type Error = Error;
+
+    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
+        if self.next == self.tensor.n_rows {
+            return Ok(None);
+        }
+        self.next += 1;
+        let (tensor, row) = (self.tensor, self.next - 1);
+        match tensor.row {
+            None => seed.deserialize(Entry(tensor, row, 0)).map(Some),
+            Some(length) => seed.deserialize(Row { tensor, row, columns: 0..length }).map(Some),
+        }
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.tensor.n_rows - self.next)
+    }
+}
+
+struct Row<'t, 'a> {
+    tensor: &'t Tensor<'a>,
+    row: usize,
+    columns: std::ops::Range<usize>,
+}
+
+impl<'de> SeqAccess<'de> for Row<'_, '_> {
+    type Error = Error;
+
+    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Error> {
+        let Some(column) = self.columns.next() else { return Ok(None) };
+        seed.deserialize(Entry(self.tensor, self.row, column)).map(Some)
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.columns.len())
+    }
+}
+
+impl<'de> Deserializer<'de> for Row<'_, '_> {
+    type Error = Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_seq(self)
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
+    }
+}
+
+/// One number, by row and column. It is read, and refused, where serde knows its place.
+struct Entry<'t, 'a>(&'t Tensor<'a>, usize, usize);
+
+impl<'de> Deserializer<'de> for Entry<'_, '_> {
+    type Error = Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_f64(self.0.number(self.1, self.2)?)
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
+    }
+}
+
+/// The header of an array of `NumPy`, and its numbers: magic, version, the length of the header, a Python dictionary with
+/// `descr`, `fortran_order` and `shape`, the numbers (NumPy Enhancement Proposal 1).
+struct Npy<'a> {
+    descr: &'a str,
+    fortran_order: bool,
+    shape: Vec<usize>,
+    data: &'a [u8],
+}
+
+impl<'a> Npy<'a> {
+    fn parse(bytes: &'a [u8]) -> Option<Self> {
+        let (version, rest) = bytes.strip_prefix(b"\x93NUMPY")?.split_at_checked(2)?;
+        let (n_header, rest) = match version[0] {
+            1 => rest.split_first_chunk().map(|(&n, rest)| (u16::from_le_bytes(n).into(), rest))?,
+            2 | 3 => rest.split_first_chunk().map(|(&n, rest)| (u32::from_le_bytes(n), rest))?,
+            _ => return None,
+        };
+        let (header, data) = rest.split_at_checked(usize::try_from(n_header).ok()?)?;
+        let header = str::from_utf8(header).ok()?;
+        let value = |name| Some(header.split_once(name)?.1.trim_start().strip_prefix(':')?.trim_start());
+        let descr = value("'descr'")?;
+        let descr = match descr.strip_prefix('\'') {
+            Some(quoted) => quoted.split_once('\'')?.0,
+            None => "of several fields",
+        };
+        let fortran_order = match value("'fortran_order'")? {
+            text if text.starts_with("True") => true,
+            text if text.starts_with("False") => false,
+            _ => return None,
+        };
+        let shape = value("'shape'")?.strip_prefix('(')?.split_once(')')?.0;
+        let lengths = shape.split(',').map(str::trim).filter(|length| !length.is_empty());
+        let shape = lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?;
+        Some(Self { descr, fortran_order, shape, data })
+    }
+
+    /// `None` if there are not as many bytes as the header says.
+    fn into_node(self) -> Option<Node<'a>> {
+        let (width, is_big_endian) = match self.descr {
+            "<f8" => (8, false),
+            ">f8" => (8, true),
+            "<f4" => (4, false),
+            ">f4" => (4, true),
+            other => {
+                return Some(Node::Refused(format!("the array has dtype {other:?}, not '<f8' or '<f4'")));
+            }
+        };
+        let n_bytes = self.shape.iter().try_fold(width, |n: usize, &length| n.checked_mul(length))?;
+        let is_transposed = self.fortran_order && self.shape.len() > 1;
+        (n_bytes == self.data.len())
+            .then(|| Tensor::node(self.data, &self.shape, Layout { width, is_big_endian, is_transposed }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use serde::Deserialize;
+
+    use super::*;
+    use crate::http::body::{Points, present};
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Request {
+        points: Points,
+        #[serde(default, deserialize_with = "present")]
+        values: Option<Vec<f64>>,
+        #[serde(default, deserialize_with = "present")]
+        alpha: Option<f64>,
+        #[serde(default, deserialize_with = "present")]
+        geometry: Option<Geometry>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Geometry {
+        noise: Vec<f64>,
+        #[serde(default, deserialize_with = "present")]
+        alpha: Option<f64>,
+    }
+
+    fn bytes(numbers: &[f64]) -> Vec<u8> {
+        numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
+    }
+
+    type Given<'a> = (&'a str, Dtype, &'a [usize], Vec<u8>);
+
+    fn safetensors(tensors: &[Given<'_>], request: Option<&str>) -> Vec<u8> {
+        let views = tensors.iter().map(|(name, dtype, shape, data)| {
+            (*name, TensorView::new(*dtype, shape.to_vec(), data).unwrap())
+        });
+        let metadata = request.map(|text| HashMap::from([("request".to_owned(), text.to_owned())]));
+        safetensors::serialize(views, metadata).unwrap()
+    }
+
+    fn refused(body: &[u8]) -> (Slug, String) {
+        describe(&parse_safetensors::<Request>(body).unwrap_err())
+    }
+
+    fn describe(problem: &Problem) -> (Slug, String) {
+        let document = serde_json::to_value(problem.document("")).unwrap();
+        (problem.slug(), document["errors"][0]["pointer"].as_str().unwrap_or("-").to_owned())
+    }
+
+    fn points() -> Given<'static> {
+        ("points", Dtype::F64, &[2, 3], bytes(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))
+    }
+
+    #[test]
+    fn tensors_stand_where_json_has_arrays() {
+        let values = [0.1f32, 0.2].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let noise = ("geometry.noise", Dtype::F64, &[1][..], bytes(&[0.5]));
+        let tensors = [points(), ("values", Dtype::F32, &[2], values), noise];
+        let body = safetensors(&tensors, Some(r#"{"alpha": 0.25, "geometry": {"alpha": 2}}"#));
+        let request: Request = parse_safetensors(&body).unwrap();
+        assert_eq!(request.points.coordinates, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!((request.points.dimension, request.alpha), (3, Some(0.25)));
+        assert_eq!(request.values.unwrap(), [f64::from(0.1f32), f64::from(0.2f32)]);
+        let geometry = request.geometry.unwrap();
+        assert_eq!((geometry.noise, geometry.alpha), (vec![0.5], Some(2.0)));
+        // Without the metadata entry there are only tensors.
+        assert_eq!(parse_safetensors::<Request>(&safetensors(&[points()], None)).unwrap().alpha, None);
+    }
+
+    #[test]
+    fn what_does_not_belong_is_pointed_to() {
+        let with = |tensor: Given<'_>, request| refused(&safetensors(&[points(), tensor], request));
+        let number = || bytes(&[1.0]);
+        for (tensor, request, pointer) in [
+            (("frobnicate", Dtype::F64, &[1][..], number()), None, "/frobnicate"),
+            (("geometry.noise.x", Dtype::F64, &[1], number()), None, "/geometry/noise"),
+            (("values", Dtype::F64, &[1], number()), Some(r#"{"values": [1]}"#), "/values"),
+            (("geometry.noise", Dtype::F64, &[1], number()), Some(r#"{"geometry": 3}"#), "/geometry/noise"),
+            (("values", Dtype::F64, &[1, 1], number()), None, "/values/0"),
+            (("values", Dtype::F64, &[], number()), None, "/values"),
+            (("values", Dtype::F64, &[1, 1, 1], number()), None, "/values"),
+            (("values", Dtype::I64, &[1], number()), None, "/values"),
+            (("alpha", Dtype::F64, &[1], number()), None, "/alpha"),
+            (("values", Dtype::F64, &[2], bytes(&[1.0, f64::NAN])), None, "/values/1"),
+            (("geometry.noise", Dtype::F64, &[2], bytes(&[1.0, f64::INFINITY])), None, "/geometry/noise/1"),
+            (("values", Dtype::F64, &[1], number()), Some(r#"{"alpha": null}"#), "/alpha"),
+        ] {
+            let name = tensor.0;
+            assert_eq!(with(tensor, request), (Slug::InvalidRequest, pointer.to_owned()), "{name}");
+        }
+        let rows = |shape| refused(&safetensors(&[("points", Dtype::F64, shape, bytes(&[1.0, 2.0]))], None));
+        assert_eq!(rows(&[2]), (Slug::InvalidRequest, "/points/0".to_owned()));
+        let empty = safetensors(&[("points", Dtype::F64, &[1 << 60, 0], vec![])], None);
+        assert_eq!(refused(&empty), (Slug::InvalidRequest, "/points".to_owned()));
+        let infinite = ("points", Dtype::F64, &[1, 2][..], bytes(&[1.0, f64::NEG_INFINITY]));
+        assert_eq!(
+            refused(&safetensors(&[infinite], None)),
+            (Slug::InvalidRequest, "/points/0/1".to_owned())
+        );
+    }
+
+    #[test]
+    fn what_is_no_safetensors_is_malformed() {
+        let good = safetensors(&[points()], Some("{}"));
+        for broken in [&good[..good.len() - 1], &good[..4], &[], b"{\"points\": [[1, 2]]}", &[0xff; 100]] {
+            assert_eq!(refused(broken).0, Slug::MalformedBody);
+        }
+        assert_eq!(refused(&safetensors(&[points()], Some("{"))).0, Slug::MalformedJson);
+        assert_eq!(refused(&safetensors(&[points()], Some("3"))).0, Slug::InvalidRequest);
+        let deep = "geometry.".repeat(100_000);
+        let nested = safetensors(&[points(), (&deep, Dtype::F64, &[0], vec![])], None);
+        assert_eq!(refused(&nested), (Slug::InvalidRequest, "/geometry/geometry".to_owned()));
+    }
+
+    fn npy(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header =
+            format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}            \n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    #[test]
+    fn npy_of_any_order_and_width_is_one_list_of_points() {
+        let rows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let columns = [1.0, 4.0, 2.0, 5.0, 3.0, 6.0];
+        let big: Vec<u8> = rows.iter().flat_map(|x: &f64| x.to_be_bytes()).collect();
+        let single: Vec<u8> = rows.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
+        let big_single: Vec<u8> = columns.iter().flat_map(|&x| (x as f32).to_be_bytes()).collect();
+        for body in [
+            npy("<f8", "False", "(2, 3)", &bytes(&rows)),
+            npy("<f8", "True", "(2, 3)", &bytes(&columns)),
+            npy(">f8", "False", "(2, 3)", &big),
+            npy("<f4", "False", "(2,3,)", &single),
+            npy(">f4", "True", "( 2, 3 )", &big_single),
+        ] {
+            let request: Request = parse_npy(&body).unwrap();
+            assert_eq!((request.points.coordinates.as_slice(), request.points.dimension), (&rows[..], 3));
+        }
+    }
+
+    #[test]
+    fn npy_that_is_none_is_malformed_and_other_arrays_are_refused() {
+        let data = bytes(&[1.0, 2.0]);
+        let refused = |body: &[u8]| describe(&parse_npy::<Request>(body).unwrap_err());
+        let good = npy("<f8", "False", "(1, 2)", &data);
+        assert!(parse_npy::<Request>(&good).is_ok());
+        for broken in [&good[..good.len() - 1], &good[..20], &good[..9], &good[1..], &[]] {
+            assert_eq!(refused(broken).0, Slug::MalformedBody);
+        }
+        for shape in ["(2, 2)", "(-1, 2)", "(18446744073709551615, 2)", "(1e3, 2)", "[1, 2]", "(1, 2"] {
+            assert_eq!(refused(&npy("<f8", "False", shape, &data)).0, Slug::MalformedBody, "{shape}");
+        }
+        assert_eq!(refused(&npy("<f8", "Maybe", "(1, 2)", &data)).0, Slug::MalformedBody);
+        for (descr, shape, pointer) in [
+            ("<i8", "(1, 2)", "/points"),
+            ("|O", "(1, 2)", "/points"),
+            ("<f8", "(2,)", "/points/0"),
+            ("<f8", "(1, 1, 2)", "/points"),
+            ("<f8", "()", "/points"),
+        ] {
+            let body = npy(descr, "False", shape, if shape == "()" { &data[..8] } else { &data });
+            assert_eq!(refused(&body), (Slug::InvalidRequest, pointer.to_owned()), "{descr} {shape}");
+        }
+        let not_finite = npy("<f8", "False", "(1, 2)", &bytes(&[1.0, f64::NAN]));
+        assert_eq!(refused(&not_finite), (Slug::InvalidRequest, "/points/0/1".to_owned()));
+    }
+}
