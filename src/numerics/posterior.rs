@@ -1,7 +1,7 @@
 //! The Gaussian process behind the interpolant: variances, covariance, likelihood (Rasmussen and Williams 2006, ch. 2).
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, MatMut, MatRef};
+use faer::{Accum, ColRef, MatMut, MatRef};
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
@@ -13,9 +13,9 @@ use super::regularization::Regularization;
 use super::solver::{GramFactor, Solution, parallelism};
 use super::vector::dot;
 
-/// Queries whose columns `L⁻¹k(X, q)` are held at once: bounds the memory to n × 256 numbers and keeps solves in
+/// Queries whose columns `L⁻¹k(X, q)` are held at once: bounds the memory to n × 512 numbers and keeps solves in
 /// matrix products.
-const QUERIES_PER_BLOCK: usize = 256;
+const QUERIES_PER_BLOCK: usize = 512;
 
 /// Variances of the latent function with the queries where rounding was clamped.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,9 +57,11 @@ pub fn variances(
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
         let columns = &mut buffer[..n * block.n_points()];
         whitened_cross_gram(factor, &nodes, &block, columns, observer)?;
-        for (k, column) in columns.chunks_exact(n).enumerate() {
+        let explained: Vec<f64> =
+            columns.par_chunks_exact(n).map(|column| ColRef::from_slice(column).squared_norm_l2()).collect();
+        for (k, explained) in explained.into_iter().enumerate() {
             let query = variances.latent.len();
-            let variance = k0 - dot(column, column);
+            let variance = k0 - explained;
             if variance.is_nan() || variance < 0.0 {
                 check_is_rounding(factor, &nodes, query, block.point(k), variance, observer)?;
                 variances.clamped.push(query);

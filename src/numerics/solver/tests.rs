@@ -197,3 +197,19 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
         assert_eq!(solve(&recycled), solve(&fresh));
     }
 }
+
+#[test]
+fn the_reciprocal_condition_is_within_a_factor_three_of_the_true_one() {
+    let n = 200;
+    let cloud = fibonacci_sphere(n);
+    for family in all_families() {
+        for alpha in [1e-6, 1e-2] {
+            let factor = factor(&cloud, family, 0.6, alpha);
+            let mut inverse = Mat::<f64>::identity(n, n);
+            factor.solve_in_place(inverse.as_mut());
+            let norm1 = (0..n).map(|j| inverse.col(j).norm_l1()).fold(0.0, f64::max);
+            let ratio = factor.reciprocal_condition() * factor.norm1() * norm1;
+            assert!((1.0 - 1e-6..3.0).contains(&ratio), "{family:?}, {alpha}: {ratio}");
+        }
+    }
+}
