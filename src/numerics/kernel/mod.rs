@@ -50,6 +50,7 @@ pub struct Kernel {
     family: Family,
     length_scale: f64,
     variance: f64,
+    inverse_square_length: f64,
 }
 
 impl Kernel {
@@ -72,7 +73,10 @@ impl Kernel {
             Family::Matern { order } if order > MAX_MATERN_ORDER => {
                 refuse("nu", "must be one of 0.5, 1.5, ..., 8.5")
             }
-            _ => Ok(Self { family, length_scale, variance }),
+            _ => {
+                let inverse_square_length = inverse_square(length_scale);
+                Ok(Self { family, length_scale, variance, inverse_square_length })
+            }
         }
     }
 
@@ -124,7 +128,7 @@ impl Kernel {
 
     /// 1/ℓ², between 1e-280 and 1e280.
     pub(crate) fn inverse_square_length(&self) -> f64 {
-        1.0 / (self.length_scale * self.length_scale)
+        self.inverse_square_length
     }
 
     /// Runs over the pairs of a block with φ, φ′ and φ″. Derivatives that the loop body does not use are never computed.
@@ -145,6 +149,15 @@ impl Kernel {
             Family::InverseMultiquadric => each(pairs, inverse_multiquadric::InverseMultiquadric),
         }
     }
+}
+
+/// 1/x², rounded once: all entries of a Gram matrix share this error, and share it where their own average out.
+fn inverse_square(x: f64) -> f64 {
+    let square = x * x;
+    let of_square = x.mul_add(x, -square);
+    let inverse = 1.0 / square;
+    let remainder = square.mul_add(-inverse, 1.0) - of_square * inverse;
+    inverse.mul_add(remainder, inverse)
 }
 
 /// A positive number so small that no scaled distance of distinct points comes near it. Profiles whose derivatives are

@@ -164,3 +164,17 @@ fn far_away_every_profile_vanishes_and_stays_finite() {
     }
     assert!(profile(Family::InverseMultiquadric, 1e300).iter().all(|p| p.abs() <= 1e-150));
 }
+
+#[test]
+fn the_inverse_square_of_the_length_is_rounded_once() {
+    // Squares of integers below 2²⁶ are exact, so that x²·y against 1 shows the error of y = 1/x² exactly.
+    for x in (3..100_000u32).step_by(7).map(f64::from) {
+        let y = Kernel::new(Family::Gauss, x, 1.0).unwrap().inverse_square_length();
+        let error = (x * x).mul_add(y, -1.0).abs();
+        assert!(error <= 0.5 * f64::EPSILON, "1/{x}²: {error:e}");
+    }
+    for tiny in [1e-140, 1e140] {
+        let kernel = Kernel::new(Family::Gauss, tiny, 1.0).unwrap();
+        assert!((kernel.inverse_square_length() * tiny * tiny - 1.0).abs() <= 2.0 * f64::EPSILON);
+    }
+}
