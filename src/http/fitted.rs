@@ -103,10 +103,16 @@ impl Fitted {
     fn surface(&self, app: &App, observer: &JobObserver) -> Result<Arc<Surface>, Problem> {
         let is_new = !self.stored.has_surface();
         let surface = self.stored.surface(|| {
-            let ones = vec![1.0; self.plan.stored.cloud.n_points()];
-            let signature = self.interpolant(app, &ones, observer)?;
-            let given = self.plan.fitted_normals();
-            Surface::of(signature, given.as_deref(), observer).map_err(|error| self.refused(error))
+            let (factor, given) = (self.stored.factor.clone(), self.plan.fitted_normals());
+            let key = ValuesKey::of(&vec![1.0; self.plan.stored.cloud.n_points()]);
+            let surface = match app.factors.solution(self.plan.key, key) {
+                Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
+                None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
+                    app.factors.keep_solution(self.plan.key, key, signature.solution.clone());
+                    Surface::with_jets(signature, jets, given.as_deref(), observer)
+                }),
+            };
+            surface.map_err(|error| self.refused(error))
         })?;
         if is_new {
             app.factors.reweigh(self.plan.key);

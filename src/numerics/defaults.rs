@@ -66,8 +66,9 @@ impl Scales {
     pub fn of(cloud: &Cloud, neighbours: &Neighbours) -> Self {
         let n = cloud.n_points();
         let spacings =
-            (0..n).into_par_iter().filter_map(|point| neighbours.mean_spacing(cloud, point, 4)).collect();
-        match (median(neighbours.spacings(cloud)), median(spacings)) {
+            (0..n).into_par_iter().filter_map(|point| neighbours.nearest_and_mean(cloud, point, 4));
+        let (nearest, means) = spacings.unzip();
+        match (median(nearest), median(means)) {
             (Some(nearest), Some(spacing)) => {
                 Self { radius: cloud.radius(), extent: extent(cloud), nearest, spacing }
             }

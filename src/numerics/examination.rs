@@ -110,10 +110,15 @@ impl<'a> Examination<'a> {
             let fit = surface.fit(query).map(Cow::Borrowed);
             return Site { x, nearest, spacing: surface.spacing(query), fit };
         }
-        let count = n_quadric_neighbours(cloud.dimension());
+        // Normals are held against a local fit to see whether they are oblique; that of the nearest point is good enough.
+        let count = if self.request.checks_curvatures { n_quadric_neighbours(cloud.dimension()) } else { 1 };
         let found = surface.neighbours().nearest_positions(cloud, x, count);
         let nearest = found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 });
-        let fit = LocalFit::of(cloud, x, &found).map(Cow::Owned);
+        let fit = match self.request.checks_curvatures {
+            true => LocalFit::of(cloud, x, &found),
+            false => surface.fit(nearest.point).map(|fit| fit.seen_from(cloud.point(nearest.point), x)),
+        };
+        let fit = fit.map(Cow::Owned);
         Site { x, nearest, spacing: surface.spacing(nearest.point), fit }
     }
 

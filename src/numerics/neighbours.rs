@@ -105,11 +105,12 @@ impl Neighbours {
         }
     }
 
-    /// Mean distance from a point to its `count` nearest positions elsewhere, unit L; `None` if there are none.
-    pub fn mean_spacing(&self, cloud: &Cloud, point: usize, count: usize) -> Option<f64> {
+    /// The least and the mean distance from a point to its `count` nearest positions elsewhere, unit L; `None` if there are
+    /// none.
+    pub fn nearest_and_mean(&self, cloud: &Cloud, point: usize, count: usize) -> Option<(f64, f64)> {
         let found = self.positions(cloud, cloud.point(point), count, f64::from_bits(1));
-        let total: f64 = found.iter().map(|n| n.squared_distance.sqrt()).sum();
-        (!found.is_empty()).then(|| total / found.len() as f64)
+        let distances = found.iter().map(|n| n.squared_distance.sqrt());
+        Some((distances.clone().next()?, distances.sum::<f64>() / found.len() as f64))
     }
 
     /// Distance from every point to the nearest point elsewhere, unit L; empty if all points coincide.
@@ -249,7 +250,7 @@ mod tests {
             [Neighbour { point: 2, squared_distance: 9.0 }]
         );
         assert_eq!(tree.spacings(&cloud), [3.0, 3.0, 3.0]);
-        assert_eq!(tree.mean_spacing(&cloud, 2, 4), Some(3.0));
+        assert_eq!(tree.nearest_and_mean(&cloud, 2, 4), Some((3.0, 3.0)));
     }
 
     #[test]
@@ -261,12 +262,12 @@ mod tests {
         };
         assert_eq!(points(3), [0, 1, 3]);
         assert_eq!(points(9), [0, 1, 3, 6]);
-        assert_eq!(tree.mean_spacing(&cloud, 0, 2), Some(1.0));
+        assert_eq!(tree.nearest_and_mean(&cloud, 0, 2), Some((1.0, 1.0)));
     }
 
     #[test]
     fn a_single_point_has_no_spacing() {
         let cloud = Cloud::new(vec![1.0, 2.0], 2).unwrap();
-        assert_eq!(Neighbours::of(&cloud).mean_spacing(&cloud, 0, 4), None);
+        assert_eq!(Neighbours::of(&cloud).nearest_and_mean(&cloud, 0, 4), None);
     }
 }

@@ -221,6 +221,12 @@ impl LocalFit {
         self.residual < SMOOTH_RESIDUAL * self.radius && self.bend() < RELIABLE_BEND
     }
 
+    /// The fit around p, with the height above its tangent plane of an x near p.
+    pub(crate) fn seen_from(&self, p: &[f64], x: &[f64]) -> Self {
+        let along: f64 = x.iter().zip(p).zip(&self.normal).map(|((x, p), n)| (x - p) * n).sum();
+        Self { height: self.height - along, ..self.clone() }
+    }
+
     /// Largest curvature times radius: about the angle by which the normal turns among the neighbours.
     pub(crate) fn bend(&self) -> f64 {
         self.radius * self.curvatures.iter().fold(0.0, |a: f64, k| a.max(k.abs()))

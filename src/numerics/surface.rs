@@ -90,6 +90,24 @@ impl Surface {
         given: Option<&Cloud>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
+        let factor = &signature.factor;
+        let jets = match factor.kernel().has_kink() {
+            true => None,
+            false => Some(signature.at(factor.cloud(), JetOrder::HessianWithMagnitudes, observer)?),
+        };
+        Self::with_jets(signature, jets, given, observer)
+    }
+
+    /// [`Surface::of`] with what [`Interpolant::signature_with_jets`] found at the points.
+    ///
+    /// # Errors
+    /// Those of [`Surface::of`].
+    pub fn with_jets(
+        signature: Interpolant,
+        jets: Option<Jets>,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
         let factor = signature.factor.clone();
         let cloud = factor.cloud();
         if cloud.dimension() < 2 {
@@ -104,10 +122,6 @@ impl Surface {
             (0..cloud.n_points()).into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
         let nearest = median(surroundings.iter().filter_map(|found| found.nearest).collect()).unwrap_or(0.0);
         let (spacings, fits) = surroundings.into_iter().map(|found| (found.spacing, found.fit)).unzip();
-        let jets = match factor.kernel().has_kink() {
-            true => None,
-            false => Some(signature.at(cloud, JetOrder::HessianWithMagnitudes, observer)?),
-        };
         let orientation = SurfaceOrientation { n_flipped: 0, is_open: false, is_given: given.is_some() };
         let is_too_rough = is_too_rough(factor.kernel(), nearest);
         let (normals, left_out_misses) = (Vec::new(), OnceLock::new());

@@ -41,22 +41,36 @@ impl Solution {
     /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::NotPositiveDefinite`] if the
     /// residual exceeds 1e-5 or the backward error 1e-13, [`NumericsError::Cancelled`].
     pub fn of(factor: &GramFactor, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+        Ok(Self::with_jets(factor, values, JetOrder::Value, observer)?.0)
+    }
+
+    /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
+    ///
+    /// # Errors
+    /// Those of [`Solution::of`], and [`NumericsError::Overflow`] of derivatives.
+    pub fn with_jets(
+        factor: &GramFactor,
+        values: &[f64],
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<(Self, Jets), NumericsError> {
         factor.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
-        let mut candidate = Candidate::new(factor, values, solve(factor, values), observer)?;
+        let candidate = |weights| Candidate::new(factor, values, weights, order, observer);
+        let mut best = candidate(solve(factor, values))?;
         let mut refined = false;
-        if candidate.relative_residual(values) > REFINE_ABOVE {
-            let correction = solve(factor, &candidate.residual);
-            let weights = candidate.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
-            match Candidate::new(factor, values, weights, observer) {
-                Ok(next) if next.relative_residual(values) < candidate.relative_residual(values) => {
-                    (candidate, refined) = (next, true);
+        if best.relative_residual(values) > REFINE_ABOVE {
+            let correction = solve(factor, &best.residual);
+            let weights = best.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
+            match candidate(weights) {
+                Ok(next) if next.relative_residual(values) < best.relative_residual(values) => {
+                    (best, refined) = (next, true);
                 }
                 Err(NumericsError::Cancelled) => return Err(NumericsError::Cancelled),
                 Ok(_) | Err(_) => {}
             }
         }
-        candidate.accept(factor, values, refined)
+        best.accept(factor, values, refined)
     }
 
     /// Bytes held on the heap.
@@ -75,7 +89,7 @@ fn solve(factor: &GramFactor, values: &[f64]) -> Vec<f64> {
 /// Weights with `KΛ`, evaluated afresh from the kernel, and the residual.
 struct Candidate {
     weights: Vec<f64>,
-    at_points: Vec<f64>,
+    jets: Jets,
     residual: Vec<f64>,
 }
 
@@ -84,18 +98,18 @@ impl Candidate {
         factor: &GramFactor,
         values: &[f64],
         weights: Vec<f64>,
+        order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         if weights.iter().any(|w| !w.is_finite()) {
             return Err(NumericsError::WeightsOverflow);
         }
         let cloud = factor.cloud();
-        let jets = Jets::evaluate(cloud, factor.kernel(), &weights, cloud, JetOrder::Value, observer)?;
-        let at_points = jets.values();
+        let jets = Jets::evaluate(cloud, factor.kernel(), &weights, cloud, order, observer)?;
         let residual = (0..values.len())
-            .map(|i| values[i] - at_points[i] - factor.regularization().at(i) * weights[i])
+            .map(|i| values[i] - jets.value(i) - factor.regularization().at(i) * weights[i])
             .collect();
-        Ok(Self { weights, at_points, residual })
+        Ok(Self { weights, jets, residual })
     }
 
     fn relative_residual(&self, values: &[f64]) -> f64 {
@@ -103,7 +117,12 @@ impl Candidate {
         if scale == 0.0 { 0.0 } else { norm2(&self.residual) / scale }
     }
 
-    fn accept(self, factor: &GramFactor, values: &[f64], refined: bool) -> Result<Solution, NumericsError> {
+    fn accept(
+        self,
+        factor: &GramFactor,
+        values: &[f64],
+        refined: bool,
+    ) -> Result<(Solution, Jets), NumericsError> {
         let relative_residual = self.relative_residual(values);
         let residual_max = norm_max(&self.residual);
         let scale = factor.norm1() * norm_max(&self.weights) + norm_max(values);
@@ -114,17 +133,19 @@ impl Candidate {
         if backward_error.is_nan() || backward_error > MAX_BACKWARD_ERROR {
             return Err(factor.not_positive_definite(NotDefinite::BackwardError { backward_error }));
         }
-        let native_norm_squared = self.weights.iter().zip(&self.at_points).map(|(w, u)| w * u).sum();
-        let misfits: Vec<f64> = self.at_points.iter().zip(values).map(|(u, y)| u - y).collect();
+        let at_points = self.jets.values();
+        let native_norm_squared = self.weights.iter().zip(&at_points).map(|(w, u)| w * u).sum();
+        let misfits: Vec<f64> = at_points.iter().zip(values).map(|(u, y)| u - y).collect();
         let misfit = norm2(&misfits);
-        Ok(Solution {
+        let solution = Solution {
             weights: self.weights,
             relative_residual,
             residual_max,
             native_norm_squared,
             misfit,
             refined,
-        })
+        };
+        Ok((solution, self.jets))
     }
 }
 
