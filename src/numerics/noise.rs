@@ -10,6 +10,9 @@ use super::patch::{Patch, n_coefficients};
 /// Residual degrees of freedom of the smaller neighbourhood: few, so that it stays within the curvature of coarse clouds.
 const DEGREES_OF_FREEDOM: usize = 2;
 
+/// Points that are looked at, or up to twice as many: their median scatters by 4 %.
+const MAX_SITES: usize = 1000;
+
 /// Standard deviation of the noise of the points across the surface they sample, unit L; 0 where none shows, and for
 /// clouds too small to tell.
 ///
@@ -39,7 +42,9 @@ pub fn estimate_noise(cloud: &Cloud, neighbours: &Neighbours) -> f64 {
         };
         Some((growth * variance(n_small)? - variance(n_large)?) / (growth - 1.0))
     };
-    let variances: Vec<f64> = (0..n).into_par_iter().filter_map(variance_at).collect();
+    let stride = (n / MAX_SITES).max(1);
+    let variances: Vec<f64> =
+        (0..n.div_ceil(stride)).into_par_iter().filter_map(|k| variance_at(k * stride)).collect();
     let correction = (1.0 - 2.0 / (9.0 * DEGREES_OF_FREEDOM as f64)).powi(3);
     median(variances).map_or(0.0, |variance| (variance.max(0.0) / correction).sqrt())
 }

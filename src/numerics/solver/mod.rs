@@ -46,6 +46,8 @@ pub struct GramFactor {
     factorization: Factorization,
     norm1: f64,
     reciprocal_condition: f64,
+    /// The weights of the constant 1.
+    weights_of_one: Vec<f64>,
 }
 
 enum Factorization {
@@ -114,15 +116,23 @@ impl GramFactor {
             }
         };
         observer.enter(Stage::Condition);
-        let mut this =
-            Self { cloud, kernel, regularization, factorization, norm1, reciprocal_condition: 0.0 };
-        let inverse_norm1 = estimate_norm1(
+        let mut this = Self {
+            cloud,
+            kernel,
+            regularization,
+            factorization,
+            norm1,
+            reciprocal_condition: 0.0,
+            weights_of_one: Vec::new(),
+        };
+        let (inverse_norm1, weights_of_one) = estimate_norm1(
             this.n_points(),
             |x| this.solve_in_place(x),
             |x| {
                 this.solve_transposed_in_place(x);
             },
         );
+        this.weights_of_one = weights_of_one;
         let product = norm1 * inverse_norm1;
         this.reciprocal_condition = if product.is_finite() { 1.0 / product.max(1.0) } else { 0.0 };
         Ok(this)
@@ -171,6 +181,11 @@ impl GramFactor {
         self.reciprocal_condition
     }
 
+    /// `W·1`, `[n]`: the weights of the signature function, where the estimate of the condition begins.
+    pub(crate) fn weights_of_one(&self) -> &[f64] {
+        &self.weights_of_one
+    }
+
     /// `‖K + αI‖₁`.
     pub(crate) fn norm1(&self) -> f64 {
         self.norm1
@@ -186,7 +201,11 @@ impl GramFactor {
             Regularization::Uniform(_) => 0,
             Regularization::PerPoint(variances) => vec_bytes(variances),
         };
-        factor + noise + block_bytes(arc_payload::<Cloud>()) + self.cloud.n_bytes()
+        factor
+            + noise
+            + vec_bytes(&self.weights_of_one)
+            + block_bytes(arc_payload::<Cloud>())
+            + self.cloud.n_bytes()
     }
 
     /// Overwrites the columns of `[n, k]` values by weights, `Λ = W Y` with `W = (K + αI)⁻¹` (its least-squares

@@ -57,7 +57,9 @@ impl Solution {
         factor.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
         let candidate = |weights| Candidate::new(factor, values, weights, order, observer);
-        let mut best = candidate(solve(factor, values))?;
+        let is_one = values.iter().all(|&value| value == 1.0);
+        let weights = if is_one { factor.weights_of_one().to_vec() } else { solve(factor, values) };
+        let mut best = candidate(weights)?;
         let mut refined = false;
         if best.relative_residual(values) > REFINE_ABOVE {
             let correction = solve(factor, &best.residual);
