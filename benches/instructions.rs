@@ -10,10 +10,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use gramian::http::array::Array;
 use gramian::http::body::{Points, parse_json};
 use gramian::numerics::cloud::Cloud;
+use gramian::numerics::instruction_set::InstructionSet;
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::jets::{JetOrder, Jets};
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::neighbours::Neighbours;
+use gramian::numerics::nodes::Nodes;
 use gramian::numerics::observer::{Observer, Stage, Unobserved};
 use gramian::numerics::posterior;
 use gramian::numerics::regularization::Regularization;
@@ -28,7 +30,7 @@ const MATERN: Family = Family::Matern { order: 2 };
 /// A name and what it runs.
 type Part = (&'static str, fn());
 
-const PARTS: [Part; 16] = [
+const PARTS: [Part; 18] = [
     ("gram_gauss_1024", || gram(GAUSS)),
     ("gram_matern_1024", || gram(MATERN)),
     ("jets_value_gauss", || jets(GAUSS, JetOrder::Value)),
@@ -36,6 +38,8 @@ const PARTS: [Part; 16] = [
     ("jets_hessian_gauss", || jets(GAUSS, JetOrder::Hessian)),
     ("jets_hessian_laplace", || jets(LAPLACE, JetOrder::Hessian)),
     ("jets_hessian_matern", || jets(MATERN, JetOrder::Hessian)),
+    ("portable_value_gauss", || portable_jets(JetOrder::Value)),
+    ("portable_hessian_gauss", || portable_jets(JetOrder::Hessian)),
     ("factorize_512", || factorize(512)),
     ("factorize_1024", || factorize(1024)),
     ("weights_1024", weights),
@@ -51,7 +55,7 @@ fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
     pool.expect("no pool is there yet");
     let asked: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    println!("instruction set: {}", gramian::numerics::instruction_set::InstructionSet::best().name());
+    println!("instruction set: {}", InstructionSet::best().name());
     for (name, run) in PARTS.iter().filter(|(name, _)| asked.is_empty() || asked.iter().any(|a| a == name)) {
         println!("part: {name}");
         run();
@@ -90,6 +94,14 @@ fn jets(family: Family, order: JetOrder) {
     let (cloud, queries, kernel) = (scattered(1024, 1), scattered(256, 2), kernel(family));
     let weights = vec![1.0; 1024];
     measured(|| Jets::evaluate(&cloud, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
+}
+
+/// On the instruction set of every machine of this architecture.
+fn portable_jets(order: JetOrder) {
+    let (cloud, queries, kernel) = (scattered(1024, 1), scattered(256, 2), kernel(GAUSS));
+    let portable = InstructionSet::available().into_iter().find(|set| set.name() == "portable");
+    let (nodes, weights) = (Nodes::on(portable.unwrap(), &cloud), vec![1.0; 1024]);
+    measured(|| Jets::over(&nodes, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
 }
 
 fn factorized(n: usize) -> GramFactor {

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import subprocess
 import sys
 import time
 from dataclasses import asdict
@@ -71,8 +72,16 @@ def write_results(groups: list[Group], facts: list[tuple[str, str]], is_disturbe
         "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in facts)]),
         markdown(groups).strip(),
         f"## Where a figure does not hold\n\n{notes}",
+        f"## Time and memory against n\n\n![growth](../docs/growth.svg)\n\n{growth()}",
     ]
     (ROOT / "bench" / "RESULTS.md").write_text("\n\n".join(parts) + "\n")
+
+
+def growth() -> str:
+    """Draws docs/growth.svg and answers the table behind it."""
+    table = ROOT / "bench" / "growth.md"
+    subprocess.run([sys.executable, ROOT / "bench" / "growth.py", "--table", table], check=True, stdout=subprocess.DEVNULL)
+    return table.read_text().strip()
 
 
 if __name__ == "__main__":

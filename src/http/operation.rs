@@ -80,7 +80,6 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
         Some(surface) if surface.key != main.plan.key => Some(report.fitted(&app, surface).await?),
         Some(_) | None => None,
     };
-    let factor = main.stored.factor.clone();
     let fits = Fits { app: app.clone(), main, surface };
     let (work, flops) = (plan.work, plan.flops);
     let job = move |observer: &JobObserver| {
@@ -93,11 +92,6 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let (encoded, times, encode) = app.compute.run(flops, job).await?.0?;
     report.add(times);
     report.encode = (!encoded.is_streamed()).then_some(encode);
-    if report.cache > Some(CacheOutcome::Hit) {
-        let app = app.clone();
-        // Nobody waits for it, and the work is the operating system's.
-        tokio::task::spawn_blocking(move || factor.prepare_another(app.factors.spare()));
-    }
     Ok(report.head(encoded.into_response(&app)))
 }
 

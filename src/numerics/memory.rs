@@ -2,7 +2,7 @@
 //!
 //! WHY. The operating system hands out fresh memory page by page at its first touch. With pages of 4 KiB that takes, for the
 //! 128 MB of 4,000 points, a third of the factorization's own time or more; with huge pages some 10 ms; and memory that
-//! was used before takes nothing. So a buffer that is given back is kept, and while none is, one can be made ready beforehand.
+//! was used before takes nothing. So a buffer that is given back is kept.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,9 +17,6 @@ const MAPPED_BYTES: usize = 4 << 20;
 
 /// A kept buffer serves whatever fills it but for one part in this many, so that what a factor weighs is what it takes.
 const SLACK: usize = 32;
-
-/// No page is smaller.
-const PAGE_BYTES: usize = 4096;
 
 /// Keeps the last large buffer that was given back, up to a size, for whoever asks next.
 #[derive(Debug, Default)]
@@ -51,15 +48,6 @@ impl SpareBuffer {
             None => map_huge(n_bytes)?,
         };
         Ok(Buffer { pages: Pages::Mapped(map), n_numbers, home: Some(self.clone()) })
-    }
-
-    /// Makes memory for `n_numbers` numbers ready, unless a buffer is kept already or this is more than is kept.
-    pub(crate) fn prepare(&self, n_numbers: usize) {
-        let n_bytes = n_numbers.saturating_mul(size_of::<f64>());
-        let is_of_use = (MAPPED_BYTES..=self.max_bytes).contains(&n_bytes) && self.n_bytes() == 0;
-        let Some(mut map) = is_of_use.then(|| map_huge(n_bytes).ok()).flatten() else { return };
-        map.chunks_mut(PAGE_BYTES).for_each(|page| page[0] = 0);
-        self.kept().get_or_insert(map);
     }
 
     /// Bytes that are kept.
@@ -172,19 +160,6 @@ mod tests {
         assert!(second.iter().all(|&x| x == 7.0));
         // While one is out, another is fresh.
         assert_ne!(address(&spare.take(LARGE).unwrap()), at);
-    }
-
-    #[test]
-    fn one_buffer_at_most_is_made_ready() {
-        let spare = SpareBuffer::up_to(LARGE * 8);
-        spare.prepare(2 * LARGE);
-        assert_eq!(spare.n_bytes(), 0, "more than may be kept");
-        spare.prepare(LARGE);
-        assert_eq!(spare.n_bytes(), LARGE * 8);
-        spare.prepare(LARGE / 2 + 1);
-        assert_eq!(spare.n_bytes(), LARGE * 8, "one is kept already");
-        let taken = spare.take(LARGE).unwrap();
-        assert!(spare.n_bytes() == 0 && taken.iter().all(|&x| x == 0.0));
     }
 
     #[test]

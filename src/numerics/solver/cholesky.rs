@@ -22,9 +22,9 @@ use crate::numerics::regularization::Regularization;
 
 /// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
 ///
-/// `cargo bench --bench factor`: 512 reaches 93 % of the matrix-product rate at n = 4,000, 128 reaches 84–91 %, and faer's
-/// blocked factorization of the whole 75–78 %.
-const LEAF_SIZE: usize = 512;
+/// `cargo bench --bench factor`, n = 4,000: with 256 the recursion reaches 85 % of the matrix-product rate, with 512 84 %; faer's
+/// blocked factorization of the whole reaches 75–78 %.
+const LEAF_SIZE: usize = 256;
 
 /// `K + αI` first, and its factor L after [`Cholesky::factorize`].
 pub(super) struct Cholesky {

@@ -138,13 +138,6 @@ impl GramFactor {
         Ok(this)
     }
 
-    /// Makes memory ready for another factorization of as many points.
-    pub fn prepare_another(&self, spare: &SpareBuffer) {
-        if self.method() == Method::Cholesky {
-            spare.prepare(Cholesky::n_numbers_needed(self.n_points()).unwrap_or(usize::MAX));
-        }
-    }
-
     pub fn cloud(&self) -> &Cloud {
         &self.cloud
     }
