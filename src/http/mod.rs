@@ -12,6 +12,7 @@ mod fitted;
 mod kernel;
 mod middleware;
 pub mod negotiation;
+mod npy;
 pub mod openapi;
 pub mod operation;
 mod plain_json;

@@ -1,7 +1,5 @@
 //! Requests as safetensors or npy: tensors stand where JSON has arrays, and the same types read both, so that every check
 //! and every pointer is the same.
-//!
-//! A crate for npy was tried and left: its parser recurses on the brackets of the client and multiplies shapes unchecked.
 
 use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
@@ -12,6 +10,7 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
 use super::body::{malformed_json, object, refusal};
+use super::npy::Npy;
 use super::problem::Problem;
 use super::slug::Slug;
 
@@ -53,7 +52,7 @@ pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
 }
 
 /// A request: JSON with tensors in it.
-enum Node<'a> {
+pub(super) enum Node<'a> {
     Json(Value),
     Object(Vec<(String, Node<'a>)>),
     Tensor(Tensor<'a>),
@@ -141,7 +140,7 @@ impl<'de> MapAccess<'de> for Members<'de, '_> {
 }
 
 /// Numbers of shape `[n]` or `[n, d]` in the bytes of a request.
-struct Tensor<'a> {
+pub(super) struct Tensor<'a> {
     data: &'a [u8],
     n_rows: usize,
     /// Numbers of a row; `None` for a list of numbers.
@@ -150,16 +149,16 @@ struct Tensor<'a> {
 }
 
 #[derive(Clone, Copy)]
-struct Layout {
+pub(super) struct Layout {
     /// Bytes of a number.
-    width: usize,
-    is_big_endian: bool,
+    pub(super) width: usize,
+    pub(super) is_big_endian: bool,
     /// Column by column, as Fortran has it.
-    is_transposed: bool,
+    pub(super) is_transposed: bool,
 }
 
 impl<'a> Tensor<'a> {
-    fn node(data: &'a [u8], shape: &[usize], layout: Layout) -> Node<'a> {
+    pub(super) fn node(data: &'a [u8], shape: &[usize], layout: Layout) -> Node<'a> {
         match *shape {
             [n_rows] => Node::Tensor(Self { data, n_rows, row: None, layout }),
             // Rows without numbers could be any number of them.
@@ -255,60 +254,6 @@ impl<'de> Deserializer<'de> for Entry<'_, '_> {
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
         newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
-    }
-}
-
-/// The header of an array of `NumPy`, and its numbers: magic, version, the length of the header, a Python dictionary with
-/// `descr`, `fortran_order` and `shape`, the numbers (NumPy Enhancement Proposal 1).
-struct Npy<'a> {
-    descr: &'a str,
-    fortran_order: bool,
-    shape: Vec<usize>,
-    data: &'a [u8],
-}
-
-impl<'a> Npy<'a> {
-    fn parse(bytes: &'a [u8]) -> Option<Self> {
-        let (version, rest) = bytes.strip_prefix(b"\x93NUMPY")?.split_at_checked(2)?;
-        let (n_header, rest) = match version[0] {
-            1 => rest.split_first_chunk().map(|(&n, rest)| (u16::from_le_bytes(n).into(), rest))?,
-            2 | 3 => rest.split_first_chunk().map(|(&n, rest)| (u32::from_le_bytes(n), rest))?,
-            _ => return None,
-        };
-        let (header, data) = rest.split_at_checked(usize::try_from(n_header).ok()?)?;
-        let header = str::from_utf8(header).ok()?;
-        let value = |name| Some(header.split_once(name)?.1.trim_start().strip_prefix(':')?.trim_start());
-        let descr = value("'descr'")?;
-        let descr = match descr.strip_prefix('\'') {
-            Some(quoted) => quoted.split_once('\'')?.0,
-            None => "of several fields",
-        };
-        let fortran_order = match value("'fortran_order'")? {
-            text if text.starts_with("True") => true,
-            text if text.starts_with("False") => false,
-            _ => return None,
-        };
-        let shape = value("'shape'")?.strip_prefix('(')?.split_once(')')?.0;
-        let lengths = shape.split(',').map(str::trim).filter(|length| !length.is_empty());
-        let shape = lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?;
-        Some(Self { descr, fortran_order, shape, data })
-    }
-
-    /// `None` if there are not as many bytes as the header says.
-    fn into_node(self) -> Option<Node<'a>> {
-        let (width, is_big_endian) = match self.descr {
-            "<f8" => (8, false),
-            ">f8" => (8, true),
-            "<f4" => (4, false),
-            ">f4" => (4, true),
-            other => {
-                return Some(Node::Refused(format!("the array has dtype {other:?}, not '<f8' or '<f4'")));
-            }
-        };
-        let n_bytes = self.shape.iter().try_fold(width, |n: usize, &length| n.checked_mul(length))?;
-        let is_transposed = self.fortran_order && self.shape.len() > 1;
-        (n_bytes == self.data.len())
-            .then(|| Tensor::node(self.data, &self.shape, Layout { width, is_big_endian, is_transposed }))
     }
 }
 
