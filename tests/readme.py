@@ -16,21 +16,19 @@ Exits with 1 and the differences if there are any. Needs nothing but the standar
 """
 
 import argparse
-import contextlib
 import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
+
+from with_server import server
 
 RELATIVE = 1e-6
 ROUNDING = 1e-9
 SECONDS_PER_EXAMPLE = 120
-SECONDS_TO_START = 20
-SECONDS_TO_STOP = 20
 SHOWN_CHARACTERS = 3000
 
 ANY = object()
@@ -50,35 +48,6 @@ def main():
             run(base, readme)
     else:
         run(bases[0].rstrip("/") if bases else "http://localhost:8080", readme)
-
-
-@contextlib.contextmanager
-def server(binary):
-    """A server on a port of its own choice, in its default configuration; its base URL."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
-    environment["RUST_LOG"] = "info"
-    with tempfile.TemporaryFile() as log:
-        command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0"]
-        process = subprocess.Popen(command, env=environment, stderr=log)
-        try:
-            yield f"http://{address_of(process, log)}"
-        finally:
-            process.terminate()
-            process.wait(SECONDS_TO_STOP)
-
-
-def address_of(process, log):
-    """The address that the server logs when it listens."""
-    for _ in range(10 * SECONDS_TO_START):
-        log.seek(0)
-        text = log.read().decode(errors="replace")
-        found = re.search(r'"address":"([^"]+)"', text)
-        if found:
-            return found[1]
-        if process.poll() is not None:
-            sys.exit(f"the server ended with status {process.returncode}: {text}")
-        time.sleep(0.1)
-    sys.exit(f"the server does not listen after {SECONDS_TO_START} s")
 
 
 def run(base, readme):

@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""Runs a command against a server of its own.
+
+    tests/with_server.py GRAMIAN COMMAND [ARGUMENT]…
+
+Starts the binary GRAMIAN on a free port, in its default configuration whatever GRAMIAN_ variables are set, runs the
+command with the base URL of the server as GRAMIAN_URL, ends the server and exits as the command did. Needs nothing
+but the standard library.
+"""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+SECONDS_TO_START = 20
+SECONDS_TO_STOP = 20
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    with server(sys.argv[1]) as base:
+        outcome = subprocess.run(sys.argv[2:], env=os.environ | {"GRAMIAN_URL": base}, check=False)
+    sys.exit(outcome.returncode)
+
+
+@contextlib.contextmanager
+def server(binary):
+    """A server on a port of its own choice, in its default configuration; its base URL."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
+    environment["RUST_LOG"] = "info"
+    with tempfile.TemporaryFile() as log:
+        command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0"]
+        process = subprocess.Popen(command, env=environment, stderr=log)
+        try:
+            yield f"http://{address_of(process, log)}"
+        finally:
+            process.terminate()
+            process.wait(SECONDS_TO_STOP)
+
+
+def address_of(process, log):
+    """The address that the server logs when it listens."""
+    for _ in range(10 * SECONDS_TO_START):
+        log.seek(0)
+        text = log.read().decode(errors="replace")
+        found = re.search(r'"address":"([^"]+)"', text)
+        if found:
+            return found[1]
+        if process.poll() is not None:
+            sys.exit(f"the server ended with status {process.returncode}: {text}")
+        time.sleep(0.1)
+    sys.exit(f"the server does not listen after {SECONDS_TO_START} s")
+
+
+if __name__ == "__main__":
+    main()
