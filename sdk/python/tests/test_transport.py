@@ -116,9 +116,10 @@ def test_lost_connections_are_tried_again(lost: type[httpx.TransportError]) -> N
 def test_a_connection_lost_too_often_is_an_error() -> None:
     handle, requests = service(*[httpx.ConnectError("gone")] * 3)
     connection, _ = connect(handle, retries=2)
-    with pytest.raises(httpx.ConnectError):
+    with pytest.raises(httpx.ConnectError) as caught:
         connection.send("GET", "/version")
     assert len(requests) == 3
+    assert "no answer from http://service" in caught.value.__notes__[0]
     handle, requests = service(httpx.ConnectError("gone"))
     connection, waits = connect(handle, max_wait=0.05)
     with pytest.raises(httpx.ConnectError):

@@ -100,7 +100,7 @@ class Client:
             normals: `[n, d]`, of any length but 0, if known: their side is the outward one.
 
         >>> gramian.Client().cloud([[0, 0], [1, 0], [0, 1]])
-        Cloud(id='6ea7b37d…', n_points=3, dimension=2)
+        Cloud(id='f70083fe…', n_points=3, dimension=2)
         """
         own_points = own_copy("points", points)
         own_normals = None if normals is None else own_copy("normals", normals)

@@ -41,11 +41,9 @@ class Problem(Exception):
             f"  at {error.pointer}" + ("" if error.detail == self.detail else f": {error.detail}")
             for error in self.errors
         ]
-        if self.minimum_alpha is not None:
-            lines.append(f"  minimum_alpha: {self.minimum_alpha:g}")
         if self.request_id:
             lines.append(f"  request {self.request_id}")
-        return "\n".join(lines)
+        return "\n".join(dict.fromkeys(lines))  # points of a cloud that was given by id share a pointer
 
     @property
     def slug(self) -> str:

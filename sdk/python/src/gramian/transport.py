@@ -51,6 +51,11 @@ class RetryingClient(httpx.Client):
         self._max_wait = max_wait
         self._sleep = sleep
 
+    def __del__(self) -> None:
+        # Five lines of a notebook close nothing. Without this, sockets would warn when they are collected.
+        if not getattr(self, "is_closed", True):
+            self.close()
+
     def send(self, request: httpx.Request, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.send)
         """Sends a request, again if need be."""
         request.read()  # a body that is read from a file can be sent once only
@@ -108,7 +113,11 @@ class Connection:
             Problem: If the answer has a status of 400 or above.
             httpx.TransportError: If there is none.
         """
-        response = self.http.request(method, path, **options)
+        try:
+            response = self.http.request(method, path, **options)
+        except httpx.TransportError as error:
+            error.add_note(f"There is no answer from {self.http.base_url}, see Client(base_url=…) or GRAMIAN_URL.")
+            raise
         if response.is_error:
             raise problem_of(response, retry_after(response))
         return response
