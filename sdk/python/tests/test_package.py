@@ -35,7 +35,9 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     "posterior with noise": lambda cloud: cloud.posterior(
         squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
     ),
-    "normals": lambda cloud: cloud.normals(QUERIES, kernel=GAUSS, surface="signature", orientation="gradient"),
+    "normals": lambda cloud: cloud.normals(
+        QUERIES, kernel=GAUSS, surface="signature", orientation="gradient", solver=None
+    ),
     "curvatures": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0),
     "curvatures nowhere": lambda cloud: cloud.curvatures([[0, 0]], kernel=GAUSS, alpha=0),
     "surface_gradient": lambda cloud: cloud.surface_gradient(squares(cloud), QUERIES, kernel=GAUSS),
@@ -145,6 +147,13 @@ def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle:
             forget(cloud)
         answer = nodes.laplace_beltrami(squares(nodes), geometry=geometry)
         np.testing.assert_array_equal(answer.values, expected.values)
+
+
+def test_the_cloud_of_a_geometry_may_be_of_another_client(client: gramian.Client, circle: Array) -> None:
+    surface = gramian.Client().cloud(1.25 * circle)
+    forget(surface)
+    answer = client.cloud(circle).laplace_beltrami_matrix(geometry=Geometry(cloud=surface))
+    assert answer.matrix.shape == (8, 8)
 
 
 def test_a_listed_cloud_cannot_be_posted_again(client: gramian.Client, circle: Array) -> None:

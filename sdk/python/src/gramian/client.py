@@ -19,6 +19,9 @@ from .transport import Connection, RetryingClient
 
 DEFAULT_URL = "http://127.0.0.1:8080"
 
+DEFAULT_TIMEOUT = httpx.Timeout(150.0, connect=10.0)
+"""In seconds. Longer than the service's own deadline, 120 s if not configured, so that it can say what was too slow."""
+
 
 class Client:
     """A gramian service.
@@ -36,7 +39,7 @@ class Client:
         base_url: str | None = None,
         *,
         api_key: str | None = None,
-        timeout: float | httpx.Timeout = 60.0,
+        timeout: float | httpx.Timeout = DEFAULT_TIMEOUT,
         retries: int = 4,
         max_wait: float = 60.0,
         format: Format | None = None,  # noqa: A002
@@ -47,7 +50,7 @@ class Client:
         Args:
             base_url: Its address; if absent the environment variable `GRAMIAN_URL`, or else `http://127.0.0.1:8080`.
             api_key: A key, where the service wants one; if absent the environment variable `GRAMIAN_API_KEY`.
-            timeout: Seconds to wait for a connection, and for each next part of an answer.
+            timeout: Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent.
             retries: How often a request is repeated at most, after 429, 503 or a lost connection.
             max_wait: Seconds that all waits of a request together may take. `Retry-After` is honoured within them; if
                 it asks for more, `Overloaded` is raised at once, with `retry_after`.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Required, TypeAlias, TypedDict
 
@@ -56,7 +55,7 @@ KernelLike: TypeAlias = Kernel | KernelUsed | KernelFields
 
 
 class Fit(TypedDict, total=False):
-    """How a function is fitted to values at the n points of a cloud. Everything is optional.
+    """How a function is fitted to values at the n points of a cloud. Everything is optional, None is as absent.
 
     Keys:
         kernel: Chosen from the cloud if absent, and repeated in `diagnostics.kernel`.
@@ -68,11 +67,11 @@ class Fit(TypedDict, total=False):
         duplicates: What to do with points that coincide when alpha is 0: `"refuse"` them (if absent) or `"merge"` them.
     """
 
-    kernel: KernelLike
-    alpha: float
-    noise_variances: npt.ArrayLike
-    solver: Solver
-    duplicates: Duplicates
+    kernel: KernelLike | None
+    alpha: float | None
+    noise_variances: npt.ArrayLike | None
+    solver: Solver | None
+    duplicates: Duplicates | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,29 +96,20 @@ class Geometry:
 
     def fields(self) -> dict[str, object]:
         """Returns the field `geometry` of a request."""
-        return given(
-            cloud=None if self.cloud is None else {"id": self.cloud.id},
-            kernel=None if self.kernel is None else kernel_fields(self.kernel),
-            alpha=self.alpha,
-            noise_variances=None if self.noise_variances is None else as_list("noise_variances", self.noise_variances),
-            solver=self.solver,
-            surface=self.surface,
-        )
+        fit = Fit(kernel=self.kernel, alpha=self.alpha, noise_variances=self.noise_variances, solver=self.solver)
+        cloud = None if self.cloud is None else {"id": self.cloud.id}
+        return given(cloud=cloud, surface=self.surface, **fit_fields(fit))
 
 
 def fit_fields(fit: Fit) -> dict[str, object]:
     """Returns the fields of a request that say how to fit."""
     fields: dict[str, object] = dict(fit)
-    if "kernel" in fit:
-        fields["kernel"] = kernel_fields(fit["kernel"])
-    if "noise_variances" in fit:
-        fields["noise_variances"] = as_list("noise_variances", fit["noise_variances"])
+    kernel, noise_variances = fit.get("kernel"), fit.get("noise_variances")
+    if isinstance(kernel, Kernel | KernelUsed):
+        fields["kernel"] = kernel.to_dict()
+    if noise_variances is not None:
+        fields["noise_variances"] = as_list("noise_variances", noise_variances)
     return fields
-
-
-def kernel_fields(kernel: KernelLike) -> Mapping[str, object]:
-    """Returns a kernel as the service reads it."""
-    return kernel.to_dict() if isinstance(kernel, Kernel | KernelUsed) else kernel
 
 
 def given(**fields: object) -> dict[str, object]:

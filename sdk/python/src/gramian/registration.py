@@ -64,10 +64,6 @@ class RegisteredCloud:
         except UnknownCloud:
             return
 
-    def _register(self) -> None:
-        if self._points is not None:
-            register(self._connection, self._points, self._normals)
-
     def _compute(self, path: str, request: Mapping[str, object], other: RegisteredCloud | None = None) -> Members:
         """Asks for something about this cloud and perhaps another one.
 
@@ -78,12 +74,15 @@ class RegisteredCloud:
         try:
             return self._connection.compute(path, request)
         except UnknownCloud:
-            clouds = [cloud for cloud in (self, other) if cloud is not None and cloud.points is not None]
-            if not clouds:
+            if not self._post_again(self, other):
                 raise
-        for cloud in clouds:
-            cloud._register()
         return self._connection.compute(path, request)
+
+    def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
+        """Posts those clouds whose points are at hand, and says whether there was one."""
+        kept = [(cloud._points, cloud._normals) for cloud in clouds if cloud is not None]
+        posted = [register(self._connection, points, normals) for points, normals in kept if points is not None]
+        return bool(posted)
 
 
 def register(connection: Connection, points: Array, normals: Array | None) -> models.Cloud:
