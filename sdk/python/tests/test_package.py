@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import dataclasses
 import os
@@ -17,6 +18,8 @@ import pytest
 
 import gramian
 from gramian import Cloud, Geometry, Kernel, KernelFamily
+from gramian.rest.api.geometry import compute_normals
+from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
 from gramian.tensors import Array, Format
 
 GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
@@ -281,6 +284,17 @@ def test_a_client_may_be_shared_by_threads(client: gramian.Client, circle: Array
 def cloud_kernel(cloud: Cloud) -> Kernel:
     assert cloud.points is not None
     return Kernel(family=KernelFamily.GAUSS, length_scale=2 * float(np.linalg.norm(cloud.points[0])))
+
+
+def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Array) -> None:
+    async def ask() -> object:
+        async with client.rest as rest:
+            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudRef(id=cloud.id)))
+
+    cloud = client.cloud(circle)
+    answer = asyncio.run(ask())
+    assert isinstance(answer, NormalsResponse)
+    np.testing.assert_array_equal(np.array(answer.normals), cloud.normals().normals)
 
 
 def test_a_server_without_keys_takes_any(circle: Array) -> None:

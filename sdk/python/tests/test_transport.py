@@ -12,6 +12,7 @@ import pytest
 
 import gramian
 from gramian.rest.api.process import get_version
+from gramian.rest.models import Version
 from gramian.transport import Connection, RetryingClient
 
 OK = {"name": "gramian", "version": "0.1.0", "api": "v1", "instruction_set": "v3", "threads": 1}
@@ -148,7 +149,7 @@ def test_the_generated_client_has_the_same_retries_and_key() -> None:
     handle, requests = service(refusal(503, "0"), httpx.Response(200, json=OK))
     client = gramian.Client("http://service", api_key="secret", transport=httpx.MockTransport(handle))
     version = get_version.sync(client=client.rest)
-    assert version is not None
+    assert isinstance(version, Version)
     assert version.name == "gramian"
     assert [request.headers["Authorization"] for request in requests] == ["Bearer secret"] * 2
 

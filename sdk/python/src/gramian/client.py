@@ -86,14 +86,18 @@ class Client:
 
     @property
     def rest(self) -> rest.Client:
-        """The generated client of this service, with the same connections, key and retries.
+        """The generated client of this service, with the same connections, key and retries; closing it closes these.
+
+        Its asyncio functions have the same key, but connections of their own and no retries.
 
         >>> from gramian.rest.api.process import check_ready
         >>> check_ready.sync(client=gramian.Client().rest).status
         'ok'
         """
         http = self._connection.http
-        return rest.Client(base_url=str(http.base_url)).set_httpx_client(http)
+        key = {name: value for name, value in http.headers.items() if name == "authorization"}
+        client = rest.Client(base_url=str(http.base_url), headers=key, timeout=http.timeout)
+        return client.set_httpx_client(http)
 
     def cloud(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None) -> Cloud:
         """Registers points, and remembers them in case the service forgets them.
