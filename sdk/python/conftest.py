@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import gramian
+from gramian.tensors import Array
+
+
+@pytest.fixture(autouse=True)
+def _names_of_doctests(doctest_namespace: dict[str, object]) -> None:
+    doctest_namespace.update(gramian=gramian, np=np)
+
+
+@pytest.fixture
+def client() -> Iterator[gramian.Client]:
+    """The server under test, at GRAMIAN_URL."""
+    with gramian.Client() as client:
+        yield client
+
+
+@pytest.fixture
+def circle() -> Array:
+    """Eight points of the unit circle."""
+    angles = np.arange(8) * np.pi / 4
+    return np.column_stack([np.cos(angles), np.sin(angles)])

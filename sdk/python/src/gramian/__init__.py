@@ -1,0 +1,91 @@
+"""A client of gramian, the service for geometric kernel interpolation and regression on point clouds.
+
+>>> import gramian, numpy as np
+>>> angles = np.arange(100) * np.pi / 50
+>>> points = np.column_stack([2 * np.cos(angles), np.sin(angles)])  # an ellipse, [n, d]
+>>> curvatures = gramian.Client().cloud(points).curvatures()
+>>> curvatures.mean_curvatures.shape, curvatures.mean_curvatures[0].round(1)  # 2 at the tip: axis/(other axis)²
+((100,), np.float64(2.0))
+
+`Client` is the service, `Cloud` what it knows of your points, with a method for each operation. Answers are NumPy
+arrays in dataclasses (`gramian.answers`), refusals are exceptions (`Problem`). `gramian.rest` is the client that is
+generated from the service's OpenAPI document, with all of the interface.
+"""
+
+import copyreg
+
+from .answers import (
+    Curvatures,
+    Interpolation,
+    LaplaceBeltrami,
+    LaplaceBeltramiMatrix,
+    Normals,
+    Posterior,
+    SurfaceGradient,
+    SurfaceGradientMatrix,
+)
+from .client import Client
+from .cloud import Cloud
+from .fit import Fit, Geometry, KernelFields, KernelLike
+from .problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
+from .rest.models import (
+    Degenerate,
+    DegenerateReason,
+    Diagnostics,
+    DuplicatePolicy,
+    FactorizationUsed,
+    Kernel,
+    KernelDescription,
+    KernelFamily,
+    KernelUsed,
+    OrientationChoice,
+    PosteriorQuantity,
+    SolverChoice,
+    SolverUsed,
+    SurfaceChoice,
+    SurfaceUsed,
+    WarningCode,
+)
+from .rest.types import UNSET, Unset
+
+# The generated code compares with this one object, which therefore must stay one when an answer is pickled or copied.
+copyreg.pickle(Unset, lambda _: "UNSET")
+
+__all__ = [
+    "UNSET",
+    "Client",
+    "Cloud",
+    "Curvatures",
+    "Degenerate",
+    "DegenerateReason",
+    "Diagnostics",
+    "DuplicatePolicy",
+    "FactorizationUsed",
+    "Fit",
+    "Geometry",
+    "Interpolation",
+    "Kernel",
+    "KernelDescription",
+    "KernelFamily",
+    "KernelFields",
+    "KernelLike",
+    "KernelUsed",
+    "LaplaceBeltrami",
+    "LaplaceBeltramiMatrix",
+    "Normals",
+    "NotPositiveDefinite",
+    "OrientationChoice",
+    "Overloaded",
+    "Posterior",
+    "PosteriorQuantity",
+    "Problem",
+    "SolverChoice",
+    "SolverUsed",
+    "SurfaceChoice",
+    "SurfaceGradient",
+    "SurfaceGradientMatrix",
+    "SurfaceUsed",
+    "UnknownCloud",
+    "Unset",
+    "WarningCode",
+]

@@ -1,0 +1,249 @@
+"""Answers: arrays with the shapes documented here, and what the service says of them.
+
+n is the number of points of the cloud, d their dimension, m the number of queries; L is the unit of the coordinates
+and V that of the values. Arrays keep the order of the request, are read-only views of the answer's bytes (`.copy()`
+them to change them), and have NaN where there is no meaningful number; `degenerate` then says why. Answers can be
+pickled and used by several threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from .rest.models import Degenerate, Diagnostics, SurfaceUsed
+from .tensors import Array, Members
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """A function u through the values (close to them, if `alpha` > 0), at the queries.
+
+    Attributes:
+        values: `[m]`, V. u at each query.
+        gradients: `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
+        hessians: `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
+        diagnostics: The kernel and α used, how the system was solved, and how well.
+    """
+
+    values: Array
+    gradients: Array | None
+    hessians: Array | None
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/interpolation`."""
+        d = members.diagnostics.dimension
+        return cls(
+            values=members.array("values"),
+            gradients=members.optional("gradients", d),
+            hessians=members.optional("hessians", d, d),
+            diagnostics=members.diagnostics,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """A Gaussian process given the values, at the queries. What was not asked for is None.
+
+    Attributes:
+        means: `[m]`, V.
+        variances: `[m]`, V². Of the latent function, no noise added; ≥ 0.
+        observation_variances: `[m]`, V². Of a new, noisy observation.
+        covariance: `[m, m]`, V². Of the latent function between queries.
+        gradients: `[m, d]`, V/L. Of the mean.
+        log_marginal_likelihood: −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        diagnostics: The kernel and α used, how the system was solved, and how well.
+    """
+
+    means: Array
+    variances: Array | None
+    observation_variances: Array | None
+    covariance: Array | None
+    gradients: Array | None
+    log_marginal_likelihood: float | None
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/posterior`."""
+        diagnostics = members.diagnostics
+        return cls(
+            means=members.array("means"),
+            variances=members.optional("variances"),
+            observation_variances=members.optional("observation_variances"),
+            covariance=members.optional("covariance", diagnostics.n_queries),
+            gradients=members.optional("gradients", diagnostics.dimension),
+            log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
+            diagnostics=diagnostics,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """Unit normals of the surface at the queries.
+
+    Attributes:
+        normals: `[m, d]`, of length 1, outward unless asked for otherwise.
+        gradient_norms: `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+        levels: `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+        surfaces: m entries. The function whose level surface was used.
+        degenerate: The queries without a normal, or with a doubtful one.
+        diagnostics: The kernel and α used, how the system was solved, and how well.
+    """
+
+    normals: Array
+    gradient_norms: Array
+    levels: Array
+    surfaces: tuple[SurfaceUsed, ...]
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/normals`."""
+        diagnostics = members.diagnostics
+        return cls(
+            normals=members.array("normals", diagnostics.dimension),
+            gradient_norms=members.array("gradient_norms"),
+            levels=members.array("levels"),
+            surfaces=_surfaces(members),
+            degenerate=members.degenerate,
+            diagnostics=diagnostics,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Curvatures:
+    """Curvatures of the surface at the queries: with outward normals, a sphere of radius r has +1/r everywhere.
+
+    Attributes:
+        principal_curvatures: `[m, d − 1]`, 1/L, ascending.
+        principal_directions: `[m, d − 1, d]`, of length 1, the largest component positive; any basis where curvatures
+            coincide.
+        mean_curvatures: `[m]`, 1/L. The average of the principal curvatures.
+        gaussian_curvatures: `[m]`, 1/L^(d − 1). Their product.
+        normals: `[m, d]`, of length 1.
+        gradient_norms: `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+        levels: `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+        surfaces: m entries. The function whose level surface was used.
+        degenerate: The queries without curvatures, or with doubtful ones.
+        diagnostics: The kernel and α used, how the system was solved, and how well.
+    """
+
+    principal_curvatures: Array
+    principal_directions: Array
+    mean_curvatures: Array
+    gaussian_curvatures: Array
+    normals: Array
+    gradient_norms: Array
+    levels: Array
+    surfaces: tuple[SurfaceUsed, ...]
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/curvatures`."""
+        diagnostics = members.diagnostics
+        d = diagnostics.dimension
+        return cls(
+            principal_curvatures=members.array("principal_curvatures", d - 1),
+            principal_directions=members.array("principal_directions", d - 1, d),
+            mean_curvatures=members.array("mean_curvatures"),
+            gaussian_curvatures=members.array("gaussian_curvatures"),
+            normals=members.array("normals", d),
+            gradient_norms=members.array("gradient_norms"),
+            levels=members.array("levels"),
+            surfaces=_surfaces(members),
+            degenerate=members.degenerate,
+            diagnostics=diagnostics,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceGradient:
+    """Surface gradients ∇u − (∇u·ν)ν of the values at the queries.
+
+    Attributes:
+        gradients: `[m, d]`, V/L, tangent to the surface.
+        degenerate: The queries without a normal, or with a doubtful one.
+        diagnostics: Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    """
+
+    gradients: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient`."""
+        diagnostics = members.diagnostics
+        return cls(members.array("gradients", diagnostics.dimension), members.degenerate, diagnostics)
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceGradientMatrix:
+    """The surface gradient as matrices, one per coordinate.
+
+    Attributes:
+        matrices: `[d, m, n]`, 1/L. `matrices @ values` has the shape `[d, m]`.
+        degenerate: The queries without a normal, or with a doubtful one.
+        diagnostics: Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    """
+
+    matrices: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient/matrix`."""
+        diagnostics = members.diagnostics
+        return cls(members.arrays("matrices", diagnostics.n_points), members.degenerate, diagnostics)
+
+
+@dataclass(frozen=True, eq=False)
+class LaplaceBeltrami:
+    """The Laplace–Beltrami operator of the values at the queries: on the unit circle Δ cos θ = −cos θ.
+
+    Attributes:
+        values: `[m]`, V/L². Δu.
+        degenerate: The queries without a normal, or with a doubtful one.
+        diagnostics: Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    """
+
+    values: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami`."""
+        return cls(members.array("values"), members.degenerate, members.diagnostics)
+
+
+@dataclass(frozen=True, eq=False)
+class LaplaceBeltramiMatrix:
+    """The Laplace–Beltrami operator as a matrix: on the unit circle `matrix @ cos θ` is −cos θ.
+
+    Attributes:
+        matrix: `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric in general.
+        degenerate: The queries without a normal, or with a doubtful one.
+        diagnostics: Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    """
+
+    matrix: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami/matrix`."""
+        diagnostics = members.diagnostics
+        return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics)
+
+
+def _surfaces(members: Members) -> tuple[SurfaceUsed, ...]:
+    return tuple(SurfaceUsed(name) for name in members.fields["surfaces"])

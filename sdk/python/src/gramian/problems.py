@@ -1,0 +1,146 @@
+"""Refusals of the service as exceptions."""
+
+from __future__ import annotations
+
+import json
+from typing import TypeVar
+
+import httpx
+
+from .rest import models
+from .rest.models import FieldError
+from .rest.types import Unset
+
+T = TypeVar("T")
+
+
+class Problem(Exception):
+    """A request was refused, or could not be answered.
+
+    Carries the problem document (RFC 9457) that the service answered with. `str()` of it has what happened, where, and
+    the remedy where there is one.
+
+    >>> cloud = gramian.Client().cloud([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    >>> try:
+    ...     cloud.curvatures(alpha=-1)
+    ... except gramian.Problem as problem:
+    ...     problem.status, problem.slug, problem.pointer
+    (422, 'invalid-request', '/alpha')
+    """
+
+    def __init__(self, document: models.Problem, retry_after: float | None = None) -> None:
+        """Takes the document, and the seconds of the header `Retry-After` if there was one."""
+        super().__init__(document, retry_after)
+        self.document = document
+        self.retry_after = retry_after
+
+    def __str__(self) -> str:
+        lines = [f"{self.status} {self.slug}: {self.detail}"]
+        # A single field usually repeats the detail of the problem: then only its place is news.
+        lines += [
+            f"  at {error.pointer}" + ("" if error.detail == self.detail else f": {error.detail}")
+            for error in self.errors
+        ]
+        if self.request_id:
+            lines.append(f"  request {self.request_id}")
+        return "\n".join(dict.fromkeys(lines))  # points of a cloud that was given by id share a pointer
+
+    @property
+    def slug(self) -> str:
+        """The kind of problem, such as `invalid-request`; the service explains it at `/problems/<slug>`."""
+        return self.document.type_.rpartition("/")[2]
+
+    @property
+    def status(self) -> int:
+        """The HTTP status."""
+        return self.document.status
+
+    @property
+    def title(self) -> str:
+        """The kind of problem in words."""
+        return self.document.title
+
+    @property
+    def detail(self) -> str:
+        """What happened, where, and the remedy where there is one."""
+        return self.document.detail
+
+    @property
+    def errors(self) -> tuple[FieldError, ...]:
+        """The fields that were refused, each with `pointer` and `detail`."""
+        return tuple(self.document.errors or ())
+
+    @property
+    def pointer(self) -> str | None:
+        """The first of these fields, as JSON pointer into the request: `/cloud/points/17/2`."""
+        return self.errors[0].pointer if self.errors else None
+
+    @property
+    def minimum_alpha(self) -> float | None:
+        """An `alpha` for which the computation succeeds, unit of the values squared."""
+        return _given(self.document.minimum_alpha)
+
+    @property
+    def point_indices(self) -> tuple[int, ...]:
+        """The points in question, by position in the cloud; at most the first 1,000."""
+        return tuple(self.document.point_indices or ())
+
+    @property
+    def limit(self) -> int | None:
+        """The limit that was exceeded, in the unit that `detail` names."""
+        return _given(self.document.limit)
+
+    @property
+    def required(self) -> int | None:
+        """What the request would have needed, in the same unit."""
+        return _given(self.document.required)
+
+    @property
+    def request_id(self) -> str:
+        """The id of the request, for the logs of the service."""
+        return self.document.instance
+
+
+class UnknownCloud(Problem):
+    """The service has no such cloud (any more), and the points are not at hand to post them again."""
+
+
+class NotPositiveDefinite(Problem):
+    """The matrix K + αI is too close to singular for what was asked; `minimum_alpha` may say which `alpha` helps."""
+
+
+class Overloaded(Problem):
+    """The service had no place (503), or not so soon again (429), for longer than the client was ready to wait."""
+
+
+_KINDS: dict[str, type[Problem]] = {
+    "unknown-cloud": UnknownCloud,
+    "not-positive-definite": NotPositiveDefinite,
+    "overloaded": Overloaded,
+    "rate-limited": Overloaded,
+}
+
+
+def problem_of(response: httpx.Response, retry_after: float | None = None) -> Problem:
+    """Returns the exception for an answer of status 400 or above."""
+    document = _document(response)
+    problem = _KINDS.get(document.type_.rpartition("/")[2], Problem)
+    return problem(document, retry_after)
+
+
+def _document(response: httpx.Response) -> models.Problem:
+    """Reads the document, or writes one for what others answer, such as a proxy with a page in HTML."""
+    try:
+        return models.Problem.from_dict(response.json())
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+        return models.Problem(
+            type_="about:blank",
+            title=response.reason_phrase,
+            status=response.status_code,
+            detail=response.text[:200] or response.reason_phrase,
+            instance=response.headers.get("X-Request-Id", ""),
+        )
+
+
+def _given(member: T | Unset) -> T | None:
+    return None if isinstance(member, Unset) else member

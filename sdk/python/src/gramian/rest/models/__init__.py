@@ -1,0 +1,99 @@
+"""Contains all the data models used in inputs/outputs"""
+
+from .bounding_box import BoundingBox
+from .cloud import Cloud
+from .cloud_list import CloudList
+from .cloud_ref import CloudRef
+from .cloud_request import CloudRequest
+from .curvatures_request import CurvaturesRequest
+from .curvatures_response import CurvaturesResponse
+from .degenerate import Degenerate
+from .degenerate_reason import DegenerateReason
+from .diagnostics import Diagnostics
+from .duplicate_policy import DuplicatePolicy
+from .factorization_used import FactorizationUsed
+from .field_error import FieldError
+from .geometry import Geometry
+from .health import Health
+from .interpolation_request import InterpolationRequest
+from .interpolation_response import InterpolationResponse
+from .kernel import Kernel
+from .kernel_description import KernelDescription
+from .kernel_family import KernelFamily
+from .kernel_list import KernelList
+from .kernel_parameter import KernelParameter
+from .kernel_used import KernelUsed
+from .laplace_beltrami_matrix_request import LaplaceBeltramiMatrixRequest
+from .laplace_beltrami_matrix_response import LaplaceBeltramiMatrixResponse
+from .laplace_beltrami_request import LaplaceBeltramiRequest
+from .laplace_beltrami_response import LaplaceBeltramiResponse
+from .matrix_format import MatrixFormat
+from .normals_request import NormalsRequest
+from .normals_response import NormalsResponse
+from .orientation_choice import OrientationChoice
+from .posterior_quantity import PosteriorQuantity
+from .posterior_request import PosteriorRequest
+from .posterior_response import PosteriorResponse
+from .problem import Problem
+from .solver_choice import SolverChoice
+from .solver_used import SolverUsed
+from .spacing import Spacing
+from .surface_choice import SurfaceChoice
+from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
+from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
+from .surface_gradient_request import SurfaceGradientRequest
+from .surface_gradient_response import SurfaceGradientResponse
+from .surface_used import SurfaceUsed
+from .version import Version
+from .warning import Warning_
+from .warning_code import WarningCode
+
+__all__ = (
+    "BoundingBox",
+    "Cloud",
+    "CloudList",
+    "CloudRef",
+    "CloudRequest",
+    "CurvaturesRequest",
+    "CurvaturesResponse",
+    "Degenerate",
+    "DegenerateReason",
+    "Diagnostics",
+    "DuplicatePolicy",
+    "FactorizationUsed",
+    "FieldError",
+    "Geometry",
+    "Health",
+    "InterpolationRequest",
+    "InterpolationResponse",
+    "Kernel",
+    "KernelDescription",
+    "KernelFamily",
+    "KernelList",
+    "KernelParameter",
+    "KernelUsed",
+    "LaplaceBeltramiMatrixRequest",
+    "LaplaceBeltramiMatrixResponse",
+    "LaplaceBeltramiRequest",
+    "LaplaceBeltramiResponse",
+    "MatrixFormat",
+    "NormalsRequest",
+    "NormalsResponse",
+    "OrientationChoice",
+    "PosteriorQuantity",
+    "PosteriorRequest",
+    "PosteriorResponse",
+    "Problem",
+    "SolverChoice",
+    "SolverUsed",
+    "Spacing",
+    "SurfaceChoice",
+    "SurfaceGradientMatrixRequest",
+    "SurfaceGradientMatrixResponse",
+    "SurfaceGradientRequest",
+    "SurfaceGradientResponse",
+    "SurfaceUsed",
+    "Version",
+    "WarningCode",
+    "Warning_",
+)

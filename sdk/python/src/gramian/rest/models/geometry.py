@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+
+from ..models.solver_choice import SolverChoice
+from ..models.surface_choice import SurfaceChoice
+from ..types import UNSET, Unset
+
+if TYPE_CHECKING:
+    from ..models.cloud_ref import CloudRef
+    from ..models.kernel import Kernel
+
+
+T = TypeVar("T", bound="Geometry")
+
+
+@_attrs_define
+class Geometry:
+    """The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as
+    in
+    the request.
+
+        Attributes:
+            cloud (CloudRef | Unset): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points`
+                is given.
+            kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
+                another family is refused.
+            alpha (float | Unset): Added to the diagonal of its Gram matrix.
+            noise_variances (list[float] | Unset): One entry per point of its cloud, instead of `alpha`.
+            solver (SolverChoice | Unset): How the linear system is solved.
+            surface (SurfaceChoice | Unset): Which function's level surface is meant.
+    """
+
+    cloud: CloudRef | Unset = UNSET
+    kernel: Kernel | Unset = UNSET
+    alpha: float | Unset = UNSET
+    noise_variances: list[float] | Unset = UNSET
+    solver: SolverChoice | Unset = UNSET
+    surface: SurfaceChoice | Unset = UNSET
+
+    def to_dict(self) -> dict[str, Any]:
+        cloud: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.cloud, Unset):
+            cloud = self.cloud.to_dict()
+
+        kernel: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.kernel, Unset):
+            kernel = self.kernel.to_dict()
+
+        alpha = self.alpha
+
+        noise_variances: list[float] | Unset = UNSET
+        if not isinstance(self.noise_variances, Unset):
+            noise_variances = self.noise_variances
+
+        solver: str | Unset = UNSET
+        if not isinstance(self.solver, Unset):
+            solver = self.solver.value
+
+        surface: str | Unset = UNSET
+        if not isinstance(self.surface, Unset):
+            surface = self.surface.value
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update({})
+        if cloud is not UNSET:
+            field_dict["cloud"] = cloud
+        if kernel is not UNSET:
+            field_dict["kernel"] = kernel
+        if alpha is not UNSET:
+            field_dict["alpha"] = alpha
+        if noise_variances is not UNSET:
+            field_dict["noise_variances"] = noise_variances
+        if solver is not UNSET:
+            field_dict["solver"] = solver
+        if surface is not UNSET:
+            field_dict["surface"] = surface
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.cloud_ref import CloudRef
+        from ..models.kernel import Kernel
+
+        d = dict(src_dict)
+        _cloud = d.pop("cloud", UNSET)
+        cloud: CloudRef | Unset
+        if isinstance(_cloud, Unset):
+            cloud = UNSET
+        else:
+            cloud = CloudRef.from_dict(_cloud)
+
+        _kernel = d.pop("kernel", UNSET)
+        kernel: Kernel | Unset
+        if isinstance(_kernel, Unset):
+            kernel = UNSET
+        else:
+            kernel = Kernel.from_dict(_kernel)
+
+        alpha = d.pop("alpha", UNSET)
+
+        noise_variances = cast(list[float], d.pop("noise_variances", UNSET))
+
+        _solver = d.pop("solver", UNSET)
+        solver: SolverChoice | Unset
+        if isinstance(_solver, Unset):
+            solver = UNSET
+        else:
+            solver = SolverChoice(_solver)
+
+        _surface = d.pop("surface", UNSET)
+        surface: SurfaceChoice | Unset
+        if isinstance(_surface, Unset):
+            surface = UNSET
+        else:
+            surface = SurfaceChoice(_surface)
+
+        geometry = cls(
+            cloud=cloud,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            surface=surface,
+        )
+
+        return geometry

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+from attrs import field as _attrs_field
+
+from ..types import UNSET, Unset
+
+if TYPE_CHECKING:
+    from ..models.diagnostics import Diagnostics
+
+
+T = TypeVar("T", bound="InterpolationResponse")
+
+
+@_attrs_define
+class InterpolationResponse:
+    """The interpolant (regression function, if alpha > 0) at the queries.
+
+    Attributes:
+        values (list[float]): u at each query.
+        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
+            well.
+        gradients (list[list[float]] | Unset): ∇u at each query, unit of the values per length; with `derivatives` of 1
+            or 2.
+        hessians (list[list[list[float]]] | Unset): D²u at each query, unit of the values per length squared; with
+            `derivatives` of 2.
+    """
+
+    values: list[float]
+    diagnostics: Diagnostics
+    gradients: list[list[float]] | Unset = UNSET
+    hessians: list[list[list[float]]] | Unset = UNSET
+    additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        values = self.values
+
+        diagnostics = self.diagnostics.to_dict()
+
+        gradients: list[list[float]] | Unset = UNSET
+        if not isinstance(self.gradients, Unset):
+            gradients = []
+            for gradients_item_data in self.gradients:
+                gradients_item = gradients_item_data
+
+                gradients.append(gradients_item)
+
+        hessians: list[list[list[float]]] | Unset = UNSET
+        if not isinstance(self.hessians, Unset):
+            hessians = []
+            for hessians_item_data in self.hessians:
+                hessians_item = []
+                for hessians_item_item_data in hessians_item_data:
+                    hessians_item_item = hessians_item_item_data
+
+                    hessians_item.append(hessians_item_item)
+
+                hessians.append(hessians_item)
+
+        field_dict: dict[str, Any] = {}
+        field_dict.update(self.additional_properties)
+        field_dict.update(
+            {
+                "values": values,
+                "diagnostics": diagnostics,
+            }
+        )
+        if gradients is not UNSET:
+            field_dict["gradients"] = gradients
+        if hessians is not UNSET:
+            field_dict["hessians"] = hessians
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.diagnostics import Diagnostics
+
+        d = dict(src_dict)
+        values = cast(list[float], d.pop("values"))
+
+        diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
+
+        _gradients = d.pop("gradients", UNSET)
+        gradients: list[list[float]] | Unset = UNSET
+        if _gradients is not UNSET:
+            gradients = []
+            for gradients_item_data in _gradients:
+                gradients_item = cast(list[float], gradients_item_data)
+
+                gradients.append(gradients_item)
+
+        _hessians = d.pop("hessians", UNSET)
+        hessians: list[list[list[float]]] | Unset = UNSET
+        if _hessians is not UNSET:
+            hessians = []
+            for hessians_item_data in _hessians:
+                hessians_item = []
+                _hessians_item = hessians_item_data
+                for hessians_item_item_data in _hessians_item:
+                    hessians_item_item = cast(list[float], hessians_item_item_data)
+
+                    hessians_item.append(hessians_item_item)
+
+                hessians.append(hessians_item)
+
+        interpolation_response = cls(
+            values=values,
+            diagnostics=diagnostics,
+            gradients=gradients,
+            hessians=hessians,
+        )
+
+        interpolation_response.additional_properties = d
+        return interpolation_response
+
+    @property
+    def additional_keys(self) -> list[str]:
+        return list(self.additional_properties.keys())
+
+    def __getitem__(self, key: str) -> Any:
+        return self.additional_properties[key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.additional_properties[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        del self.additional_properties[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.additional_properties

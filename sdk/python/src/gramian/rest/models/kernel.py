@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self, TypeVar
+
+from attrs import define as _attrs_define
+
+from ..models.kernel_family import KernelFamily
+from ..types import UNSET, Unset
+
+T = TypeVar("T", bound="Kernel")
+
+
+@_attrs_define
+class Kernel:
+    """A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+
+    Attributes:
+        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
+        length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; chosen from the cloud if
+            absent.
+        variance (float | Unset): The factor of φ, unit of the values squared; 1 if absent.
+        epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of
+            the cloud.
+        nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+        smoothness (int | Unset): wendland: 2, 4 or 6 times differentiable; 4 if absent.
+    """
+
+    family: KernelFamily
+    length_scale: float | Unset = UNSET
+    variance: float | Unset = UNSET
+    epsilon: float | Unset = UNSET
+    nu: float | Unset = UNSET
+    smoothness: int | Unset = UNSET
+
+    def to_dict(self) -> dict[str, Any]:
+        family = self.family.value
+
+        length_scale = self.length_scale
+
+        variance = self.variance
+
+        epsilon = self.epsilon
+
+        nu = self.nu
+
+        smoothness = self.smoothness
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "family": family,
+            }
+        )
+        if length_scale is not UNSET:
+            field_dict["length_scale"] = length_scale
+        if variance is not UNSET:
+            field_dict["variance"] = variance
+        if epsilon is not UNSET:
+            field_dict["epsilon"] = epsilon
+        if nu is not UNSET:
+            field_dict["nu"] = nu
+        if smoothness is not UNSET:
+            field_dict["smoothness"] = smoothness
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        d = dict(src_dict)
+        family = KernelFamily(d.pop("family"))
+
+        length_scale = d.pop("length_scale", UNSET)
+
+        variance = d.pop("variance", UNSET)
+
+        epsilon = d.pop("epsilon", UNSET)
+
+        nu = d.pop("nu", UNSET)
+
+        smoothness = d.pop("smoothness", UNSET)
+
+        kernel = cls(
+            family=family,
+            length_scale=length_scale,
+            variance=variance,
+            epsilon=epsilon,
+            nu=nu,
+            smoothness=smoothness,
+        )
+
+        return kernel

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self, TypeVar
+
+from attrs import define as _attrs_define
+from attrs import field as _attrs_field
+
+from ..models.kernel_family import KernelFamily
+from ..types import UNSET, Unset
+
+T = TypeVar("T", bound="KernelUsed")
+
+
+@_attrs_define
+class KernelUsed:
+    """The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+
+    Attributes:
+        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
+        length_scale (float): The length scale ℓ, in the unit of the coordinates.
+        variance (float): The factor of φ, unit of the values squared.
+        epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)).
+        nu (float | Unset): matern: the smoothness ν.
+        smoothness (int | Unset): wendland: how often differentiable.
+    """
+
+    family: KernelFamily
+    length_scale: float
+    variance: float
+    epsilon: float | Unset = UNSET
+    nu: float | Unset = UNSET
+    smoothness: int | Unset = UNSET
+    additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        family = self.family.value
+
+        length_scale = self.length_scale
+
+        variance = self.variance
+
+        epsilon = self.epsilon
+
+        nu = self.nu
+
+        smoothness = self.smoothness
+
+        field_dict: dict[str, Any] = {}
+        field_dict.update(self.additional_properties)
+        field_dict.update(
+            {
+                "family": family,
+                "length_scale": length_scale,
+                "variance": variance,
+            }
+        )
+        if epsilon is not UNSET:
+            field_dict["epsilon"] = epsilon
+        if nu is not UNSET:
+            field_dict["nu"] = nu
+        if smoothness is not UNSET:
+            field_dict["smoothness"] = smoothness
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        d = dict(src_dict)
+        family = KernelFamily(d.pop("family"))
+
+        length_scale = d.pop("length_scale")
+
+        variance = d.pop("variance")
+
+        epsilon = d.pop("epsilon", UNSET)
+
+        nu = d.pop("nu", UNSET)
+
+        smoothness = d.pop("smoothness", UNSET)
+
+        kernel_used = cls(
+            family=family,
+            length_scale=length_scale,
+            variance=variance,
+            epsilon=epsilon,
+            nu=nu,
+            smoothness=smoothness,
+        )
+
+        kernel_used.additional_properties = d
+        return kernel_used
+
+    @property
+    def additional_keys(self) -> list[str]:
+        return list(self.additional_properties.keys())
+
+    def __getitem__(self, key: str) -> Any:
+        return self.additional_properties[key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.additional_properties[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        del self.additional_properties[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.additional_properties

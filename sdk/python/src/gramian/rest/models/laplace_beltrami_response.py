@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+from attrs import field as _attrs_field
+
+if TYPE_CHECKING:
+    from ..models.degenerate import Degenerate
+    from ..models.diagnostics import Diagnostics
+
+
+T = TypeVar("T", bound="LaplaceBeltramiResponse")
+
+
+@_attrs_define
+class LaplaceBeltramiResponse:
+    """The Laplace–Beltrami operator of the values at the queries.
+
+    Attributes:
+        values (list[float | None]): Δu at each query, unit of the values per length squared; null where there is no
+            normal.
+        degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
+        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
+            well.
+    """
+
+    values: list[float | None]
+    degenerate: list[Degenerate]
+    diagnostics: Diagnostics
+    additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        values = []
+        for values_item_data in self.values:
+            values_item: float | None
+            values_item = values_item_data
+            values.append(values_item)
+
+        degenerate = []
+        for degenerate_item_data in self.degenerate:
+            degenerate_item = degenerate_item_data.to_dict()
+            degenerate.append(degenerate_item)
+
+        diagnostics = self.diagnostics.to_dict()
+
+        field_dict: dict[str, Any] = {}
+        field_dict.update(self.additional_properties)
+        field_dict.update(
+            {
+                "values": values,
+                "degenerate": degenerate,
+                "diagnostics": diagnostics,
+            }
+        )
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.degenerate import Degenerate
+        from ..models.diagnostics import Diagnostics
+
+        d = dict(src_dict)
+        values = []
+        _values = d.pop("values")
+        for values_item_data in _values:
+
+            def _parse_values_item(data: object) -> float | None:
+                if data is None:
+                    return data
+                return cast(float | None, data)
+
+            values_item = _parse_values_item(values_item_data)
+
+            values.append(values_item)
+
+        degenerate = []
+        _degenerate = d.pop("degenerate")
+        for degenerate_item_data in _degenerate:
+            degenerate_item = Degenerate.from_dict(degenerate_item_data)
+
+            degenerate.append(degenerate_item)
+
+        diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
+
+        laplace_beltrami_response = cls(
+            values=values,
+            degenerate=degenerate,
+            diagnostics=diagnostics,
+        )
+
+        laplace_beltrami_response.additional_properties = d
+        return laplace_beltrami_response
+
+    @property
+    def additional_keys(self) -> list[str]:
+        return list(self.additional_properties.keys())
+
+    def __getitem__(self, key: str) -> Any:
+        return self.additional_properties[key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.additional_properties[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        del self.additional_properties[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.additional_properties

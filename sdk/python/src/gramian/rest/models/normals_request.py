@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+
+from ..models.duplicate_policy import DuplicatePolicy
+from ..models.orientation_choice import OrientationChoice
+from ..models.solver_choice import SolverChoice
+from ..models.surface_choice import SurfaceChoice
+from ..types import UNSET, Unset
+
+if TYPE_CHECKING:
+    from ..models.cloud_ref import CloudRef
+    from ..models.kernel import Kernel
+
+
+T = TypeVar("T", bound="NormalsRequest")
+
+
+@_attrs_define
+class NormalsRequest:
+    """A cloud that samples a hypersurface, and where its normals are wanted.
+
+    Attributes:
+        cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+        kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
+            another family is refused.
+        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
+            interpolates, the variance
+            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
+            the noise of the points, 1e-3 at least.
+        noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`.
+        solver (SolverChoice | Unset): How the linear system is solved.
+        duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
+        queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.
+        surface (SurfaceChoice | Unset): Which function's level surface is meant.
+        orientation (OrientationChoice | Unset): Which way normals point.
+    """
+
+    cloud: CloudRef
+    kernel: Kernel | Unset = UNSET
+    alpha: float | Unset = UNSET
+    noise_variances: list[float] | Unset = UNSET
+    solver: SolverChoice | Unset = UNSET
+    duplicates: DuplicatePolicy | Unset = UNSET
+    queries: list[list[float]] | Unset = UNSET
+    surface: SurfaceChoice | Unset = UNSET
+    orientation: OrientationChoice | Unset = UNSET
+
+    def to_dict(self) -> dict[str, Any]:
+        cloud = self.cloud.to_dict()
+
+        kernel: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.kernel, Unset):
+            kernel = self.kernel.to_dict()
+
+        alpha = self.alpha
+
+        noise_variances: list[float] | Unset = UNSET
+        if not isinstance(self.noise_variances, Unset):
+            noise_variances = self.noise_variances
+
+        solver: str | Unset = UNSET
+        if not isinstance(self.solver, Unset):
+            solver = self.solver.value
+
+        duplicates: str | Unset = UNSET
+        if not isinstance(self.duplicates, Unset):
+            duplicates = self.duplicates.value
+
+        queries: list[list[float]] | Unset = UNSET
+        if not isinstance(self.queries, Unset):
+            queries = []
+            for queries_item_data in self.queries:
+                queries_item = queries_item_data
+
+                queries.append(queries_item)
+
+        surface: str | Unset = UNSET
+        if not isinstance(self.surface, Unset):
+            surface = self.surface.value
+
+        orientation: str | Unset = UNSET
+        if not isinstance(self.orientation, Unset):
+            orientation = self.orientation.value
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "cloud": cloud,
+            }
+        )
+        if kernel is not UNSET:
+            field_dict["kernel"] = kernel
+        if alpha is not UNSET:
+            field_dict["alpha"] = alpha
+        if noise_variances is not UNSET:
+            field_dict["noise_variances"] = noise_variances
+        if solver is not UNSET:
+            field_dict["solver"] = solver
+        if duplicates is not UNSET:
+            field_dict["duplicates"] = duplicates
+        if queries is not UNSET:
+            field_dict["queries"] = queries
+        if surface is not UNSET:
+            field_dict["surface"] = surface
+        if orientation is not UNSET:
+            field_dict["orientation"] = orientation
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.cloud_ref import CloudRef
+        from ..models.kernel import Kernel
+
+        d = dict(src_dict)
+        cloud = CloudRef.from_dict(d.pop("cloud"))
+
+        _kernel = d.pop("kernel", UNSET)
+        kernel: Kernel | Unset
+        if isinstance(_kernel, Unset):
+            kernel = UNSET
+        else:
+            kernel = Kernel.from_dict(_kernel)
+
+        alpha = d.pop("alpha", UNSET)
+
+        noise_variances = cast(list[float], d.pop("noise_variances", UNSET))
+
+        _solver = d.pop("solver", UNSET)
+        solver: SolverChoice | Unset
+        if isinstance(_solver, Unset):
+            solver = UNSET
+        else:
+            solver = SolverChoice(_solver)
+
+        _duplicates = d.pop("duplicates", UNSET)
+        duplicates: DuplicatePolicy | Unset
+        if isinstance(_duplicates, Unset):
+            duplicates = UNSET
+        else:
+            duplicates = DuplicatePolicy(_duplicates)
+
+        _queries = d.pop("queries", UNSET)
+        queries: list[list[float]] | Unset = UNSET
+        if _queries is not UNSET:
+            queries = []
+            for queries_item_data in _queries:
+                queries_item = cast(list[float], queries_item_data)
+
+                queries.append(queries_item)
+
+        _surface = d.pop("surface", UNSET)
+        surface: SurfaceChoice | Unset
+        if isinstance(_surface, Unset):
+            surface = UNSET
+        else:
+            surface = SurfaceChoice(_surface)
+
+        _orientation = d.pop("orientation", UNSET)
+        orientation: OrientationChoice | Unset
+        if isinstance(_orientation, Unset):
+            orientation = UNSET
+        else:
+            orientation = OrientationChoice(_orientation)
+
+        normals_request = cls(
+            cloud=cloud,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+            queries=queries,
+            surface=surface,
+            orientation=orientation,
+        )
+
+        return normals_request

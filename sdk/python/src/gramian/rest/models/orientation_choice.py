@@ -1,0 +1,9 @@
+from enum import StrEnum
+
+
+class OrientationChoice(StrEnum):
+    GRADIENT = "gradient"
+    OUTWARD = "outward"
+
+    def __str__(self) -> str:
+        return str(self.value)

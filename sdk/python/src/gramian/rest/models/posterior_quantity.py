@@ -1,0 +1,12 @@
+from enum import StrEnum
+
+
+class PosteriorQuantity(StrEnum):
+    COVARIANCE = "covariance"
+    GRADIENTS = "gradients"
+    LOG_MARGINAL_LIKELIHOOD = "log_marginal_likelihood"
+    OBSERVATION_VARIANCE = "observation_variance"
+    VARIANCE = "variance"
+
+    def __str__(self) -> str:
+        return str(self.value)

@@ -1,0 +1,9 @@
+from enum import StrEnum
+
+
+class SolverChoice(StrEnum):
+    AUTO = "auto"
+    DENSE = "dense"
+
+    def __str__(self) -> str:
+        return str(self.value)

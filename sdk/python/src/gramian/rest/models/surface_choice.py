@@ -1,0 +1,10 @@
+from enum import StrEnum
+
+
+class SurfaceChoice(StrEnum):
+    AUTO = "auto"
+    OFFSET = "offset"
+    SIGNATURE = "signature"
+
+    def __str__(self) -> str:
+        return str(self.value)

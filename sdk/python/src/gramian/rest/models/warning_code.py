@@ -1,0 +1,17 @@
+from enum import StrEnum
+
+
+class WarningCode(StrEnum):
+    DISAGREES_WITH_NEIGHBOURS = "disagrees_with_neighbours"
+    DUPLICATES_MERGED = "duplicates_merged"
+    FAR_FROM_CLOUD = "far_from_cloud"
+    ILL_CONDITIONED = "ill_conditioned"
+    KERNEL_TOO_ROUGH = "kernel_too_rough"
+    OFFSET_MODEL_USED = "offset_model_used"
+    OPEN_CLOUD = "open_cloud"
+    ORIENTATION_REPAIRED = "orientation_repaired"
+    REFINED = "refined"
+    VARIANCE_CLAMPED = "variance_clamped"
+
+    def __str__(self) -> str:
+        return str(self.value)

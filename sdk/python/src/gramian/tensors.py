@@ -1,0 +1,146 @@
+"""Requests and answers as bytes: safetensors, or JSON where that package is absent.
+
+In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`), and all
+other fields are JSON text in the metadata entry `request`; an answer has the entry `response`, and NaN where JSON has
+null. Both ways numbers are float64 and keep every bit.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import httpx
+import numpy as np
+import numpy.typing as npt
+
+from .rest.models import Degenerate, Diagnostics
+
+save_safetensors: Callable[..., bytes] | None
+try:
+    from safetensors.numpy import save as save_safetensors
+except ModuleNotFoundError:  # the extra gramian[safetensors] is not installed
+    save_safetensors = None
+
+Array: TypeAlias = npt.NDArray[np.float64]
+"""Numbers in float64, little-endian, row major."""
+
+Format: TypeAlias = Literal["safetensors", "json"]
+"""How arrays travel."""
+
+JSON = "application/json"
+SAFETENSORS = "application/x-safetensors"
+
+
+def available_format() -> Format:
+    """Returns `"safetensors"` if that package is installed, else `"json"`."""
+    return "json" if save_safetensors is None else "safetensors"
+
+
+def encode(request: Mapping[str, object], format: Format) -> tuple[bytes, str]:  # noqa: A002
+    """Returns the body of a request, a JSON document with arrays in it, and its media type.
+
+    Raises:
+        ValueError: If a number outside of the arrays is not finite.
+        ModuleNotFoundError: If safetensors is asked for and not installed.
+    """
+    if format == "json":
+        return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
+    if save_safetensors is None:
+        raise ModuleNotFoundError(
+            "safetensors is not installed: pip install 'gramian[safetensors]'", name="safetensors"
+        )
+    tensors, fields = _split(request)
+    return save_safetensors(tensors, metadata={"request": json.dumps(fields, allow_nan=False)}), SAFETENSORS
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{value!r} is not JSON")
+
+
+def _split(request: Mapping[str, object], path: str = "") -> tuple[dict[str, Array], dict[str, object]]:
+    """Takes the arrays out, under their paths; the rest stays as it is."""
+    tensors: dict[str, Array] = {}
+    fields: dict[str, object] = {}
+    for name, value in request.items():
+        if isinstance(value, np.ndarray):
+            tensors[path + name] = value
+        elif isinstance(value, Mapping):
+            inner, fields[name] = _split(value, f"{path}{name}.")
+            tensors |= inner
+        else:
+            fields[name] = value
+    return tensors, fields
+
+
+@dataclass(frozen=True)
+class Members:
+    """The members of an answer, however it was written."""
+
+    tensors: Mapping[str, Array]
+    fields: Mapping[str, Any]
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """How the answer came about."""
+        return Diagnostics.from_dict(self.fields["diagnostics"])
+
+    @property
+    def degenerate(self) -> tuple[Degenerate, ...]:
+        """The queries without a meaningful answer, or with a doubtful one."""
+        return tuple(Degenerate.from_dict(entry) for entry in self.fields["degenerate"])
+
+    def array(self, name: str, *entry: int) -> Array:
+        """Returns an array with entries of the shape `entry`, NaN where an entry is null."""
+        if name in self.tensors:
+            return self.tensors[name]
+        return _frozen(_filled(self.fields[name], entry))
+
+    def arrays(self, name: str, *entry: int) -> Array:
+        """Returns a stack of such arrays."""
+        if name in self.tensors:
+            return self.tensors[name]
+        return _frozen(np.stack([_filled(rows, entry) for rows in self.fields[name]]))
+
+    def optional(self, name: str, *entry: int) -> Array | None:
+        """Returns an array, or None if the answer has no such member."""
+        return self.array(name, *entry) if name in self.tensors or name in self.fields else None
+
+
+def decode(response: httpx.Response) -> Members:
+    """Reads an answer in the format that it announces; tensors are views of its bytes, nothing is copied."""
+    if not response.headers.get("Content-Type", "").startswith(SAFETENSORS):
+        return Members({}, response.json())
+    body = response.content
+    start = 8 + int.from_bytes(body[:8], "little")
+    header = json.loads(body[8:start])
+    fields = json.loads(header.pop("__metadata__")["response"])
+    return Members({name: _view(body, start, tensor) for name, tensor in header.items()}, fields)
+
+
+def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> Array:
+    shape: Sequence[int] = tensor["shape"]
+    if tensor["dtype"] != "F64":
+        raise TypeError(f"the answer has a tensor of dtype {tensor['dtype']}, not F64")
+    offset: int = tensor["data_offsets"][0]
+    numbers = np.frombuffer(body, dtype="<f8", count=int(np.prod(shape)), offset=start + offset)
+    return numbers.reshape(shape)
+
+
+def _filled(rows: Sequence[Any], entry: tuple[int, ...]) -> Array:
+    """Returns the rows as an array; it needs their shape, since all of them may be null."""
+    array = np.full((len(rows), *entry), np.nan)
+    present = [row for row, numbers in enumerate(rows) if numbers is not None]
+    if present:
+        array[present] = [rows[row] for row in present]
+    return array
+
+
+def _frozen(array: Array) -> Array:
+    """Makes an array as read-only as the views of an answer's bytes are."""
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,133 @@
+"""The one place that sends requests: retries, and problems as exceptions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from typing import Any
+
+import httpx
+
+from .problems import problem_of
+from .tensors import JSON, SAFETENSORS, Format, Members, decode, encode
+
+BACKOFF_SECONDS = 0.1
+"""The first wait where the service does not say how long; doubled from one attempt to the next."""
+
+_TRY_LATER = {httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE}
+
+# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes.
+# Reading past the timeout is not among these, since the service is then busy with the first request still.
+_LOST_CONNECTION = (
+    httpx.ConnectError,
+    httpx.ConnectTimeout,
+    httpx.ReadError,
+    httpx.WriteError,
+    httpx.RemoteProtocolError,
+)
+
+
+class RetryingClient(httpx.Client):
+    """An HTTP client that tries again after 429, 503 and lost connections.
+
+    Waits as long as `Retry-After` says, and not at all if that would exceed `max_wait` seconds for all waits of a
+    request together: the caller should know at once. Then, and after `retries` repetitions, the answer is returned as
+    it is.
+    """
+
+    def __init__(
+        self,
+        *,
+        retries: int,
+        max_wait: float,
+        sleep: Callable[[float], object] = time.sleep,
+        **options: Any,  # noqa: ANN401 (those of httpx.Client)
+    ) -> None:
+        """Takes the bounds, the function that waits, and the options of `httpx.Client`."""
+        super().__init__(**options)
+        self._retries = retries
+        self._max_wait = max_wait
+        self._sleep = sleep
+
+    def __del__(self) -> None:
+        # Five lines of a notebook close nothing. Without this, sockets would warn when they are collected.
+        if not getattr(self, "is_closed", True):
+            self.close()
+
+    def send(self, request: httpx.Request, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.send)
+        """Sends a request, again if need be."""
+        request.read()  # a body that is read from a file can be sent once only
+        waited = 0.0
+        for attempt in range(self._retries):
+            backoff = BACKOFF_SECONDS * 2**attempt
+            try:
+                response = super().send(request, **options)
+            except _LOST_CONNECTION:
+                wait = backoff
+                if waited + wait > self._max_wait:
+                    raise
+            else:
+                if response.status_code not in _TRY_LATER:
+                    return response
+                wait = _or(retry_after(response), backoff)
+                if waited + wait > self._max_wait:
+                    return response
+                response.close()
+            waited += wait
+            self._sleep(wait)
+        return super().send(request, **options)
+
+
+def retry_after(response: httpx.Response) -> float | None:
+    """Returns the seconds that `Retry-After` asks to wait, given as seconds or as date; None without the header."""
+    text = response.headers.get("Retry-After", "").strip()
+    if text.isdecimal():
+        return float(text)
+    try:
+        date = parsedate_to_datetime(text)
+    except ValueError:
+        return None
+    if date.tzinfo is None:  # "-0000" says: in UTC, of an unknown place
+        date = date.replace(tzinfo=UTC)
+    return max(0.0, (date - datetime.now(UTC)).total_seconds())
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+class Connection:
+    """A service at an address, and how arrays travel there. May be shared by threads."""
+
+    def __init__(self, http: httpx.Client, format: Format) -> None:  # noqa: A002
+        """Takes the HTTP client, whose base URL is the service, and the format of arrays."""
+        self.http = http
+        self.format = format
+
+    def send(self, method: str, path: str, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.request)
+        """Sends a request.
+
+        Raises:
+            Problem: If the answer has a status of 400 or above.
+            httpx.TransportError: If there is none.
+        """
+        try:
+            response = self.http.request(method, path, **options)
+        except httpx.TransportError as error:
+            error.add_note(f"There is no answer from {self.http.base_url}, see Client(base_url=…) or GRAMIAN_URL.")
+            raise
+        if response.is_error:
+            raise problem_of(response, retry_after(response))
+        return response
+
+    def post(self, path: str, request: Mapping[str, object], accept: str | None = None) -> httpx.Response:
+        """Posts a JSON document with arrays in it."""
+        body, media_type = encode(request, self.format)
+        accepted = accept or (JSON if self.format == "json" else SAFETENSORS)
+        return self.send("POST", path, content=body, headers={"Content-Type": media_type, "Accept": accepted})
+
+    def compute(self, path: str, request: Mapping[str, object]) -> Members:
+        """Posts a request and reads its answer."""
+        return decode(self.post(path, request))

@@ -1,0 +1,301 @@
+"""The package against the server at GRAMIAN_URL."""
+
+from __future__ import annotations
+
+import asyncio
+import copy
+import dataclasses
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import numpy as np
+import pytest
+
+import gramian
+from gramian import Cloud, Geometry, Kernel, KernelFamily
+from gramian.rest.api.geometry import compute_normals
+from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
+from gramian.tensors import Array, Format
+
+GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
+
+# Every operation, with all that can be asked of it; the second query has no normal. The values are x².
+QUERIES = [[1.0, 0.0], [0.0, 0.0]]
+OPERATIONS: dict[str, Callable[[Cloud], object]] = {
+    "interpolate": lambda cloud: cloud.interpolate(squares(cloud), QUERIES, derivatives=2, kernel=GAUSS),
+    "posterior": lambda cloud: cloud.posterior(
+        squares(cloud),
+        QUERIES,
+        include=["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"],
+        kernel={"family": "gauss", "length_scale": 2.0},
+        alpha=1e-6,
+    ),
+    "posterior with noise": lambda cloud: cloud.posterior(
+        squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
+    ),
+    "normals": lambda cloud: cloud.normals(
+        QUERIES, kernel=GAUSS, surface="signature", orientation="gradient", solver=None
+    ),
+    "curvatures": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0),
+    "curvatures nowhere": lambda cloud: cloud.curvatures([[0, 0]], kernel=GAUSS, alpha=0),
+    "surface_gradient": lambda cloud: cloud.surface_gradient(squares(cloud), QUERIES, kernel=GAUSS),
+    "surface_gradient_matrix": lambda cloud: cloud.surface_gradient_matrix(QUERIES, kernel=GAUSS),
+    "laplace_beltrami": lambda cloud: cloud.laplace_beltrami(squares(cloud), QUERIES, kernel=GAUSS),
+    "laplace_beltrami_matrix": lambda cloud: cloud.laplace_beltrami_matrix(QUERIES, kernel=GAUSS),
+    "another surface": lambda cloud: cloud.laplace_beltrami(
+        squares(cloud), kernel=GAUSS, geometry=Geometry(cloud=cloud, alpha=1e-8, noise_variances=None)
+    ),
+}
+
+
+def squares(cloud: Cloud) -> Array:
+    assert cloud.points is not None
+    return np.square(cloud.points[:, 0])
+
+
+def members(answer: object) -> dict[str, object]:
+    assert dataclasses.is_dataclass(answer)
+    return {field.name: getattr(answer, field.name) for field in dataclasses.fields(answer)}
+
+
+@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS.keys())
+def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], object], circle: Array) -> None:
+    formats: list[Format] = ["safetensors", "json"]
+    binary, text = (members(operation(gramian.Client(format=format_).cloud(circle))) for format_ in formats)
+    assert binary.keys() == text.keys()
+    for name, value in binary.items():
+        other = text[name]
+        if isinstance(value, np.ndarray):
+            assert isinstance(other, np.ndarray)
+            assert (value.shape, value.dtype) == (other.shape, other.dtype), name
+            np.testing.assert_array_equal(value, other, err_msg=name)
+            assert not value.flags.writeable
+            assert not other.flags.writeable
+        else:
+            assert value == other, name
+
+
+def test_answers_have_the_documented_shapes(client: gramian.Client) -> None:
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(50, 3))
+    cloud = client.cloud(points / np.linalg.norm(points, axis=1, keepdims=True))
+    queries = cloud.points[:7] if cloud.points is not None else None
+    curvatures = cloud.curvatures(queries)
+    assert curvatures.principal_curvatures.shape == (7, 2)
+    assert curvatures.principal_directions.shape == (7, 2, 3)
+    assert curvatures.mean_curvatures.shape == curvatures.gaussian_curvatures.shape == (7,)
+    assert curvatures.normals.shape == (7, 3)
+    assert len(curvatures.surfaces) == 7
+    assert cloud.laplace_beltrami_matrix(queries).matrix.shape == (7, 50)
+    assert cloud.surface_gradient_matrix(queries).matrices.shape == (3, 7, 50)
+    answer = cloud.interpolate(np.ones(50), queries, derivatives=2)
+    assert answer.gradients is not None
+    assert answer.hessians is not None
+    assert (answer.gradients.shape, answer.hessians.shape) == ((7, 3), (7, 3, 3))
+    posterior = cloud.posterior(np.ones(50), queries, include=[gramian.PosteriorQuantity.COVARIANCE], alpha=0.1)
+    assert posterior.covariance is not None
+    assert posterior.covariance.shape == (7, 7)
+    assert posterior.variances is None
+
+
+def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) -> None:
+    answer = client.cloud(circle).curvatures(QUERIES, kernel=GAUSS, alpha=0)
+    np.testing.assert_allclose(answer.principal_curvatures[0], 1, atol=1e-4)
+    assert np.isnan(answer.principal_curvatures[1]).all()
+    assert np.isnan(answer.normals[1]).all()
+    assert answer.degenerate[0].reason is gramian.DegenerateReason.VANISHING_GRADIENT
+
+
+def test_without_safetensors_json_is_used(circle: Array) -> None:
+    program = f"""
+import sys
+sys.modules["safetensors"] = None  # as if it were not installed
+import gramian
+client = gramian.Client()
+assert client._connection.format == "json"
+print(client.cloud({circle.tolist()}).curvatures([[1, 0]]).principal_curvatures.shape)
+try:
+    gramian.Client(format="safetensors").cloud([[1, 0]])
+except ModuleNotFoundError as error:
+    print(error)
+"""
+    printed = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
+    assert printed == "(1, 1)\nsafetensors is not installed: pip install 'gramian[safetensors]'\n"
+
+
+@pytest.mark.parametrize("format_", ["safetensors", "json"])
+def test_a_forgotten_cloud_is_posted_again(format_: Format, circle: Array) -> None:
+    client = gramian.Client(format=format_)
+    cloud = client.cloud(circle, normals=circle)
+    expected = cloud.normals().normals
+    forget(cloud)
+    np.testing.assert_array_equal(cloud.normals().normals, expected)
+    assert cloud.id in {known.id for known in client.clouds()}
+
+
+def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle: Array) -> None:
+    nodes, surface = client.cloud(circle), client.cloud(1.5 * circle)
+    geometry = Geometry(cloud=surface, kernel={"family": "gauss", "length_scale": 3.0}, alpha=0.0)
+    expected = nodes.laplace_beltrami(squares(nodes), geometry=geometry)
+    assert expected.values.shape == (8,)
+    assert isinstance(expected.diagnostics.geometry, gramian.Diagnostics)
+    assert expected.diagnostics.geometry.cloud_id == surface.id
+    for forgotten in [[nodes], [surface], [nodes, surface]]:
+        for cloud in forgotten:
+            forget(cloud)
+        answer = nodes.laplace_beltrami(squares(nodes), geometry=geometry)
+        np.testing.assert_array_equal(answer.values, expected.values)
+
+
+def test_the_cloud_of_a_geometry_may_be_of_another_client(client: gramian.Client, circle: Array) -> None:
+    surface = gramian.Client().cloud(1.25 * circle)
+    forget(surface)
+    answer = client.cloud(circle).laplace_beltrami_matrix(geometry=Geometry(cloud=surface))
+    assert answer.matrix.shape == (8, 8)
+
+
+def test_a_listed_cloud_cannot_be_posted_again(client: gramian.Client, circle: Array) -> None:
+    made = client.cloud(3 * circle)
+    [listed] = [cloud for cloud in client.clouds(page_size=1) if cloud.id == made.id]
+    assert (listed.points, listed.description) == (None, made.description)
+    np.testing.assert_array_equal(listed.normals().normals, made.normals().normals)
+    forget(listed)
+    with pytest.raises(gramian.UnknownCloud) as caught:
+        listed.normals()
+    assert (caught.value.status, caught.value.pointer) == (404, "/cloud/id")
+    made.normals()  # and now it is back for both
+    listed.normals()
+
+
+def forget(cloud: Cloud) -> None:
+    """Deletes the cloud behind its back."""
+    httpx.delete(f"{os.environ['GRAMIAN_URL']}/v1/clouds/{cloud.id}").raise_for_status()
+
+
+def test_a_deleted_cloud_may_be_deleted_again(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    cloud.delete()
+    cloud.delete()
+
+
+def test_points_are_kept_as_they_were_posted(client: gramian.Client, circle: Array) -> None:
+    points = circle.copy()
+    cloud = client.cloud(points)
+    points[0] = 7
+    assert cloud.points is not None
+    np.testing.assert_array_equal(cloud.points, circle)
+    with pytest.raises(ValueError, match="read-only"):
+        cloud.points[0] = 7
+
+
+def test_a_refusal_has_pointer_and_remedy(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(np.vstack([circle, circle[:1]]))
+    with pytest.raises(gramian.Problem) as caught:
+        cloud.interpolate(np.arange(9), kernel=GAUSS, alpha=0)
+    problem = caught.value
+    assert (problem.status, problem.slug, problem.point_indices) == (422, "duplicate-points", (0, 8))
+    assert "set alpha" in problem.detail
+    assert problem.pointer == "/cloud/id"
+    first, place, request = str(problem).splitlines()
+    assert first == f"422 duplicate-points: {problem.detail}"
+    assert place == "  at /cloud/id: coincides with another point"
+    assert request == f"  request {problem.request_id}"
+    merged = cloud.interpolate(np.arange(9), kernel=GAUSS, alpha=0, duplicates="merge")
+    assert merged.diagnostics.n_merged_duplicates == 1
+
+
+def test_a_matrix_too_close_to_singular_says_which_alpha_helps(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    flat = Kernel(family=KernelFamily.GAUSS, length_scale=1e4)
+    with pytest.raises(gramian.NotPositiveDefinite) as caught:
+        cloud.posterior(np.ones(8), kernel=flat, alpha=0, include=["variance"])
+    remedy = caught.value.minimum_alpha
+    assert remedy is not None
+    assert "set alpha to" in str(caught.value)
+    cloud.posterior(np.ones(8), kernel=flat, alpha=remedy, include=["variance"])
+
+
+@pytest.mark.parametrize("format_", ["safetensors", "json"])
+def test_pointers_are_the_same_in_both_formats(format_: Format, circle: Array) -> None:
+    cloud = gramian.Client(format=format_).cloud(circle)
+    refusals: dict[str, Callable[[], object]] = {
+        "/kernel/length_scale": lambda: cloud.normals(kernel={"family": "gauss", "length_scale": -1.0}),
+        "/values": lambda: cloud.interpolate([1, 2]),
+        "/queries": lambda: cloud.normals([[1, 2, 3]]),
+        "/geometry/noise_variances": lambda: cloud.laplace_beltrami_matrix(geometry=Geometry(noise_variances=[1])),
+    }
+    for pointer, refused in refusals.items():
+        with pytest.raises(gramian.Problem) as caught:
+            refused()
+        assert caught.value.pointer == pointer
+
+
+def test_wrong_shapes_and_numbers_are_refused_before_they_are_sent(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    with pytest.raises(ValueError, match=r"queries must have the shape \[n, d\], not \[2\]"):
+        cloud.normals([1, 0])
+    with pytest.raises(ValueError, match=r"values must have the shape \[n\], not \[8, 1\]"):
+        cloud.interpolate(np.ones((8, 1)))
+    with pytest.raises(ValueError, match=r"points\[1, 0\] is not finite"):
+        client.cloud([[0.0, 0.0], [np.nan, 0.0]])
+    with pytest.raises(ValueError, match="JSON"):
+        cloud.normals(alpha=float("nan"))
+
+
+def test_arrays_of_any_layout_are_sent_right(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    rows: list[list[float]] = circle.tolist()
+    layouts: list[list[list[float]] | Array] = [
+        rows,
+        circle.T.copy().T,
+        np.repeat(circle, 2, axis=0)[::2],
+        circle.astype(">f8"),
+    ]
+    assert {client.cloud(same).id for same in layouts} == {cloud.id}
+
+
+def test_answers_and_problems_can_be_pickled_and_copied(client: gramian.Client, circle: Array) -> None:
+    answer = client.cloud(circle).curvatures(QUERIES, kernel=GAUSS)
+    for twin in [pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)]:
+        np.testing.assert_array_equal(twin.normals, answer.normals)
+        assert twin.diagnostics == answer.diagnostics
+        assert twin.diagnostics.to_dict() == answer.diagnostics.to_dict()
+        client.cloud(circle).curvatures(kernel=twin.diagnostics.kernel)
+    with pytest.raises(gramian.Problem) as caught:
+        client.cloud(circle).normals(alpha=-1)
+    problem = pickle.loads(pickle.dumps(caught.value))
+    assert (type(problem), str(problem)) == (type(caught.value), str(caught.value))
+
+
+def test_a_client_may_be_shared_by_threads(client: gramian.Client, circle: Array) -> None:
+    clouds = [client.cloud((1 + i) * circle) for i in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        radii = list(
+            pool.map(lambda cloud: 1 / cloud.curvatures(kernel=cloud_kernel(cloud)).mean_curvatures[0], clouds)
+        )
+    np.testing.assert_allclose(radii, np.arange(1, 9), rtol=1e-3)
+
+
+def cloud_kernel(cloud: Cloud) -> Kernel:
+    assert cloud.points is not None
+    return Kernel(family=KernelFamily.GAUSS, length_scale=2 * float(np.linalg.norm(cloud.points[0])))
+
+
+def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Array) -> None:
+    async def ask() -> object:
+        async with client.rest as rest:
+            return await compute_normals.asyncio(client=rest, body=NormalsRequest(cloud=CloudRef(id=cloud.id)))
+
+    cloud = client.cloud(circle)
+    answer = asyncio.run(ask())
+    assert isinstance(answer, NormalsResponse)
+    np.testing.assert_array_equal(np.array(answer.normals), cloud.normals().normals)
+
+
+def test_a_server_without_keys_takes_any(circle: Array) -> None:
+    assert gramian.Client(api_key="secret").cloud(circle).n_points == 8

@@ -1,0 +1,129 @@
+"""The types of the generated client: no Any, no anonymous inner objects, enumerations as such, None for null."""
+
+from __future__ import annotations
+
+import enum
+import importlib
+import inspect
+import json
+import pkgutil
+import types
+import typing
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, get_args, get_type_hints
+
+import attrs
+import pytest
+
+from gramian import fit, rest
+from gramian.rest import api, models
+from gramian.rest.types import File, Response, Unset
+
+MODELS = [model for model in vars(models).values() if inspect.isclass(model)]
+OBJECTS = [model for model in MODELS if attrs.has(model)]
+ENUMERATIONS = [model for model in MODELS if issubclass(model, enum.Enum)]
+
+# Answers may grow: what a later version adds is kept in this dictionary, and nothing can be said of its type.
+LATER_MEMBERS = "additional_properties"
+
+# The modules import their models for type checkers only.
+NAMES = {model.__name__: model for model in MODELS} | {"Unset": Unset, "File": File}
+
+
+def parts(hint: Any) -> Iterator[Any]:  # noqa: ANN401 (hints have no common type)
+    """The type and all types in it."""
+    yield hint
+    for part in get_args(hint):
+        yield from parts(part)
+
+
+def fields(model: type) -> dict[str, Any]:
+    hints = get_type_hints(model, localns=NAMES)
+    return {field.name: hints[field.name] for field in attrs.fields(model) if field.name != LATER_MEMBERS}
+
+
+def functions() -> Iterator[tuple[str, Any]]:
+    for module in pkgutil.walk_packages(api.__path__, api.__name__ + "."):
+        if not module.ispkg:
+            for name in ["sync", "sync_detailed", "asyncio", "asyncio_detailed"]:
+                yield f"{module.name}.{name}", getattr(importlib.import_module(module.name), name, None)
+
+
+def test_every_model_is_an_object_or_an_enumeration() -> None:
+    assert len(OBJECTS) > 25
+    assert len(ENUMERATIONS) > 9
+    assert len(OBJECTS) + len(ENUMERATIONS) == len(MODELS)
+
+
+@pytest.mark.parametrize("model", OBJECTS, ids=lambda model: model.__name__)
+def test_no_field_is_any(model: type) -> None:
+    for name, hint in fields(model).items():
+        assert all(part not in (Any, object, dict) for part in parts(hint)), f"{name}: {hint}"
+
+
+def test_no_argument_or_result_is_any() -> None:
+    found = [(name, function) for name, function in functions() if function is not None]
+    assert len(found) > 50
+    for name, function in found:
+        for hint in get_type_hints(function).values():
+            assert all(part not in (Any, object, dict) for part in parts(hint)), f"{name}: {hint}"
+
+
+def test_requests_have_no_later_members() -> None:
+    for model in OBJECTS:
+        is_request = model.__name__.endswith("Request") or model in (models.CloudRef, models.Kernel, models.Geometry)
+        assert (LATER_MEMBERS not in attrs.fields_dict(model)) == is_request, model
+
+
+def test_every_model_is_a_named_schema() -> None:
+    # The generator makes up names for anonymous ones, by their place: GeometryType0, KernelListKernelsItem.
+    document = json.loads((Path(__file__).parents[3] / "openapi" / "openapi.json").read_text())
+    assert {model.__name__.rstrip("_") for model in MODELS} == set(document["components"]["schemas"])
+
+
+def test_enumerations_are_enumerations() -> None:
+    assert models.KernelFamily("gauss") is models.KernelFamily.GAUSS
+    hints = fields(models.CurvaturesResponse) | fields(models.Degenerate) | fields(models.Diagnostics)
+    assert hints["surfaces"] == list[models.SurfaceUsed]
+    assert hints["reason"] is models.DegenerateReason
+    assert hints["solver"] is models.SolverUsed
+    assert hints["factorization"] is models.FactorizationUsed
+    assert fields(models.Warning_)["code"] is models.WarningCode
+    assert fields(models.PosteriorRequest)["include"] == list[models.PosteriorQuantity] | Unset
+
+
+def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
+    row = list[float]
+    assert fields(models.NormalsResponse)["normals"] == list[row | None]
+    curvatures = fields(models.CurvaturesResponse)
+    assert curvatures["principal_curvatures"] == list[row | None]
+    assert curvatures["principal_directions"] == list[list[row] | None]
+    assert curvatures["mean_curvatures"] == list[float | None]
+    assert curvatures["gaussian_curvatures"] == list[float | None]
+    assert fields(models.SurfaceGradientResponse)["gradients"] == list[row | None]
+    assert fields(models.SurfaceGradientMatrixResponse)["matrices"] == list[list[row | None]]
+    assert fields(models.LaplaceBeltramiResponse)["values"] == list[float | None]
+    assert fields(models.LaplaceBeltramiMatrixResponse)["matrix"] == list[row | None]
+    nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
+    assert all(name.endswith("Response") for name in nullable)
+    assert not nullable & {"InterpolationResponse", "PosteriorResponse"}
+
+
+def test_a_required_body_is_required_and_the_key_is_not() -> None:
+    from gramian.rest.api.geometry import compute_curvatures
+
+    signature = inspect.signature(compute_curvatures.sync_detailed)
+    assert signature.parameters["body"].default is inspect.Parameter.empty
+    hints = get_type_hints(compute_curvatures.sync_detailed)
+    assert hints["client"] == rest.AuthenticatedClient | rest.Client
+    assert hints["return"] == Response[models.CurvaturesResponse | models.Problem]
+
+
+@pytest.mark.parametrize(
+    "alias", [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Quantity], ids=str
+)
+def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:
+    enumeration, strings = get_args(alias)
+    assert typing.get_origin(strings) is Literal
+    assert set(get_args(strings)) == {member.value for member in enumeration}
