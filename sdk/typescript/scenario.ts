@@ -23,6 +23,7 @@ const gauss: Kernel = { family: KernelFamily.GAUSS, length_scale: 2 };
 client.setConfig({ baseUrl: process.env["GRAMIAN_URL"] ?? "http://localhost:8080" });
 const { data: registered } = await createCloud({ body: { points }, throwOnError: true });
 const cloud = { id: registered.cloud_id };
+assert.equal(cloud.id, "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c");
 
 await curvaturesAreNullAtTheCentre();
 await theMatrixTurnsCosinesIntoTheirNegatives();
@@ -45,8 +46,9 @@ async function theMatrixTurnsCosinesIntoTheirNegatives() {
     assert.equal(data.matrix.length, 8);
     data.matrix.forEach((row, i) => {
         const applied = dot(row ?? [], cosines);
-        // Eight points on the circle take a wave of frequency 7 for a cosine. The interpolant has 48 I_7(1/2)/I_1(1/2)
-        // = 2.3e-6 too much of it, with the Bessel functions I_k, the Fourier coefficients of this kernel there.
+        // Eight points on the circle take a wave of frequency 7 for a cosine, which adds the fraction
+        // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel
+        // on the circle, up to a factor.
         assert.ok(Math.abs(applied + (cosines[i] ?? NaN)) < 5e-6, `row ${i}: ${applied}`);
     });
 }
