@@ -28,7 +28,7 @@ use std::sync::Arc;
 use axum::Router;
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
-use axum::routing::get;
+use axum::routing::{MethodRouter, get};
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowOrigin, CorsLayer};
@@ -45,14 +45,13 @@ use routes::{
 /// The service as one router.
 pub fn router(app: Arc<App>) -> Router {
     let (v1, probes, document) = parts();
-    let document = Arc::<str>::from(to_json(&document));
+    let [document, document_3_0] = [to_json(&document), to_json_3_0(&document)].map(serve_json);
     let v1 = v1
         .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
         .layer(from_fn_with_state(app.clone(), auth::authenticate));
-    let serve_document =
-        move || async move { ([(header::CONTENT_TYPE, "application/json")], document.to_string()) };
     v1.merge(probes)
-        .route("/openapi.json", get(serve_document))
+        .route("/openapi.json", document)
+        .route("/openapi-3.0.json", document_3_0)
         .merge(
             SwaggerUi::new("/docs")
                 .config(utoipa_swagger_ui::Config::from("/openapi.json").validator_url("none")),
@@ -65,9 +64,20 @@ pub fn router(app: Arc<App>) -> Router {
         .with_state(app)
 }
 
+/// A route to a document.
+fn serve_json(text: String) -> MethodRouter<Arc<App>> {
+    let text = bytes::Bytes::from(text);
+    get(move || async move { ([(header::CONTENT_TYPE, "application/json")], text) })
+}
+
 /// The OpenAPI document of this version, as JSON.
 pub fn openapi_json() -> String {
     to_json(&parts().2)
+}
+
+/// The same for generators that stop at OpenAPI 3.0.
+pub fn openapi_3_0_json() -> String {
+    to_json_3_0(&parts().2)
 }
 
 /// Routes behind keys, routes for everyone, and the document of both.
@@ -94,14 +104,21 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     let (v1, mut document) = v1.split_for_parts();
     let (probes, of_probes) = probes.split_for_parts();
     document.merge(of_probes);
-    openapi::add_binary_formats(&mut document);
-    openapi::add_examples(&mut document);
+    openapi::complete(&mut document);
     (v1, probes, document)
 }
 
 fn to_json(document: &utoipa::openapi::OpenApi) -> String {
     // Serialization of a document that utoipa built cannot fail; an empty one would be caught by the test of the file.
     document.to_pretty_json().map(|json| json + "\n").unwrap_or_default()
+}
+
+fn to_json_3_0(document: &utoipa::openapi::OpenApi) -> String {
+    let derived = serde_json::to_value(document).map(|document| openapi::version_3_0::derive(&document));
+    derived
+        .and_then(|derived| serde_json::to_string_pretty(&derived))
+        .map(|json| json + "\n")
+        .unwrap_or_default()
 }
 
 /// Nothing unless origins are configured: then OPTIONS is a method like any other that no path has.

@@ -296,6 +296,6 @@ mod tests {
     fn absent_members_are_left_out_of_the_document() {
         let document = serde_json::to_value(Problem::internal().document("id-1")).unwrap();
         let members: Vec<&String> = document.as_object().unwrap().keys().collect();
-        assert_eq!(members, ["detail", "instance", "status", "title", "type"]);
+        assert_eq!(members, ["type", "title", "status", "detail", "instance"]);
     }
 }

@@ -1,84 +1,93 @@
-//! The problems that operations can answer, as sets for the document. Never constructed: [`Problem`] is what handlers return.
+//! The problems that operations can answer, as sets for the document. [`Problem`] is what handlers return.
 //!
 //! [`Problem`]: super::problem::Problem
-#![expect(dead_code, reason = "only their schemas are used")]
+
+use std::collections::BTreeMap;
 
 use utoipa::IntoResponses;
+use utoipa::openapi::{ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
 
-use super::problem::ProblemDocument;
+use super::openapi::examples::problem_example;
+use super::slug::Slug;
 
-/// One set of statuses with their descriptions.
+/// Declares a set of problems.
 macro_rules! problem_set {
-    ($(#[$meta:meta])* $name:ident { $($status:literal $variant:ident $description:literal,)* }) => {
+    ($(#[$meta:meta])* $name:ident: $($slug:ident),* $(,)?) => {
         $(#[$meta])*
-        #[derive(IntoResponses)]
-        pub enum $name {
-            $(
-                #[response(status = $status, description = $description, content_type = "application/problem+json")]
-                $variant(ProblemDocument<'static>),
-            )*
+        pub struct $name;
+
+        impl IntoResponses for $name {
+            fn responses() -> BTreeMap<String, RefOr<Response>> {
+                responses_of(&[$(Slug::$slug),*])
+            }
         }
     };
 }
 
 problem_set! {
-    /// Operations with a body that compute.
-    ComputeProblems {
-        400 Malformed "`malformed-json` or `malformed-body`: the body is not what its headers say",
-        401 Unauthorized "`unauthorized`: no valid API key",
-        404 UnknownCloud "`unknown-cloud`: no cloud is registered under the id",
-        406 NotAcceptable "`not-acceptable`: Accept names no media type that this operation answers with",
-        413 TooLarge "`body-too-large` or `problem-too-large`: over a limit of this server",
-        415 UnsupportedMediaType "`unsupported-media-type`: the body is announced as another media type or coding than this operation reads",
-        422 Refused "`invalid-request`, `invalid-cloud`, `duplicate-points`, `dimension-mismatch`, `length-mismatch`, `kernel-not-smooth`, `kernel-not-positive-definite` or `not-positive-definite`: the body is readable, but cannot be answered",
-        500 Internal "`internal`: a bug",
-        503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
-        504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",
-    }
+    /// Operations that compute.
+    ComputeProblems:
+    MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, BodyTooLarge, ProblemTooLarge,
+    UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
+    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
-    /// Operations on one cloud.
-    LookUpProblems {
-        401 Unauthorized "`unauthorized`: no valid API key",
-        404 UnknownCloud "`unknown-cloud`: no cloud is registered under the id",
-        406 NotAcceptable "`not-acceptable`: answers come as application/json",
-        500 Internal "`internal`: a bug",
-        503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
-        504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",
-    }
+    /// The registration of a cloud.
+    RegisterProblems:
+    MalformedJson, MalformedBody, Unauthorized, NotAcceptable, BodyTooLarge, ProblemTooLarge, UnsupportedMediaType,
+    InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// The description of one cloud.
+    DescribeProblems: Unauthorized, UnknownCloud, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// Operations that only look a cloud up.
+    LookUpProblems: Unauthorized, UnknownCloud, NotAcceptable, Internal
 }
 
 problem_set! {
     /// The list of clouds.
-    ListProblems {
-        401 Unauthorized "`unauthorized`: no valid API key",
-        406 NotAcceptable "`not-acceptable`: answers come as application/json",
-        422 Refused "`invalid-request`: a query parameter is out of its range or unknown",
-        500 Internal "`internal`: a bug",
-        503 Overloaded "`overloaded`: the queue is full; `Retry-After` says when to come back",
-        504 DeadlineExceeded "`deadline-exceeded`: the answer took too long",
-    }
+    ListProblems: Unauthorized, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only read what is built in.
-    ReadProblems {
-        401 Unauthorized "`unauthorized`: no valid API key",
-        406 NotAcceptable "`not-acceptable`: answers come as application/json",
-    }
+    ReadProblems: Unauthorized, NotAcceptable, Internal
+}
+
+problem_set! {
+    /// Probes that cannot be refused.
+    ProbeProblems: Internal
 }
 
 problem_set! {
     /// The readiness probe.
-    ReadyProblems {
-        503 Overloaded "`overloaded`: the queue is full, or the server is shutting down",
-    }
+    ReadyProblems: Internal, Overloaded
 }
 
 problem_set! {
     /// Pages of problems.
-    ProblemPageProblems {
-        404 NotFound "`not-found`: no such problem type",
+    PageProblems: NotFound, Internal
+}
+
+/// One response for each status, with the problems that have it and an example of each.
+fn responses_of(slugs: &[Slug]) -> BTreeMap<String, RefOr<Response>> {
+    let mut by_status: BTreeMap<String, Vec<Slug>> = BTreeMap::new();
+    for &slug in slugs {
+        by_status.entry(slug.status().as_str().to_owned()).or_default().push(slug);
     }
+    by_status.into_iter().map(|(status, slugs)| (status, RefOr::T(response_of(&slugs)))).collect()
+}
+
+fn response_of(slugs: &[Slug]) -> Response {
+    let describe = |slug: &Slug| format!("`{}`: {}", slug.as_str(), slug.title());
+    let description = slugs.iter().map(describe).collect::<Vec<_>>().join("; ");
+    let examples = slugs.iter().map(|&slug| (slug.as_str(), problem_example(slug)));
+    let problem = Ref::from_schema_name("Problem");
+    let content = ContentBuilder::new().schema(Some(problem)).examples_from_iter(examples).build();
+    ResponseBuilder::new().description(description).content("application/problem+json", content).build()
 }

@@ -1,7 +1,10 @@
 //! The objects that requests and answers share: CloudRef, Kernel, Fit, Geometry, Diagnostics, Degenerate.
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{Schema, SchemaType, Type};
+use utoipa::openapi::{ObjectBuilder, RefOr};
+use utoipa::{PartialSchema, ToSchema};
 
 use super::array::finite;
 use super::body::{Points, present, present_object, present_word, word};
@@ -54,15 +57,32 @@ pub struct Kernel {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub epsilon: Option<f64>,
-    /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+    /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
     #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 0.5, maximum = 8.5)]
+    #[schema(nullable = false, minimum = 0.5, maximum = 8.5, multiple_of = 0.5)]
     pub nu: Option<f64>,
     /// wendland: 2, 4 or 6 times differentiable; 4 if absent.
     #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, minimum = 2, maximum = 6)]
+    #[schema(nullable = false, value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
+
+/// The schema of `smoothness`; requests are read as numbers, so that a refusal can say which there are.
+pub struct Smoothness;
+
+impl PartialSchema for Smoothness {
+    fn schema() -> RefOr<Schema> {
+        let names = Extensions::builder().add("x-enum-varnames", ["C2", "C4", "C6"]).build();
+        ObjectBuilder::new()
+            .schema_type(SchemaType::Type(Type::Integer))
+            .enum_values(Some([2, 4, 6]))
+            .description(Some("How often a Wendland kernel is continuously differentiable."))
+            .extensions(Some(names))
+            .into()
+    }
+}
+
+impl ToSchema for Smoothness {}
 
 /// The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -83,7 +103,7 @@ pub struct KernelUsed {
     pub nu: Option<f64>,
     /// wendland: how often differentiable.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[schema(nullable = false, value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
 

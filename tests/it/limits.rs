@@ -8,7 +8,7 @@ use crate::routes::{ROUTES, route_of};
 use crate::support::{Server, fibonacci_sphere};
 
 /// A request that takes seconds on any machine.
-fn slow_request() -> Value {
+pub fn slow_request() -> Value {
     let points = fibonacci_sphere(12_000);
     json!({
         "cloud": {"points": points},

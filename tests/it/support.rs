@@ -129,3 +129,8 @@ pub fn numbers(value: &Value) -> Vec<f64> {
         other => panic!("no number: {other}"),
     }
 }
+
+/// Whether tests of committed files write them instead of comparing with them.
+pub fn overwrites() -> bool {
+    std::env::var("EXPECTORATE").is_ok_and(|value| value == "overwrite")
+}

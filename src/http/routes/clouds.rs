@@ -16,7 +16,7 @@ use crate::http::body::{Points, present, read_body};
 use crate::http::fit::{Planner, unknown_cloud};
 use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
-use crate::http::responses::{ComputeProblems, ListProblems, LookUpProblems};
+use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::CloudId;
@@ -120,9 +120,9 @@ pub struct CloudList {
     tag = "clouds",
     request_body = CloudRequest,
     responses(
-        (status = 201, description = "Registered", body = Cloud, headers(("Location" = String, description = "The path of the cloud"))),
-        (status = 200, description = "Known already", body = Cloud, headers(("Location" = String, description = "The path of the cloud"))),
-        ComputeProblems
+        (status = 201, description = "Registered", body = Cloud),
+        (status = 200, description = "Known already", body = Cloud),
+        RegisterProblems
     ),
     security((), ("bearer" = []))
 )]
@@ -149,16 +149,19 @@ pub async fn create_cloud(
 }
 
 /// Describe a cloud
+///
+/// Its size, the box around it and the distances between its points, not the points. `ETag` and `If-None-Match` save the
+/// body; asking keeps the cloud from being dropped as the least recently used.
 #[utoipa::path(
     get,
     path = "/v1/clouds/{cloud_id}",
     operation_id = "get_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses(
-        (status = 200, description = "The cloud", body = Cloud, headers(("ETag" = String, description = "The id in quotes, weak"))),
+        (status = 200, description = "The cloud", body = Cloud),
         (status = 304, description = "The client has it already"),
-        LookUpProblems
+        DescribeProblems
     ),
     security((), ("bearer" = []))
 )]
@@ -187,7 +190,7 @@ pub async fn get_cloud(
     path = "/v1/clouds/{cloud_id}",
     operation_id = "check_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses((status = 200, description = "Registered"), (status = 304, description = "The client has it already"), LookUpProblems),
     security((), ("bearer" = []))
 )]
@@ -213,7 +216,7 @@ pub async fn check_cloud(
     path = "/v1/clouds/{cloud_id}",
     operation_id = "delete_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$")),
+    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses((status = 204, description = "Deleted"), LookUpProblems),
     security((), ("bearer" = []))
 )]
@@ -239,7 +242,7 @@ pub async fn delete_cloud(
     operation_id = "list_clouds",
     tag = "clouds",
     params(
-        ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000),
+        ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000, example = 10),
         ("cursor" = Option<String>, Query, description = "`next` of the page before")
     ),
     responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems),

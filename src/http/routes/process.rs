@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use crate::app::App;
 use crate::http::problem::Problem;
-use crate::http::responses::{ProblemPageProblems, ReadyProblems};
+use crate::http::responses::{PageProblems, ProbeProblems, ReadyProblems};
 use crate::http::slug::Slug;
 
 /// The state of the process.
@@ -38,12 +38,14 @@ pub struct Version {
 }
 
 /// Check that the process lives
+///
+/// 200 as long as it answers at all, whatever it is busy with.
 #[utoipa::path(
     get,
     path = "/health/live",
     operation_id = "check_live",
     tag = "process",
-    responses((status = 200, description = "It lives", body = Health)),
+    responses((status = 200, description = "It lives", body = Health), ProbeProblems),
     security(())
 )]
 pub async fn check_live() -> Json<Health> {
@@ -72,12 +74,14 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
 }
 
 /// Describe the build
+///
+/// The version of the service and what it chose to run on this machine.
 #[utoipa::path(
     get,
     path = "/version",
     operation_id = "get_version",
     tag = "process",
-    responses((status = 200, description = "What is running", body = Version)),
+    responses((status = 200, description = "What is running", body = Version), ProbeProblems),
     security(())
 )]
 pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
@@ -99,7 +103,7 @@ pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
     operation_id = "get_problem_page",
     tag = "process",
     params(("slug" = String, Path, description = "The last segment of a problem's type", example = "duplicate-points")),
-    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), ProblemPageProblems),
+    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems),
     security(())
 )]
 pub async fn get_problem_page(Path(slug): Path<String>) -> Result<Html<String>, Problem> {

@@ -1,0 +1,98 @@
+//! The examples of the document: files in openapi/examples/ that a test sends and compares.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde_json::Value;
+use utoipa::openapi::example::{Example, ExampleBuilder};
+use utoipa::openapi::path::Operation;
+use utoipa::openapi::{Content, Ref, RefOr};
+
+use super::{id_of, operations};
+use crate::http::slug::Slug;
+
+/// One example of a file, by the name that it has there.
+macro_rules! example_file {
+    ($name:literal) => {
+        ($name, include_str!(concat!("../../../openapi/examples/", $name, ".json")))
+    };
+}
+
+/// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
+/// sends the ones and compares the others.
+pub const EXAMPLES: [(&str, &str); 16] = [
+    example_file!("create_cloud"),
+    example_file!("get_cloud"),
+    example_file!("list_clouds"),
+    example_file!("list_kernels"),
+    example_file!("compute_interpolation"),
+    example_file!("compute_posterior"),
+    example_file!("compute_normals"),
+    example_file!("compute_curvatures"),
+    example_file!("compute_surface_gradient"),
+    example_file!("assemble_surface_gradient_matrix"),
+    example_file!("compute_laplace_beltrami"),
+    example_file!("assemble_laplace_beltrami_matrix"),
+    example_file!("check_live"),
+    example_file!("check_ready"),
+    example_file!("get_version"),
+    example_file!("get_problem_page"),
+];
+
+/// One problem document of every type, with what provokes it.
+pub const PROBLEMS: &str = include_str!("../../../openapi/examples/problems.json");
+
+/// What an example file has.
+#[derive(Deserialize)]
+struct Sample {
+    request: Option<Value>,
+    response: Value,
+}
+
+/// Puts the examples where readers and generators look for them.
+pub fn add(document: &mut utoipa::openapi::OpenApi) {
+    for operation in operations(document) {
+        let Some((_, text)) = EXAMPLES.iter().find(|(name, _)| *name == id_of(operation)) else { continue };
+        // The files are part of the build and read by a test; an unreadable one leaves the operation without an example.
+        if let Ok(sample) = serde_json::from_str::<Sample>(text) {
+            add_sample(operation, sample);
+        }
+    }
+    let components = document.components.get_or_insert_default();
+    components.examples = problem_examples();
+}
+
+fn add_sample(operation: &mut Operation, sample: Sample) {
+    for media_type in ["application/json", "text/html"] {
+        if let Some(RefOr::T(body)) = operation.request_body.as_mut() {
+            set_example(body.content.get_mut(media_type), sample.request.as_ref());
+        }
+        for status in ["200", "201"] {
+            if let Some(RefOr::T(answer)) = operation.responses.responses.get_mut(status) {
+                set_example(answer.content.get_mut(media_type), Some(&sample.response));
+            }
+        }
+    }
+}
+
+fn set_example(content: Option<&mut RefOr<Content>>, example: Option<&Value>) {
+    if let Some(RefOr::T(content)) = content {
+        content.example = example.cloned();
+    }
+}
+
+/// The problem documents by the slugs of their types.
+fn problem_examples() -> BTreeMap<String, RefOr<Example>> {
+    let samples: BTreeMap<String, Sample> = serde_json::from_str(PROBLEMS).unwrap_or_default();
+    let example = |(slug, sample): (String, Sample)| {
+        let title = Slug::parse(&slug)?.title();
+        let example = ExampleBuilder::new().summary(title).value(Some(sample.response)).build();
+        Some((slug, RefOr::T(example)))
+    };
+    samples.into_iter().filter_map(example).collect()
+}
+
+/// A reference to the example of a problem.
+pub fn problem_example(slug: Slug) -> RefOr<Example> {
+    RefOr::Ref(Ref::new(format!("#/components/examples/{}", slug.as_str())))
+}

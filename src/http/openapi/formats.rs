@@ -1,0 +1,55 @@
+//! The binary media types of operations with a body.
+
+use utoipa::openapi::schema::{KnownFormat, SchemaFormat, SchemaType, Type};
+use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
+
+use super::{id_of, operations};
+use crate::http::negotiation::Format;
+
+/// What requests and answers may be beside JSON, by operation id.
+fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) {
+    match operation_id {
+        "create_cloud" => (&[Format::Safetensors, Format::Npy], &[]),
+        "assemble_surface_gradient_matrix" | "assemble_laplace_beltrami_matrix" => {
+            (&[Format::Safetensors], &[Format::Safetensors, Format::Npy])
+        }
+        _ => (&[Format::Safetensors], &[Format::Safetensors]),
+    }
+}
+
+/// Adds the binary media types of operations with a body. A test asks the service for every one.
+pub fn add(document: &mut utoipa::openapi::OpenApi) {
+    for operation in operations(document) {
+        let (requests, answers) = binary_formats(id_of(operation));
+        let Some(RefOr::T(body)) = operation.request_body.as_mut() else { continue };
+        for &format in requests {
+            let content = binary(match format {
+                Format::Npy => "The points, `[n, d]`, as little- or big-endian float64 or float32.",
+                Format::Json | Format::Safetensors => {
+                    "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other fields \
+                     as JSON text in the metadata entry `request`."
+                }
+            });
+            body.content.insert(format.media_type().to_owned(), content);
+        }
+        let Some(RefOr::T(answer)) = operation.responses.responses.get_mut("200") else { continue };
+        for &format in answers {
+            let content = binary(match format {
+                Format::Npy => "The matrix as float64, row by row, NaN for null.",
+                Format::Json | Format::Safetensors => {
+                    "F64 tensors named as the JSON arrays, NaN for null; the other members as JSON text in the metadata \
+                     entry `response`."
+                }
+            });
+            answer.content.insert(format.media_type().to_owned(), content);
+        }
+    }
+}
+
+fn binary(description: &str) -> RefOr<Content> {
+    let schema = ObjectBuilder::new()
+        .schema_type(SchemaType::Type(Type::String))
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+        .description(Some(description));
+    RefOr::T(ContentBuilder::new().schema(Some(schema)).build())
+}

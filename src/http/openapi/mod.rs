@@ -1,0 +1,74 @@
+//! The OpenAPI document: generated from the code, committed as openapi/openapi.json, tested against it.
+//!
+//! The routes declare their operations; what is the same for many of them is added here.
+
+pub mod examples;
+mod formats;
+mod headers;
+mod links;
+pub mod version_3_0;
+
+use utoipa::openapi::path::{Operation, PathItem};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::{Modify, OpenApi};
+
+use super::problem::ProblemDocument;
+
+/// The parts of the document that no operation declares.
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "gramian",
+        description = "Geometric kernel interpolation and regression on point clouds, after Guidotti. Post points once; the \
+                       factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface \
+                       operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, \
+                       lengths are in the client's unit, a null marks an entry without a meaningful value, and every error \
+                       is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so \
+                       are computed answers in JSON if Accept-Encoding asks for it.",
+        contact(name = "The gramian developers"),
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    servers((url = "/", description = "This server")),
+    tags(
+        (name = "clouds", description = "Register point clouds and refer to them by id."),
+        (name = "values", description = "Functions through values: interpolation, regression, Gaussian processes."),
+        (name = "geometry", description = "Normals and curvatures of the surface that a cloud samples."),
+        (name = "operators", description = "Surface gradient and Laplace–Beltrami, applied and as matrices."),
+        (name = "process", description = "Health, version and problem pages; no key needed."),
+    ),
+    components(schemas(ProblemDocument<'static>)),
+    modifiers(&BearerKeys)
+)]
+pub struct Document;
+
+struct BearerKeys;
+
+impl Modify for BearerKeys {
+    fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
+        let scheme = HttpBuilder::new()
+            .scheme(HttpAuthScheme::Bearer)
+            .description(Some("One of the configured API keys; needed only where keys are configured."));
+        let components = document.components.get_or_insert_default();
+        components.add_security_scheme("bearer", SecurityScheme::Http(scheme.build()));
+    }
+}
+
+/// Completes the document that the routes declare.
+pub fn complete(document: &mut utoipa::openapi::OpenApi) {
+    formats::add(document);
+    examples::add(document);
+    headers::add(document);
+    links::add(document);
+}
+
+fn operations(document: &mut utoipa::openapi::OpenApi) -> impl Iterator<Item = &mut Operation> {
+    document.paths.paths.values_mut().flat_map(|item| {
+        let PathItem { get, post, delete, head, .. } = item;
+        [get, post, delete, head].into_iter().flatten()
+    })
+}
+
+/// The name of an operation, by which examples, formats and links know it.
+fn id_of(operation: &Operation) -> &str {
+    operation.operation_id.as_deref().unwrap_or_default()
+}

@@ -1,0 +1,128 @@
+//! The document for generators that stop at OpenAPI 3.0: the same operations and types, JSON only.
+
+use serde_json::{Map, Value, json};
+
+type Object = Map<String, Value>;
+
+/// Translates a document of version 3.1 to 3.0.3.
+///
+/// What 3.0 cannot say is said its way: nullable types, exclusive bounds, descriptions beside references, licences.
+/// Bodies come as `application/json` only, problem documents among them, since generators know no other; operations
+/// that answer nothing but pages for people are left out.
+pub fn derive(document: &Value) -> Value {
+    let mut document = document.clone();
+    document["openapi"] = json!("3.0.3");
+    if let Some(license) = document.pointer_mut("/info/license").and_then(Value::as_object_mut) {
+        license.remove("identifier");
+    }
+    if let Some(paths) = document["paths"].as_object_mut() {
+        for item in paths.values_mut().filter_map(Value::as_object_mut) {
+            item.retain(|_, operation| !answers_pages(operation));
+        }
+        paths.retain(|_, item| item.as_object().is_some_and(|item| !item.is_empty()));
+    }
+    translate(&mut document);
+    document
+}
+
+/// Whether success has a body, but none in JSON.
+fn answers_pages(operation: &Value) -> bool {
+    let content = operation.pointer("/responses/200/content").and_then(Value::as_object);
+    content.is_some_and(|content| !content.contains_key("application/json"))
+}
+
+/// Translates every object of the document, innermost first.
+fn translate(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(translate),
+        Value::Object(object) => {
+            for (name, member) in object.iter_mut() {
+                // Examples are data, which looks like a schema by accident at most.
+                if !matches!(name.as_str(), "example" | "examples") {
+                    translate(member);
+                }
+            }
+            keep_json(object);
+            take_null_out_of_type(object);
+            translate_bound(object, "exclusiveMinimum", "minimum");
+            translate_bound(object, "exclusiveMaximum", "maximum");
+            wrap_reference(object);
+        }
+        _ => {}
+    }
+}
+
+/// Media types: JSON, and problem documents as JSON.
+fn keep_json(object: &mut Object) {
+    let Some(content) = object.get_mut("content").and_then(Value::as_object_mut) else { return };
+    if let Some(problem) = content.shift_remove("application/problem+json") {
+        content.insert("application/json".to_owned(), problem);
+    }
+    content.retain(|media_type, _| media_type == "application/json");
+}
+
+/// `type: [x, null]` becomes `type: x, nullable: true`.
+fn take_null_out_of_type(object: &mut Object) {
+    let Some(Value::Array(types)) = object.get("type") else { return };
+    let mut kept: Vec<Value> = types.iter().filter(|kind| *kind != "null").cloned().collect();
+    if kept.len() < types.len() {
+        object.insert("nullable".to_owned(), json!(true));
+    }
+    if kept.len() == 1 {
+        object.insert("type".to_owned(), kept.remove(0));
+    }
+}
+
+/// `exclusiveMinimum: x` becomes `minimum: x, exclusiveMinimum: true`.
+fn translate_bound(object: &mut Object, exclusive: &str, inclusive: &str) {
+    if object.get(exclusive).is_some_and(Value::is_number) {
+        let bound = object.insert(exclusive.to_owned(), json!(true));
+        object.insert(inclusive.to_owned(), bound.unwrap_or_default());
+    }
+}
+
+/// A reference stands alone in 3.0: with anything beside it, it becomes the one member of an `allOf`.
+fn wrap_reference(object: &mut Object) {
+    if object.len() > 1
+        && object.get("$ref").is_some_and(Value::is_string)
+        && let Some(reference) = object.remove("$ref")
+    {
+        object.insert("allOf".to_owned(), json!([{"$ref": reference}]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_3_0_cannot_say_is_said_its_way() {
+        let derived = |schema: Value| derive(&json!({"schema": schema}))["schema"].clone();
+        assert_eq!(derived(json!({"type": ["array", "null"]})), json!({"type": "array", "nullable": true}));
+        assert_eq!(
+            derived(json!({"exclusiveMinimum": 0.0})),
+            json!({"minimum": 0.0, "exclusiveMinimum": true})
+        );
+        let reference = "#/components/schemas/A";
+        let described = json!({"$ref": reference, "description": "An A."});
+        assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
+        assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
+        let example = json!({"example": {"type": ["x", "null"]}});
+        assert_eq!(derived(example.clone()), example);
+    }
+
+    #[test]
+    fn bodies_are_json_and_pages_are_left_out() {
+        let answers = |media_type: &str| {
+            json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}}},
+                                 "404": {"content": {"application/problem+json": {}}}}})
+        };
+        let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});
+        let derived =
+            derive(&json!({"paths": paths, "info": {"license": {"name": "MIT", "identifier": "MIT"}}}));
+        let json = json!({"content": {"application/json": {}}});
+        assert_eq!(derived["paths"], json!({"/a": {"get": {"responses": {"200": json, "404": json}}}}));
+        assert_eq!(derived["info"], json!({"license": {"name": "MIT"}}));
+        assert_eq!(derived["openapi"], "3.0.3");
+    }
+}
