@@ -79,6 +79,7 @@ pub mod types {
     ///A registered cloud.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Cloud {
+        ///The smallest box around the points.
         pub bounding_box: BoundingBox,
         ///64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
         pub cloud_id: CloudCloudId,
@@ -90,6 +91,7 @@ pub mod types {
         pub n_duplicates: u64,
         ///Number of points, n.
         pub n_points: u64,
+        ///Distances between nearest points; absent if all points coincide.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub spacing: ::std::option::Option<Spacing>,
     }
@@ -267,21 +269,27 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
+        ///Which way normals point, and with them the sign of curvatures; `outward` if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub orientation: ::std::option::Option<OrientationChoice>,
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///Which function's level surface is meant; `auto` if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -295,6 +303,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct CurvaturesResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///Their product at each query, 1/length to the d − 1; null where there are none.
         pub gaussian_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
@@ -330,6 +339,7 @@ where that has no answer.*/
         pub gradient_norm: f64,
         ///The position of the query.
         pub query: u64,
+        ///Why.
         pub reason: DegenerateReason,
     }
     impl Degenerate {
@@ -470,9 +480,12 @@ where that has no answer.*/
         pub cloud_id: ::std::string::String,
         ///Coordinates of each point, d.
         pub dimension: u64,
+        ///How the matrix was factorized.
         pub factorization: FactorizationUsed,
+        ///The same for the fit of the surface, in answers about values on a surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<::std::boxed::Box<Diagnostics>>,
+        ///The kernel used, in full.
         pub kernel: KernelUsed,
         ///|u(X) − Y|, unit of the values.
         pub misfit: f64,
@@ -490,6 +503,7 @@ where that has no answer.*/
         pub reciprocal_condition: f64,
         ///‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
         pub relative_residual: f64,
+        ///The solver used.
         pub solver: SolverUsed,
         ///What was changed or limits the accuracy.
         pub warnings: ::std::vec::Vec<Warning>,
@@ -646,15 +660,19 @@ the request.*/
         ///Added to the diagonal of its Gram matrix.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The cloud whose level surface carries the operator.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub cloud: ::std::option::Option<CloudRef>,
+        ///The kernel of its signature function.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///One entry per point of its cloud, instead of `alpha`.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
+        ///How its linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///Which function's level surface is meant.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -739,12 +757,15 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
         ///0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub derivatives: ::std::option::Option<i32>,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -753,6 +774,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points, in their order.
@@ -766,6 +788,7 @@ the noise of the points, 1e-3 at least.*/
     ///The interpolant (regression function, if alpha > 0) at the queries.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct InterpolationResponse {
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
@@ -788,16 +811,17 @@ the noise of the points, 1e-3 at least.*/
         ///laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub epsilon: ::std::option::Option<f64>,
+        ///The family, which determines φ.
         pub family: KernelFamily,
         ///The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub length_scale: ::std::option::Option<f64>,
-        ///matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+        ///matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
         ///wendland: 2, 4 or 6 times differentiable; 4 if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
-        pub smoothness: ::std::option::Option<i32>,
+        pub smoothness: ::std::option::Option<Smoothness>,
         ///The factor of φ, unit of the values squared; 1 if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub variance: ::std::option::Option<f64>,
@@ -812,6 +836,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct KernelDescription {
         ///Whether it has derivatives at the points of the cloud, as geometry and operators need there.
         pub differentiable_at_points: ::std::string::String,
+        ///The name in a kernel object.
         pub family: KernelFamily,
         ///φ as a function of r = |x − y|/length_scale; the kernel is variance · φ.
         pub formula: ::std::string::String,
@@ -927,6 +952,7 @@ the noise of the points, 1e-3 at least.*/
         ///laplace: φ = exp(−√(r² + epsilon)).
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub epsilon: ::std::option::Option<f64>,
+        ///The family, which determines φ.
         pub family: KernelFamily,
         ///The length scale ℓ, in the unit of the coordinates.
         pub length_scale: f64,
@@ -935,7 +961,7 @@ the noise of the points, 1e-3 at least.*/
         pub nu: ::std::option::Option<f64>,
         ///wendland: how often differentiable.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
-        pub smoothness: ::std::option::Option<i32>,
+        pub smoothness: ::std::option::Option<Smoothness>,
         ///The factor of φ, unit of the values squared.
         pub variance: f64,
     }
@@ -953,13 +979,18 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///How the matrix is written; `dense` if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub format: ::std::option::Option<MatrixFormat>,
+        ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -968,6 +999,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -981,6 +1013,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct LaplaceBeltramiMatrixResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         /**Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
 in general.*/
@@ -1000,11 +1033,15 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -1013,6 +1050,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted; the points of the surface's cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points of `cloud`, in their order.
@@ -1028,6 +1066,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct LaplaceBeltramiResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///Δu at each query, unit of the values per length squared; null where there is no normal.
         pub values: ::std::vec::Vec<::std::option::Option<f64>>,
@@ -1097,21 +1136,27 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
+        ///Which way normals point; `outward` if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub orientation: ::std::option::Option<OrientationChoice>,
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///Which function's level surface is meant; `auto` if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -1125,6 +1170,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct NormalsResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///|∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
         pub gradient_norms: ::std::vec::Vec<f64>,
@@ -1271,12 +1317,15 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
         ///What is wanted beside the mean; nothing if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<PosteriorQuantity>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -1285,6 +1334,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The observed values at the points, in their order.
@@ -1301,6 +1351,7 @@ the noise of the points, 1e-3 at least.*/
         ///The covariance of the latent function between queries.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub covariance: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///The gradient of the mean at each query, unit of the values per length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
@@ -1355,6 +1406,42 @@ the noise of the points, 1e-3 at least.*/
     impl Problem {
         pub fn builder() -> builder::Problem {
             Default::default()
+        }
+    }
+    ///How often a Wendland kernel is continuously differentiable.
+    #[derive(::serde::Serialize, Clone, Debug)]
+    #[serde(transparent)]
+    pub struct Smoothness(i64);
+    impl ::std::ops::Deref for Smoothness {
+        type Target = i64;
+        fn deref(&self) -> &i64 {
+            &self.0
+        }
+    }
+    impl ::std::convert::From<Smoothness> for i64 {
+        fn from(value: Smoothness) -> Self {
+            value.0
+        }
+    }
+    impl ::std::convert::TryFrom<i64> for Smoothness {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: i64,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            if ![2_i64, 4_i64, 6_i64].contains(&value) {
+                Err("invalid value".into())
+            } else {
+                Ok(Self(value))
+            }
+        }
+    }
+    impl<'de> ::serde::Deserialize<'de> for Smoothness {
+        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
+        where
+            D: ::serde::Deserializer<'de>,
+        {
+            Self::try_from(<i64>::deserialize(deserializer)?)
+                .map_err(|e| { <D::Error as ::serde::de::Error>::custom(e.to_string()) })
         }
     }
     ///How the linear system is solved.
@@ -1558,11 +1645,15 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -1571,6 +1662,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -1584,6 +1676,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct SurfaceGradientMatrixResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         /**One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
 is no normal.*/
@@ -1605,11 +1698,15 @@ of the noise regresses. Absent: 1e-10 for values or with a kernel given; for sur
 the noise of the points, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
         pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`.
@@ -1618,6 +1715,7 @@ the noise of the points, 1e-3 at least.*/
         ///Where answers are wanted; the points of the surface's cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points of `cloud`, in their order.
@@ -1633,6 +1731,7 @@ the noise of the points, 1e-3 at least.*/
     pub struct SurfaceGradientResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the answer came about.
         pub diagnostics: Diagnostics,
         ///∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
         pub gradients: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
@@ -1719,6 +1818,7 @@ the noise of the points, 1e-3 at least.*/
     ///Something that was changed, or that limits the accuracy of the answer.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Warning {
+        ///What it is about.
         pub code: WarningCode,
         ///The same in words, with numbers.
         pub detail: ::std::string::String,
@@ -3620,7 +3720,7 @@ the noise of the points, 1e-3 at least.*/
             >,
             nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
             smoothness: ::std::result::Result<
-                ::std::option::Option<i32>,
+                ::std::option::Option<super::Smoothness>,
                 ::std::string::String,
             >,
             variance: ::std::result::Result<
@@ -3689,7 +3789,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn smoothness<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::option::Option<i32>>,
+                T: ::std::convert::TryInto<::std::option::Option<super::Smoothness>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.smoothness = value
@@ -4002,7 +4102,7 @@ the noise of the points, 1e-3 at least.*/
             length_scale: ::std::result::Result<f64, ::std::string::String>,
             nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
             smoothness: ::std::result::Result<
-                ::std::option::Option<i32>,
+                ::std::option::Option<super::Smoothness>,
                 ::std::string::String,
             >,
             variance: ::std::result::Result<f64, ::std::string::String>,
@@ -4068,7 +4168,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn smoothness<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::option::Option<i32>>,
+                T: ::std::convert::TryInto<::std::option::Option<super::Smoothness>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.smoothness = value
@@ -6516,6 +6616,9 @@ let response = client.create_cloud()
     }
     /**Describe a cloud
 
+Its size, the box around it and the distances between its points, not the points. `ETag` and `If-None-Match` save the
+body; asking keeps the cloud from being dropped as the least recently used.
+
 Sends a `GET` request to `/v1/clouds/{cloud_id}`
 
 Arguments:
@@ -6711,6 +6814,8 @@ let response = client.assemble_laplace_beltrami_matrix()
     }
     /**Check that the process lives
 
+200 as long as it answers at all, whatever it is busy with.
+
 Sends a `GET` request to `/health/live`
 
 ```ignore
@@ -6736,6 +6841,8 @@ let response = client.check_ready()
         builder::CheckReady::new(self)
     }
     /**Describe the build
+
+The version of the service and what it chose to run on this machine.
 
 Sends a `GET` request to `/version`
 
@@ -6968,13 +7075,6 @@ pub mod builder {
                     )
                 }
                 401u16 => {
-                    Err(
-                        Error::ErrorResponse(
-                            ResponseValue::from_response(response).await?,
-                        ),
-                    )
-                }
-                404u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -7230,20 +7330,6 @@ pub mod builder {
                         ),
                     )
                 }
-                503u16 => {
-                    Err(
-                        Error::ErrorResponse(
-                            ResponseValue::from_response(response).await?,
-                        ),
-                    )
-                }
-                504u16 => {
-                    Err(
-                        Error::ErrorResponse(
-                            ResponseValue::from_response(response).await?,
-                        ),
-                    )
-                }
                 _ => Err(Error::UnexpectedResponse(response)),
             }
         }
@@ -7336,20 +7422,6 @@ pub mod builder {
                         ),
                     )
                 }
-                503u16 => {
-                    Err(
-                        Error::ErrorResponse(
-                            ResponseValue::from_response(response).await?,
-                        ),
-                    )
-                }
-                504u16 => {
-                    Err(
-                        Error::ErrorResponse(
-                            ResponseValue::from_response(response).await?,
-                        ),
-                    )
-                }
                 _ => Err(Error::UnexpectedResponse(response)),
             }
         }
@@ -7406,6 +7478,13 @@ pub mod builder {
                     )
                 }
                 406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -8670,7 +8749,9 @@ pub mod builder {
             Self { client: client }
         }
         ///Sends a `GET` request to `/health/live`
-        pub async fn send(self) -> Result<ResponseValue<types::Health>, Error<()>> {
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::Health>, Error<types::Problem>> {
             let Self { client } = self;
             let url = format!("{}/health/live", client.baseurl,);
             let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
@@ -8700,6 +8781,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 _ => Err(Error::UnexpectedResponse(response)),
             }
         }
@@ -8748,6 +8836,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 503u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -8771,7 +8866,9 @@ pub mod builder {
             Self { client: client }
         }
         ///Sends a `GET` request to `/version`
-        pub async fn send(self) -> Result<ResponseValue<types::Version>, Error<()>> {
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::Version>, Error<types::Problem>> {
             let Self { client } = self;
             let url = format!("{}/version", client.baseurl,);
             let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
@@ -8801,6 +8898,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 _ => Err(Error::UnexpectedResponse(response)),
             }
         }
