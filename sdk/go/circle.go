@@ -1,4 +1,4 @@
-// Prints the mean curvatures of a circle of radius 1.
+// Prints the mean curvature of a circle of radius 1.
 package main
 
 import (
@@ -12,24 +12,24 @@ import (
 )
 
 func main() {
-	client := connect()
-	points := make([][]float64, 8)
-	for i := range points {
-		y, x := math.Sincos(float64(i) * math.Pi / 4)
-		points[i] = []float64{x, y}
-	}
-	request := gramian.NewCurvaturesRequest(gramian.CloudRef{Points: points})
-	answer, _, err := client.GeometryAPI.ComputeCurvatures(context.Background()).CurvaturesRequest(*request).Execute()
+	// begin README
+	configuration := gramian.NewConfiguration()
+	configuration.Servers = gramian.ServerConfigurations{{URL: os.Getenv("GRAMIAN_URL")}}
+	api := gramian.NewAPIClient(configuration).GeometryAPI
+	request := gramian.NewCurvaturesRequest(gramian.CloudRef{Points: circle(8)})
+	answer, _, err := api.ComputeCurvatures(context.Background()).CurvaturesRequest(*request).Execute()
 	if err != nil {
 		log.Fatal(err)
 	}
-	for _, curvature := range answer.MeanCurvatures {
-		fmt.Println(*curvature)
-	}
+	fmt.Println(*answer.MeanCurvatures[0])
+	// end README
 }
 
-func connect() *gramian.APIClient {
-	configuration := gramian.NewConfiguration()
-	configuration.Servers = gramian.ServerConfigurations{{URL: os.Getenv("GRAMIAN_URL")}}
-	return gramian.NewAPIClient(configuration)
+func circle(n int) [][]float64 {
+	points := make([][]float64, n)
+	for i := range points {
+		y, x := math.Sincos(2 * math.Pi * float64(i) / float64(n))
+		points[i] = []float64{x, y}
+	}
+	return points
 }

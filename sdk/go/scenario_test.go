@@ -5,6 +5,7 @@ import (
 	"context"
 	"errors"
 	"math"
+	"os"
 	"testing"
 
 	"gramian"
@@ -25,6 +26,12 @@ func TestScenario(t *testing.T) {
 	t.Run("the matrix turns cosines into their negatives", func(t *testing.T) { theMatrixNegatesCosines(t, client) })
 	t.Run("the posterior has a variance", func(t *testing.T) { thePosteriorHasAVariance(t, client) })
 	t.Run("a refusal names the field", func(t *testing.T) { aRefusalNamesTheField(t, client) })
+}
+
+func connect() *gramian.APIClient {
+	configuration := gramian.NewConfiguration()
+	configuration.Servers = gramian.ServerConfigurations{{URL: os.Getenv("GRAMIAN_URL")}}
+	return gramian.NewAPIClient(configuration)
 }
 
 func register(t *testing.T, client *gramian.APIClient) {

@@ -20,7 +20,7 @@ const points = [
 const cosines = points.map(([x = NaN]) => x);
 const gauss: Kernel = { family: KernelFamily.GAUSS, length_scale: 2 };
 
-client.setConfig({ baseUrl: process.env["GRAMIAN_URL"] ?? "http://localhost:8080" });
+client.setConfig({ baseUrl: process.env.GRAMIAN_URL ?? "http://localhost:8080" });
 const { data: registered } = await createCloud({ body: { points }, throwOnError: true });
 const cloud = { id: registered.cloud_id };
 assert.equal(cloud.id, "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c");
