@@ -201,11 +201,14 @@ impl Problem {
                 );
                 let mut problem = Self::new(Slug::DuplicatePoints, remedy);
                 for point in points.iter().take(10) {
-                    problem.members.errors.push(FieldError {
-                        pointer: Place::entry(place.points, *point),
-                        detail: "coincides with another point".to_owned(),
-                    });
+                    let pointer = Place::entry(place.points, *point);
+                    problem
+                        .members
+                        .errors
+                        .push(FieldError { pointer, detail: "coincides with another point".to_owned() });
                 }
+                // A cloud given by its id has one pointer for all its points.
+                problem.members.errors.dedup_by(|a, b| a.pointer == b.pointer);
                 problem.members.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
                 problem
             }

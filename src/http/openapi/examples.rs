@@ -1,6 +1,6 @@
 //! The examples of the document: files in openapi/examples/ that a test sends and compares.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -58,8 +58,24 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
             add_sample(operation, sample);
         }
     }
-    let components = document.components.get_or_insert_default();
-    components.examples = problem_examples();
+    let mut problems = problem_examples();
+    let answered: BTreeSet<String> =
+        operations(document).flat_map(|operation| examples_of(operation)).collect();
+    problems.retain(|slug, _| answered.contains(slug));
+    document.components.get_or_insert_default().examples = problems;
+}
+
+/// The names of the examples that the answers of an operation refer to.
+fn examples_of(operation: &Operation) -> Vec<String> {
+    let responses = operation.responses.responses.values().filter_map(|response| match response {
+        RefOr::T(response) => Some(response.content.values()),
+        RefOr::Ref(_) => None,
+    });
+    let contents = responses.flatten().filter_map(|content| match content {
+        RefOr::T(content) => Some(content.examples.keys().cloned()),
+        RefOr::Ref(_) => None,
+    });
+    contents.flatten().collect()
 }
 
 fn add_sample(operation: &mut Operation, sample: Sample) {

@@ -7,31 +7,28 @@ use utoipa::openapi::{ObjectBuilder, Ref, RefOr};
 
 use super::{id_of, operations};
 
-/// Name, type, example, description.
-const HEADERS: [(&str, Type, &str, &str); 7] = [
+/// Name, example, description.
+const HEADERS: [(&str, &str, &str); 7] = [
     (
         "X-Request-Id",
-        Type::String,
         "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c",
         "The id of the request, as in the logs and in `instance` of problems; the client's own if it sent a short plain one.",
     ),
     (
         "Server-Timing",
-        Type::String,
         "parse;dur=0.052, gram;dur=1.310, factor;dur=4.207, solve;dur=0.118, evaluate;dur=0.640, encode;dur=0.021",
         "Milliseconds of each stage; `encode` is absent if the answer is written while it is sent.",
     ),
     (
         "Cache-Status",
-        Type::String,
         "gramian; hit",
         "Whether the factorization was there: `gramian; hit`, `gramian; fwd=miss; stored`, `gramian; fwd=miss; collapsed` \
          (another request computed it), `gramian; fwd=miss`. With two factorizations a hit only if both were there.",
     ),
-    ("Location", Type::String, "/v1/clouds/…", "The path of the cloud."),
-    ("ETag", Type::String, "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),
-    ("Retry-After", Type::Integer, "1", "Seconds after which to try again."),
-    ("WWW-Authenticate", Type::String, "Bearer", "How to authenticate: a bearer key."),
+    ("Location", "/v1/clouds/…", "The path of the cloud."),
+    ("ETag", "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),
+    ("Retry-After", "1", "Seconds after which to try again."),
+    ("WWW-Authenticate", "Bearer", "How to authenticate: a bearer key."),
 ];
 
 /// Declares the headers and refers to them from the answers of every operation.
@@ -46,7 +43,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
             }
         }
     }
-    let declared = HEADERS.map(|(name, kind, example, text)| (name.to_owned(), header(kind, example, text)));
+    let declared = HEADERS.map(|(name, example, text)| (name.to_owned(), header(example, text)));
     document.components.get_or_insert_default().headers = declared.into();
 }
 
@@ -71,8 +68,12 @@ fn names(status: &str, own: &[&'static str]) -> Vec<&'static str> {
     [&["X-Request-Id"], by_status].concat()
 }
 
-fn header(kind: Type, example: &str, description: &str) -> RefOr<Header> {
+fn header(example: &str, description: &str) -> RefOr<Header> {
+    let (kind, example) = match example.parse::<u64>() {
+        Ok(number) => (Type::Integer, number.into()),
+        Err(_) => (Type::String, example.into()),
+    };
     let schema = ObjectBuilder::new().schema_type(SchemaType::Type(kind));
     let header = HeaderBuilder::new().schema(Some(schema)).description(Some(description));
-    RefOr::T(header.example(Some(example.into())).build())
+    RefOr::T(header.example(Some(example)).build())
 }

@@ -8,6 +8,7 @@ mod headers;
 mod links;
 pub mod version_3_0;
 
+use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, PathItem};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::{Modify, OpenApi};
@@ -59,6 +60,18 @@ pub fn complete(document: &mut utoipa::openapi::OpenApi) {
     examples::add(document);
     headers::add(document);
     links::add(document);
+    empty_answers_to_head(document);
+}
+
+/// HEAD is answered without a body, whatever the problem.
+fn empty_answers_to_head(document: &mut utoipa::openapi::OpenApi) {
+    for operation in document.paths.paths.values_mut().filter_map(|item| item.head.as_mut()) {
+        for response in operation.responses.responses.values_mut() {
+            if let RefOr::T(response) = response {
+                response.content.clear();
+            }
+        }
+    }
 }
 
 fn operations(document: &mut utoipa::openapi::OpenApi) -> impl Iterator<Item = &mut Operation> {

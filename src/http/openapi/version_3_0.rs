@@ -22,7 +22,16 @@ pub fn derive(document: &Value) -> Value {
         paths.retain(|_, item| item.as_object().is_some_and(|item| !item.is_empty()));
     }
     translate(&mut document);
+    drop_unused_examples(&mut document);
     document
+}
+
+/// Drops the examples of what was left out.
+fn drop_unused_examples(document: &mut Value) {
+    let text = document["paths"].to_string();
+    if let Some(examples) = document.pointer_mut("/components/examples").and_then(Value::as_object_mut) {
+        examples.retain(|name, _| text.contains(&format!("\"#/components/examples/{name}\"")));
+    }
 }
 
 /// Whether success has a body, but none in JSON.
