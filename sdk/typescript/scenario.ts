@@ -1,0 +1,78 @@
+// The scenario that every client runs, against the server at GRAMIAN_URL.
+import assert from "node:assert/strict";
+
+import { client } from "./generated/client.gen.ts";
+import {
+    assembleLaplaceBeltramiMatrix,
+    computeCurvatures,
+    computePosterior,
+    createCloud,
+    KernelFamily,
+    PosteriorQuantity,
+    type Kernel,
+} from "./generated/index.ts";
+
+// Eight points of the unit circle.
+const points = [
+    [1, 0], [0.70710678, 0.70710678], [0, 1], [-0.70710678, 0.70710678],
+    [-1, 0], [-0.70710678, -0.70710678], [0, -1], [0.70710678, -0.70710678],
+];
+const cosines = points.map(([x = NaN]) => x);
+const gauss: Kernel = { family: KernelFamily.GAUSS, length_scale: 2 };
+
+client.setConfig({ baseUrl: process.env.GRAMIAN_URL ?? "http://localhost:8080" });
+const { data: registered } = await createCloud({ body: { points }, throwOnError: true });
+const cloud = { id: registered.cloud_id };
+assert.equal(cloud.id, "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c");
+
+await curvaturesAreNullAtTheCentre();
+await theMatrixTurnsCosinesIntoTheirNegatives();
+await thePosteriorHasAVariance();
+await aRefusalNamesTheField();
+
+async function curvaturesAreNullAtTheCentre() {
+    const queries = [[1, 0], [0, 0]];
+    const body = { cloud, queries, kernel: gauss, alpha: 0 };
+    const { data } = await computeCurvatures({ body, throwOnError: true });
+    const [onTheCircle, atTheCentre] = data.mean_curvatures;
+    assert.ok(Math.abs((onTheCircle ?? NaN) - 1) < 1e-6, `${onTheCircle}`);
+    assert.equal(atTheCentre, null);
+    assert.equal(data.degenerate[0]?.query, 1);
+}
+
+async function theMatrixTurnsCosinesIntoTheirNegatives() {
+    const body = { cloud, kernel: gauss, alpha: 0 };
+    const { data } = await assembleLaplaceBeltramiMatrix({ body, throwOnError: true });
+    assert.equal(data.matrix.length, 8);
+    data.matrix.forEach((row, i) => {
+        const applied = dot(row ?? [], cosines);
+        // Eight points on the circle take a wave of frequency 7 for a cosine, which adds the fraction
+        // 48 I_7(1/2)/I_1(1/2) = 2.3e-6. The Bessel functions I_k are the Fourier coefficients of this kernel
+        // on the circle, up to a factor.
+        assert.ok(Math.abs(applied + (cosines[i] ?? NaN)) < 5e-6, `row ${i}: ${applied}`);
+    });
+}
+
+async function thePosteriorHasAVariance() {
+    const { data } = await computePosterior({
+        body: { cloud, values: cosines, queries: [[0.9, 0.1]], alpha: 1e-6, include: [PosteriorQuantity.VARIANCE] },
+        throwOnError: true,
+    });
+    assert.equal(data.means.length, 1);
+    assert.equal(data.variances?.length, 1);
+    assert.ok((data.variances[0] ?? NaN) >= 0);
+}
+
+// Without `throwOnError` a refusal is not thrown but answered as `error`, a `Problem`.
+async function aRefusalNamesTheField() {
+    const kernel = { ...gauss, length_scale: -1 };
+    const { data, error } = await computeCurvatures({ body: { cloud, kernel } });
+    assert.equal(data, undefined);
+    assert.equal(error?.type, "/problems/invalid-request");
+    assert.equal(error.errors?.[0]?.pointer, "/kernel/length_scale");
+}
+
+function dot(a: number[], b: number[]): number {
+    assert.equal(a.length, b.length);
+    return a.reduce((sum, x, i) => sum + x * (b[i] ?? NaN), 0);
+}
