@@ -1,5 +1,7 @@
 //! The objects that requests and answers share: CloudRef, Kernel, Fit, Geometry, Diagnostics, Degenerate.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::schema::{Schema, SchemaType, Type};
@@ -15,7 +17,7 @@ use super::body::{Points, present, present_object, present_word, word};
 pub struct CloudRef {
     /// The id of a registered cloud, 64 hexadecimal digits.
     #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, pattern = "^[0-9a-f]{64}$")]
+    #[schema(nullable = false, value_type = Option<CloudIdSchema>)]
     pub id: Option<String>,
     /// The points, one row of coordinates each, all of the same length; the cloud is registered with them.
     #[serde(default, deserialize_with = "present")]
@@ -25,6 +27,25 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub normals: Option<Points>,
+}
+
+/// The schema of the id of a cloud; requests are read as text, since what is no id is an unknown cloud.
+pub struct CloudIdSchema;
+
+impl PartialSchema for CloudIdSchema {
+    fn schema() -> RefOr<Schema> {
+        let text =
+            "The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.";
+        let schema =
+            ObjectBuilder::new().schema_type(SchemaType::Type(Type::String)).pattern(Some("^[0-9a-f]{64}$"));
+        schema.description(Some(text)).into()
+    }
+}
+
+impl ToSchema for CloudIdSchema {
+    fn name() -> Cow<'static, str> {
+        "CloudId".into()
+    }
 }
 
 /// The families of kernels; `GET /v1/kernels` has their formulas.
@@ -333,6 +354,7 @@ pub struct Warning {
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Diagnostics {
     /// The id of the cloud, to refer to it in later requests.
+    #[schema(value_type = CloudIdSchema)]
     pub cloud_id: String,
     /// Points of the cloud, n.
     pub n_points: usize,

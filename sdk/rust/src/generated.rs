@@ -20,69 +20,13 @@ pub mod types {
             Default::default()
         }
     }
-    ///`CheckCloudCloudId`
-    #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
-    #[serde(transparent)]
-    pub struct CheckCloudCloudId(::std::string::String);
-    impl ::std::ops::Deref for CheckCloudCloudId {
-        type Target = ::std::string::String;
-        fn deref(&self) -> &::std::string::String {
-            &self.0
-        }
-    }
-    impl ::std::convert::From<CheckCloudCloudId> for ::std::string::String {
-        fn from(value: CheckCloudCloudId) -> Self {
-            value.0
-        }
-    }
-    impl ::std::str::FromStr for CheckCloudCloudId {
-        type Err = self::error::ConversionError;
-        fn from_str(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            static PATTERN: ::std::sync::LazyLock<::regress::Regex> = ::std::sync::LazyLock::new(||
-            { ::regress::Regex::new("^[0-9a-f]{64}$").unwrap() });
-            if PATTERN.find(value).is_none() {
-                return Err("doesn't match pattern \"^[0-9a-f]{64}$\"".into());
-            }
-            Ok(Self(value.to_string()))
-        }
-    }
-    impl ::std::convert::TryFrom<&str> for CheckCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl ::std::convert::TryFrom<::std::string::String> for CheckCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: ::std::string::String,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl<'de> ::serde::Deserialize<'de> for CheckCloudCloudId {
-        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
-        where
-            D: ::serde::Deserializer<'de>,
-        {
-            ::std::string::String::deserialize(deserializer)?
-                .parse()
-                .map_err(|e: self::error::ConversionError| {
-                    <D::Error as ::serde::de::Error>::custom(e.to_string())
-                })
-        }
-    }
     ///A registered cloud.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Cloud {
         ///The smallest box around the points.
         pub bounding_box: BoundingBox,
-        ///64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
-        pub cloud_id: CloudCloudId,
+        ///The id of the cloud, to refer to it in later requests.
+        pub cloud_id: CloudId,
         ///When it was registered, in UTC.
         pub created_at: ::chrono::DateTime<::chrono::offset::Utc>,
         ///Coordinates of each point, d.
@@ -100,22 +44,22 @@ pub mod types {
             Default::default()
         }
     }
-    ///64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
+    ///The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
     #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
     #[serde(transparent)]
-    pub struct CloudCloudId(::std::string::String);
-    impl ::std::ops::Deref for CloudCloudId {
+    pub struct CloudId(::std::string::String);
+    impl ::std::ops::Deref for CloudId {
         type Target = ::std::string::String;
         fn deref(&self) -> &::std::string::String {
             &self.0
         }
     }
-    impl ::std::convert::From<CloudCloudId> for ::std::string::String {
-        fn from(value: CloudCloudId) -> Self {
+    impl ::std::convert::From<CloudId> for ::std::string::String {
+        fn from(value: CloudId) -> Self {
             value.0
         }
     }
-    impl ::std::str::FromStr for CloudCloudId {
+    impl ::std::str::FromStr for CloudId {
         type Err = self::error::ConversionError;
         fn from_str(
             value: &str,
@@ -128,7 +72,7 @@ pub mod types {
             Ok(Self(value.to_string()))
         }
     }
-    impl ::std::convert::TryFrom<&str> for CloudCloudId {
+    impl ::std::convert::TryFrom<&str> for CloudId {
         type Error = self::error::ConversionError;
         fn try_from(
             value: &str,
@@ -136,7 +80,7 @@ pub mod types {
             value.parse()
         }
     }
-    impl ::std::convert::TryFrom<::std::string::String> for CloudCloudId {
+    impl ::std::convert::TryFrom<::std::string::String> for CloudId {
         type Error = self::error::ConversionError;
         fn try_from(
             value: ::std::string::String,
@@ -144,7 +88,7 @@ pub mod types {
             value.parse()
         }
     }
-    impl<'de> ::serde::Deserialize<'de> for CloudCloudId {
+    impl<'de> ::serde::Deserialize<'de> for CloudId {
         fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
         where
             D: ::serde::Deserializer<'de>,
@@ -176,7 +120,7 @@ pub mod types {
     pub struct CloudRef {
         ///The id of a registered cloud, 64 hexadecimal digits.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
-        pub id: ::std::option::Option<CloudRefId>,
+        pub id: ::std::option::Option<CloudId>,
         ///Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
@@ -187,62 +131,6 @@ pub mod types {
     impl CloudRef {
         pub fn builder() -> builder::CloudRef {
             Default::default()
-        }
-    }
-    ///The id of a registered cloud, 64 hexadecimal digits.
-    #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
-    #[serde(transparent)]
-    pub struct CloudRefId(::std::string::String);
-    impl ::std::ops::Deref for CloudRefId {
-        type Target = ::std::string::String;
-        fn deref(&self) -> &::std::string::String {
-            &self.0
-        }
-    }
-    impl ::std::convert::From<CloudRefId> for ::std::string::String {
-        fn from(value: CloudRefId) -> Self {
-            value.0
-        }
-    }
-    impl ::std::str::FromStr for CloudRefId {
-        type Err = self::error::ConversionError;
-        fn from_str(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            static PATTERN: ::std::sync::LazyLock<::regress::Regex> = ::std::sync::LazyLock::new(||
-            { ::regress::Regex::new("^[0-9a-f]{64}$").unwrap() });
-            if PATTERN.find(value).is_none() {
-                return Err("doesn't match pattern \"^[0-9a-f]{64}$\"".into());
-            }
-            Ok(Self(value.to_string()))
-        }
-    }
-    impl ::std::convert::TryFrom<&str> for CloudRefId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl ::std::convert::TryFrom<::std::string::String> for CloudRefId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: ::std::string::String,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl<'de> ::serde::Deserialize<'de> for CloudRefId {
-        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
-        where
-            D: ::serde::Deserializer<'de>,
-        {
-            ::std::string::String::deserialize(deserializer)?
-                .parse()
-                .map_err(|e: self::error::ConversionError| {
-                    <D::Error as ::serde::de::Error>::custom(e.to_string())
-                })
         }
     }
     ///Points to register.
@@ -414,62 +302,6 @@ where that has no answer.*/
             value.parse()
         }
     }
-    ///`DeleteCloudCloudId`
-    #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
-    #[serde(transparent)]
-    pub struct DeleteCloudCloudId(::std::string::String);
-    impl ::std::ops::Deref for DeleteCloudCloudId {
-        type Target = ::std::string::String;
-        fn deref(&self) -> &::std::string::String {
-            &self.0
-        }
-    }
-    impl ::std::convert::From<DeleteCloudCloudId> for ::std::string::String {
-        fn from(value: DeleteCloudCloudId) -> Self {
-            value.0
-        }
-    }
-    impl ::std::str::FromStr for DeleteCloudCloudId {
-        type Err = self::error::ConversionError;
-        fn from_str(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            static PATTERN: ::std::sync::LazyLock<::regress::Regex> = ::std::sync::LazyLock::new(||
-            { ::regress::Regex::new("^[0-9a-f]{64}$").unwrap() });
-            if PATTERN.find(value).is_none() {
-                return Err("doesn't match pattern \"^[0-9a-f]{64}$\"".into());
-            }
-            Ok(Self(value.to_string()))
-        }
-    }
-    impl ::std::convert::TryFrom<&str> for DeleteCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl ::std::convert::TryFrom<::std::string::String> for DeleteCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: ::std::string::String,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl<'de> ::serde::Deserialize<'de> for DeleteCloudCloudId {
-        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
-        where
-            D: ::serde::Deserializer<'de>,
-        {
-            ::std::string::String::deserialize(deserializer)?
-                .parse()
-                .map_err(|e: self::error::ConversionError| {
-                    <D::Error as ::serde::de::Error>::custom(e.to_string())
-                })
-        }
-    }
     ///What an answer says of itself: the numbers used, how the system was solved, and how well.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Diagnostics {
@@ -477,7 +309,7 @@ where that has no answer.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The id of the cloud, to refer to it in later requests.
-        pub cloud_id: ::std::string::String,
+        pub cloud_id: CloudId,
         ///Coordinates of each point, d.
         pub dimension: u64,
         ///How the matrix was factorized.
@@ -679,62 +511,6 @@ the request.*/
     impl Geometry {
         pub fn builder() -> builder::Geometry {
             Default::default()
-        }
-    }
-    ///`GetCloudCloudId`
-    #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
-    #[serde(transparent)]
-    pub struct GetCloudCloudId(::std::string::String);
-    impl ::std::ops::Deref for GetCloudCloudId {
-        type Target = ::std::string::String;
-        fn deref(&self) -> &::std::string::String {
-            &self.0
-        }
-    }
-    impl ::std::convert::From<GetCloudCloudId> for ::std::string::String {
-        fn from(value: GetCloudCloudId) -> Self {
-            value.0
-        }
-    }
-    impl ::std::str::FromStr for GetCloudCloudId {
-        type Err = self::error::ConversionError;
-        fn from_str(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            static PATTERN: ::std::sync::LazyLock<::regress::Regex> = ::std::sync::LazyLock::new(||
-            { ::regress::Regex::new("^[0-9a-f]{64}$").unwrap() });
-            if PATTERN.find(value).is_none() {
-                return Err("doesn't match pattern \"^[0-9a-f]{64}$\"".into());
-            }
-            Ok(Self(value.to_string()))
-        }
-    }
-    impl ::std::convert::TryFrom<&str> for GetCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: &str,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl ::std::convert::TryFrom<::std::string::String> for GetCloudCloudId {
-        type Error = self::error::ConversionError;
-        fn try_from(
-            value: ::std::string::String,
-        ) -> ::std::result::Result<Self, self::error::ConversionError> {
-            value.parse()
-        }
-    }
-    impl<'de> ::serde::Deserialize<'de> for GetCloudCloudId {
-        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
-        where
-            D: ::serde::Deserializer<'de>,
-        {
-            ::std::string::String::deserialize(deserializer)?
-                .parse()
-                .map_err(|e: self::error::ConversionError| {
-                    <D::Error as ::serde::de::Error>::custom(e.to_string())
-                })
         }
     }
     ///The state of the process.
@@ -1981,7 +1757,7 @@ the noise of the points, 1e-3 at least.*/
                 super::BoundingBox,
                 ::std::string::String,
             >,
-            cloud_id: ::std::result::Result<super::CloudCloudId, ::std::string::String>,
+            cloud_id: ::std::result::Result<super::CloudId, ::std::string::String>,
             created_at: ::std::result::Result<
                 ::chrono::DateTime<::chrono::offset::Utc>,
                 ::std::string::String,
@@ -2022,7 +1798,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn cloud_id<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<super::CloudCloudId>,
+                T: ::std::convert::TryInto<super::CloudId>,
                 T::Error: ::std::fmt::Display,
             {
                 self.cloud_id = value
@@ -2189,7 +1965,7 @@ the noise of the points, 1e-3 at least.*/
         #[derive(Clone, Debug)]
         pub struct CloudRef {
             id: ::std::result::Result<
-                ::std::option::Option<super::CloudRefId>,
+                ::std::option::Option<super::CloudId>,
                 ::std::string::String,
             >,
             normals: ::std::result::Result<
@@ -2213,7 +1989,7 @@ the noise of the points, 1e-3 at least.*/
         impl CloudRef {
             pub fn id<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::option::Option<super::CloudRefId>>,
+                T: ::std::convert::TryInto<::std::option::Option<super::CloudId>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.id = value
@@ -2859,10 +2635,7 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<f64>,
                 ::std::string::String,
             >,
-            cloud_id: ::std::result::Result<
-                ::std::string::String,
-                ::std::string::String,
-            >,
+            cloud_id: ::std::result::Result<super::CloudId, ::std::string::String>,
             dimension: ::std::result::Result<u64, ::std::string::String>,
             factorization: ::std::result::Result<
                 super::FactorizationUsed,
@@ -2934,7 +2707,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn cloud_id<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::string::String>,
+                T: ::std::convert::TryInto<super::CloudId>,
                 T::Error: ::std::fmt::Display,
             {
                 self.cloud_id = value
@@ -7140,7 +6913,7 @@ pub mod builder {
     #[derive(Debug, Clone)]
     pub struct GetCloud<'a> {
         client: &'a super::Client,
-        cloud_id: Result<types::GetCloudCloudId, String>,
+        cloud_id: Result<types::CloudId, String>,
     }
     impl<'a> GetCloud<'a> {
         pub fn new(client: &'a super::Client) -> Self {
@@ -7151,13 +6924,11 @@ pub mod builder {
         }
         pub fn cloud_id<V>(mut self, value: V) -> Self
         where
-            V: std::convert::TryInto<types::GetCloudCloudId>,
+            V: std::convert::TryInto<types::CloudId>,
         {
             self.cloud_id = value
                 .try_into()
-                .map_err(|_| {
-                    "conversion to `GetCloudCloudId` for cloud_id failed".to_string()
-                });
+                .map_err(|_| "conversion to `CloudId` for cloud_id failed".to_string());
             self
         }
         ///Sends a `GET` request to `/v1/clouds/{cloud_id}`
@@ -7248,7 +7019,7 @@ pub mod builder {
     #[derive(Debug, Clone)]
     pub struct DeleteCloud<'a> {
         client: &'a super::Client,
-        cloud_id: Result<types::DeleteCloudCloudId, String>,
+        cloud_id: Result<types::CloudId, String>,
     }
     impl<'a> DeleteCloud<'a> {
         pub fn new(client: &'a super::Client) -> Self {
@@ -7259,13 +7030,11 @@ pub mod builder {
         }
         pub fn cloud_id<V>(mut self, value: V) -> Self
         where
-            V: std::convert::TryInto<types::DeleteCloudCloudId>,
+            V: std::convert::TryInto<types::CloudId>,
         {
             self.cloud_id = value
                 .try_into()
-                .map_err(|_| {
-                    "conversion to `DeleteCloudCloudId` for cloud_id failed".to_string()
-                });
+                .map_err(|_| "conversion to `CloudId` for cloud_id failed".to_string());
             self
         }
         ///Sends a `DELETE` request to `/v1/clouds/{cloud_id}`
@@ -7340,7 +7109,7 @@ pub mod builder {
     #[derive(Debug, Clone)]
     pub struct CheckCloud<'a> {
         client: &'a super::Client,
-        cloud_id: Result<types::CheckCloudCloudId, String>,
+        cloud_id: Result<types::CloudId, String>,
     }
     impl<'a> CheckCloud<'a> {
         pub fn new(client: &'a super::Client) -> Self {
@@ -7351,13 +7120,11 @@ pub mod builder {
         }
         pub fn cloud_id<V>(mut self, value: V) -> Self
         where
-            V: std::convert::TryInto<types::CheckCloudCloudId>,
+            V: std::convert::TryInto<types::CloudId>,
         {
             self.cloud_id = value
                 .try_into()
-                .map_err(|_| {
-                    "conversion to `CheckCloudCloudId` for cloud_id failed".to_string()
-                });
+                .map_err(|_| "conversion to `CloudId` for cloud_id failed".to_string());
             self
         }
         ///Sends a `HEAD` request to `/v1/clouds/{cloud_id}`

@@ -8,7 +8,7 @@ type Object = Map<String, Value>;
 ///
 /// What 3.0 cannot say is said its way: nullable types, exclusive bounds, descriptions beside references, licences.
 /// Bodies come as `application/json` only, problem documents among them, since generators know no other; operations
-/// that answer nothing but pages for people are left out.
+/// that answer nothing but pages for people are left out, and so are links, whose bodies some generators refuse.
 pub fn derive(document: &Value) -> Value {
     let mut document = document.clone();
     document["openapi"] = json!("3.0.3");
@@ -50,6 +50,9 @@ fn translate(value: &mut Value) {
                 if !matches!(name.as_str(), "example" | "examples") {
                     translate(member);
                 }
+            }
+            if object.get("links").is_some_and(Value::is_object) {
+                object.shift_remove("links");
             }
             keep_json(object);
             take_null_out_of_type(object);
@@ -94,7 +97,7 @@ fn translate_bound(object: &mut Object, exclusive: &str, inclusive: &str) {
 fn wrap_reference(object: &mut Object) {
     if object.len() > 1
         && object.get("$ref").is_some_and(Value::is_string)
-        && let Some(reference) = object.remove("$ref")
+        && let Some(reference) = object.shift_remove("$ref")
     {
         object.insert("allOf".to_owned(), json!([{"$ref": reference}]));
     }
@@ -123,7 +126,8 @@ mod tests {
     #[test]
     fn bodies_are_json_and_pages_are_left_out() {
         let answers = |media_type: &str| {
-            json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}}},
+            json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}},
+                                        "links": {"next": {}}},
                                  "404": {"content": {"application/problem+json": {}}}}})
         };
         let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});

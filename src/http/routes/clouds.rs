@@ -17,6 +17,7 @@ use crate::http::fit::{Planner, unknown_cloud};
 use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
+use crate::http::shared::CloudIdSchema;
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::CloudId;
@@ -62,8 +63,8 @@ pub struct Spacing {
 /// A registered cloud.
 #[derive(Serialize, ToSchema)]
 pub struct Cloud {
-    /// 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
-    #[schema(pattern = "^[0-9a-f]{64}$")]
+    /// The id of the cloud, to refer to it in later requests.
+    #[schema(value_type = CloudIdSchema)]
     cloud_id: String,
     /// Number of points, n.
     n_points: usize,
@@ -157,7 +158,7 @@ pub async fn create_cloud(
     path = "/v1/clouds/{cloud_id}",
     operation_id = "get_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
+    params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses(
         (status = 200, description = "The cloud", body = Cloud),
         (status = 304, description = "The client has it already"),
@@ -190,7 +191,7 @@ pub async fn get_cloud(
     path = "/v1/clouds/{cloud_id}",
     operation_id = "check_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
+    params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses((status = 200, description = "Registered"), (status = 304, description = "The client has it already"), LookUpProblems),
     security((), ("bearer" = []))
 )]
@@ -216,7 +217,7 @@ pub async fn check_cloud(
     path = "/v1/clouds/{cloud_id}",
     operation_id = "delete_cloud",
     tag = "clouds",
-    params(("cloud_id" = String, Path, description = "The id of a registered cloud", pattern = "^[0-9a-f]{64}$", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
+    params(("cloud_id" = CloudIdSchema, Path, description = "The id of a registered cloud", example = "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c")),
     responses((status = 204, description = "Deleted"), LookUpProblems),
     security((), ("bearer" = []))
 )]

@@ -35,6 +35,7 @@ from .posterior_quantity import PosteriorQuantity
 from .posterior_request import PosteriorRequest
 from .posterior_response import PosteriorResponse
 from .problem import Problem
+from .smoothness import Smoothness
 from .solver_choice import SolverChoice
 from .solver_used import SolverUsed
 from .spacing import Spacing
@@ -84,6 +85,7 @@ __all__ = (
     "PosteriorRequest",
     "PosteriorResponse",
     "Problem",
+    "Smoothness",
     "SolverChoice",
     "SolverUsed",
     "Spacing",

@@ -22,7 +22,7 @@ class Cloud:
     """A registered cloud.
 
     Attributes:
-        cloud_id (str): 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
         n_points (int): Number of points, n.
         dimension (int): Coordinates of each point, d.
         bounding_box (BoundingBox): The smallest box around a cloud.

@@ -15,7 +15,7 @@ class CloudRef:
     """A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
 
     Attributes:
-        id (str | Unset): The id of a registered cloud, 64 hexadecimal digits.
+        id (str | Unset): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
         points (list[list[float]] | Unset): The points, one row of coordinates each, all of the same length; the cloud
             is registered with them.
         normals (list[list[float]] | Unset): Normals at the points, one row each, of any length but 0, with `points`

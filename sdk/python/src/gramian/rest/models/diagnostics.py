@@ -23,7 +23,7 @@ class Diagnostics:
     """What an answer says of itself: the numbers used, how the system was solved, and how well.
 
     Attributes:
-        cloud_id (str): The id of the cloud, to refer to it in later requests.
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
         n_points (int): Points of the cloud, n.
         n_queries (int): Queries answered, m.
         dimension (int): Coordinates of each point, d.

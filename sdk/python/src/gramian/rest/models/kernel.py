@@ -6,6 +6,7 @@ from typing import Any, Self, TypeVar
 from attrs import define as _attrs_define
 
 from ..models.kernel_family import KernelFamily
+from ..models.smoothness import Smoothness
 from ..types import UNSET, Unset
 
 T = TypeVar("T", bound="Kernel")
@@ -22,8 +23,9 @@ class Kernel:
         variance (float | Unset): The factor of φ, unit of the values squared; 1 if absent.
         epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of
             the cloud.
-        nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
-        smoothness (int | Unset): wendland: 2, 4 or 6 times differentiable; 4 if absent.
+        nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no
+            enumerations of fractions.)
+        smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
     """
 
     family: KernelFamily
@@ -31,7 +33,7 @@ class Kernel:
     variance: float | Unset = UNSET
     epsilon: float | Unset = UNSET
     nu: float | Unset = UNSET
-    smoothness: int | Unset = UNSET
+    smoothness: Smoothness | Unset = UNSET
 
     def to_dict(self) -> dict[str, Any]:
         family = self.family.value
@@ -44,7 +46,9 @@ class Kernel:
 
         nu = self.nu
 
-        smoothness = self.smoothness
+        smoothness: int | Unset = UNSET
+        if not isinstance(self.smoothness, Unset):
+            smoothness = self.smoothness.value
 
         field_dict: dict[str, Any] = {}
 
@@ -79,7 +83,12 @@ class Kernel:
 
         nu = d.pop("nu", UNSET)
 
-        smoothness = d.pop("smoothness", UNSET)
+        _smoothness = d.pop("smoothness", UNSET)
+        smoothness: Smoothness | Unset
+        if isinstance(_smoothness, Unset):
+            smoothness = UNSET
+        else:
+            smoothness = Smoothness(_smoothness)
 
         kernel = cls(
             family=family,

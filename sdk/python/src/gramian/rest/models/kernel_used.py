@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.kernel_family import KernelFamily
+from ..models.smoothness import Smoothness
 from ..types import UNSET, Unset
 
 T = TypeVar("T", bound="KernelUsed")
@@ -22,7 +23,7 @@ class KernelUsed:
         variance (float): The factor of φ, unit of the values squared.
         epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)).
         nu (float | Unset): matern: the smoothness ν.
-        smoothness (int | Unset): wendland: how often differentiable.
+        smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
     """
 
     family: KernelFamily
@@ -30,7 +31,7 @@ class KernelUsed:
     variance: float
     epsilon: float | Unset = UNSET
     nu: float | Unset = UNSET
-    smoothness: int | Unset = UNSET
+    smoothness: Smoothness | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -44,7 +45,9 @@ class KernelUsed:
 
         nu = self.nu
 
-        smoothness = self.smoothness
+        smoothness: int | Unset = UNSET
+        if not isinstance(self.smoothness, Unset):
+            smoothness = self.smoothness.value
 
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
@@ -77,7 +80,12 @@ class KernelUsed:
 
         nu = d.pop("nu", UNSET)
 
-        smoothness = d.pop("smoothness", UNSET)
+        _smoothness = d.pop("smoothness", UNSET)
+        smoothness: Smoothness | Unset
+        if isinstance(_smoothness, Unset):
+            smoothness = UNSET
+        else:
+            smoothness = Smoothness(_smoothness)
 
         kernel_used = cls(
             family=family,

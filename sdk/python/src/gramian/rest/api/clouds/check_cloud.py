@@ -6,7 +6,6 @@ import httpx
 
 from ... import errors
 from ...client import AuthenticatedClient, Client
-from ...models.problem import Problem
 from ...types import Response
 
 
@@ -24,44 +23,24 @@ def _get_kwargs(
     return _kwargs
 
 
-def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> None | Problem:
+def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> Any | None:
     if response.status_code == 200:
-        response_200 = None
-        return response_200
+        return None
 
     if response.status_code == 304:
-        response_304 = None
-        return response_304
+        return None
 
     if response.status_code == 401:
-        response_401 = Problem.from_dict(response.json())
-
-        return response_401
+        return None
 
     if response.status_code == 404:
-        response_404 = Problem.from_dict(response.json())
-
-        return response_404
+        return None
 
     if response.status_code == 406:
-        response_406 = Problem.from_dict(response.json())
-
-        return response_406
+        return None
 
     if response.status_code == 500:
-        response_500 = Problem.from_dict(response.json())
-
-        return response_500
-
-    if response.status_code == 503:
-        response_503 = Problem.from_dict(response.json())
-
-        return response_503
-
-    if response.status_code == 504:
-        response_504 = Problem.from_dict(response.json())
-
-        return response_504
+        return None
 
     if client.raise_on_unexpected_status:
         raise errors.UnexpectedStatus(response.status_code, response.content)
@@ -69,7 +48,7 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
         return None
 
 
-def _build_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> Response[None | Problem]:
+def _build_response(*, client: AuthenticatedClient | Client, response: httpx.Response) -> Response[Any]:
     return Response(
         status_code=HTTPStatus(response.status_code),
         content=response.content,
@@ -82,20 +61,21 @@ def sync_detailed(
     cloud_id: str,
     *,
     client: AuthenticatedClient | Client,
-) -> Response[None | Problem]:
+) -> Response[Any]:
     """Check for a cloud
 
      As GET, without the body.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Response[None | Problem]
+        Response[Any]
     """
 
     kwargs = _get_kwargs(
@@ -109,50 +89,25 @@ def sync_detailed(
     return _build_response(client=client, response=response)
 
 
-def sync(
-    cloud_id: str,
-    *,
-    client: AuthenticatedClient | Client,
-) -> None | Problem:
-    """Check for a cloud
-
-     As GET, without the body.
-
-    Args:
-        cloud_id (str):
-
-    Raises:
-        errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
-        httpx.TimeoutException: If the request takes longer than Client.timeout.
-
-    Returns:
-        None | Problem
-    """
-
-    return sync_detailed(
-        cloud_id=cloud_id,
-        client=client,
-    ).parsed
-
-
 async def asyncio_detailed(
     cloud_id: str,
     *,
     client: AuthenticatedClient | Client,
-) -> Response[None | Problem]:
+) -> Response[Any]:
     """Check for a cloud
 
      As GET, without the body.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
         httpx.TimeoutException: If the request takes longer than Client.timeout.
 
     Returns:
-        Response[None | Problem]
+        Response[Any]
     """
 
     kwargs = _get_kwargs(
@@ -162,31 +117,3 @@ async def asyncio_detailed(
     response = await client.get_async_httpx_client().request(**kwargs)
 
     return _build_response(client=client, response=response)
-
-
-async def asyncio(
-    cloud_id: str,
-    *,
-    client: AuthenticatedClient | Client,
-) -> None | Problem:
-    """Check for a cloud
-
-     As GET, without the body.
-
-    Args:
-        cloud_id (str):
-
-    Raises:
-        errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
-        httpx.TimeoutException: If the request takes longer than Client.timeout.
-
-    Returns:
-        None | Problem
-    """
-
-    return (
-        await asyncio_detailed(
-            cloud_id=cloud_id,
-            client=client,
-        )
-    ).parsed

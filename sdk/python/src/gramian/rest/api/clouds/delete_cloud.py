@@ -49,16 +49,6 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
 
         return response_500
 
-    if response.status_code == 503:
-        response_503 = Problem.from_dict(response.json())
-
-        return response_503
-
-    if response.status_code == 504:
-        response_504 = Problem.from_dict(response.json())
-
-        return response_504
-
     if client.raise_on_unexpected_status:
         raise errors.UnexpectedStatus(response.status_code, response.content)
     else:
@@ -84,7 +74,8 @@ def sync_detailed(
      Forgets the points and everything that was computed from them.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -115,7 +106,8 @@ def sync(
      Forgets the points and everything that was computed from them.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -141,7 +133,8 @@ async def asyncio_detailed(
      Forgets the points and everything that was computed from them.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -170,7 +163,8 @@ async def asyncio(
      Forgets the points and everything that was computed from them.
 
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -89,8 +89,13 @@ def sync_detailed(
 ) -> Response[None | Cloud | Problem]:
     """Describe a cloud
 
+     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
+    None-Match` save the
+    body; asking keeps the cloud from being dropped as the least recently used.
+
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -118,8 +123,13 @@ def sync(
 ) -> None | Cloud | Problem:
     """Describe a cloud
 
+     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
+    None-Match` save the
+    body; asking keeps the cloud from being dropped as the least recently used.
+
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -142,8 +152,13 @@ async def asyncio_detailed(
 ) -> Response[None | Cloud | Problem]:
     """Describe a cloud
 
+     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
+    None-Match` save the
+    body; asking keeps the cloud from being dropped as the least recently used.
+
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -169,8 +184,13 @@ async def asyncio(
 ) -> None | Cloud | Problem:
     """Describe a cloud
 
+     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
+    None-Match` save the
+    body; asking keeps the cloud from being dropped as the least recently used.
+
     Args:
-        cloud_id (str):
+        cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
+            the normals if given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
