@@ -1,4 +1,5 @@
-//! Links: what can be asked next of a cloud that an answer names.
+//! Links: what can be asked next of a cloud that an answer names. A link holds for every answer that has it, so the next
+//! page of a list is none.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +26,6 @@ const IN_BODY: [&str; 8] = [
     "compute_laplace_beltrami",
     "assemble_laplace_beltrami_matrix",
 ];
-const NEXT_PAGE: &str = "next_page";
 const CLOUD_USED: &str = "get_cloud_used";
 
 /// Declares the links and refers to them from the answers that they start from.
@@ -33,7 +33,6 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
     for operation in operations(document) {
         let links: Vec<&str> = match id_of(operation) {
             "create_cloud" => ON_PATH.into_iter().chain(IN_BODY).collect(),
-            "list_clouds" => vec![NEXT_PAGE],
             id if IN_BODY.contains(&id) => vec![CLOUD_USED],
             _ => continue,
         };
@@ -58,8 +57,6 @@ fn components() -> BTreeMap<String, RefOr<Link>> {
     links.extend(IN_BODY.map(|id| (id.to_owned(), in_body(id))));
     let used = link("get_cloud", "The cloud that the request named or registered.");
     links.insert(CLOUD_USED.to_owned(), used.parameter("cloud_id", CLOUD_ID_USED).build());
-    let next = link("list_clouds", "The next page; there is none without `next`.");
-    links.insert(NEXT_PAGE.to_owned(), next.parameter("cursor", "$response.body#/next").build());
     links.into_iter().map(|(name, link)| (name, RefOr::T(link))).collect()
 }
 
