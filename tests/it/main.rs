@@ -4,6 +4,7 @@ mod access;
 mod bodies;
 mod cache;
 mod clouds;
+mod compatibility;
 mod contract;
 mod examples;
 mod fits;
