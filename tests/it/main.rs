@@ -6,6 +6,7 @@ mod cache;
 mod clouds;
 mod compatibility;
 mod contract;
+mod docs;
 mod examples;
 mod fits;
 mod golden;
