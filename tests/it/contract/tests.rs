@@ -137,6 +137,10 @@ async fn what_the_document_does_not_have_is_refused_as_such() {
     let method = Case::of("PUT", "/v1/clouds", &json!({})).await;
     method.finds("status 404 instead of 405", |answer| answer.status = 404);
     method.finds("Allow", |answer| set(answer, "allow", "GET, HEAD"));
+    let mut preflight = Case::of("OPTIONS", PATH, &json!({})).await;
+    preflight.finds("status 200 instead of 405", |answer| answer.status = 200);
+    set(&mut preflight.answer, "access-control-allow-methods", "POST");
+    preflight.finds("a body, and none is declared", |answer| answer.status = 200);
     for path in BESIDE {
         assert!(is_beside(path));
     }
