@@ -2,8 +2,8 @@
 //!
 //! A change is breaking if a client that keeps to the released document, or code generated from it, would have to be changed.
 //! Requests and answers are mirror images: what a request may hold must not shrink, what an answer may hold must not grow, but
-//! for new members of objects, which clients pass over. What the rules do not know counts as breaking, so a keyword that the
-//! document begins to use is noticed here.
+//! for new members of objects, which clients pass over. A change of a keyword that the rules for schemas do not know counts
+//! as breaking, so what the document begins to use is noticed here.
 //!
 //! The crate `drift` 0.2.0 was tried first, on the document in its OpenAPI 3.0 form, with the mutations of `tests.rs`. It reports
 //! every change of members, required members, enumerations and bounds, in requests and in answers, as the same "unhandled": a

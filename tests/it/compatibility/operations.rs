@@ -50,10 +50,9 @@ impl Comparison<'_> {
 
     /// Whoever was let in still is.
     fn compare_security(&mut self, pointer: &str, old: &Value, new: &Value) {
-        let alternatives = |operation: &Value| operation["security"].as_array().cloned().unwrap_or_default();
-        let new = alternatives(new);
-        for alternative in alternatives(old).iter().filter(|alternative| !new.contains(alternative)) {
-            self.report(&below(pointer, "security"), format!("{alternative} is not enough any more"));
+        let (old, new) = (ways_in(self.released, old), ways_in(self.current, new));
+        for way in old.iter().filter(|way| !new.contains(way)) {
+            self.report(&below(pointer, "security"), format!("{way} is not enough any more"));
         }
     }
 
@@ -146,6 +145,12 @@ impl Comparison<'_> {
             }
         }
     }
+}
+
+/// The alternatives of an operation's security, its own or the document's; none declared is one that everyone has.
+fn ways_in(document: &Value, operation: &Value) -> Vec<Value> {
+    let declared = operation["security"].as_array().or(document["security"].as_array());
+    declared.cloned().unwrap_or_else(|| vec![serde_json::json!({})])
 }
 
 /// What a response or header refers to, or itself.

@@ -67,6 +67,9 @@ fn operations_stay_with_their_names() {
     assert_eq!(set(OPERATION, "operationId", json!("curvatures")), [format!("{OPERATION}/operationId")]);
     assert_eq!(set(OPERATION, "tags", json!(["curves"])), [format!("{OPERATION}/tags")]);
     assert_eq!(set(OPERATION, "security", json!([{"bearer": []}])), [format!("{OPERATION}/security")]);
+    let live = "/paths/~1health~1live/get";
+    assert_eq!(remove(live, "security"), NOTHING);
+    assert_eq!(set(live, "security", json!([{"bearer": []}])), [format!("{live}/security")]);
     let spacing = "#/components/schemas/Spacing";
     let renamed = broken(|document| {
         *document =
