@@ -86,27 +86,38 @@ fn rewritten(lines: &[&str], blocks: &[Block]) -> String {
     text + &lines[done..].join("\n") + "\n"
 }
 
-/// JSON with each value on one line if it fits, else with its entries on lines of their own. `column` is where it begins.
+/// JSON with each value on one line if it fits, else with its entries below. `column` is where it begins.
 fn laid_out(value: &Value, indent: usize, column: usize) -> String {
     let flat = on_one_line(value);
     if column + flat.chars().count() < WIDTH {
         return flat;
     }
     let inner = indent + 2;
-    let entries: Vec<_> = match value {
-        Value::Array(items) => items.iter().map(|item| laid_out(item, inner, inner)).collect(),
+    let (open, lines, close) = match value {
+        Value::Array(items) => ('[', filled(items, inner), ']'),
         Value::Object(members) => {
             let member = |(name, value): (&String, &Value)| {
                 let name = format!("\"{name}\": ");
                 format!("{name}{}", laid_out(value, inner, inner + name.len()))
             };
-            members.iter().map(member).collect()
+            ('{', members.iter().map(member).collect(), '}')
         }
         _ => return flat,
     };
-    let (open, close) = if value.is_array() { ('[', ']') } else { ('{', '}') };
     let (outer, inner) = (" ".repeat(indent), " ".repeat(inner));
-    format!("{open}\n{inner}{}\n{outer}{close}", entries.join(&format!(",\n{inner}")))
+    format!("{open}\n{inner}{}\n{outer}{close}", lines.join(&format!(",\n{inner}")))
+}
+
+/// The items of an array, as many on a line as fit.
+fn filled(items: &[Value], indent: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for item in items.iter().map(|item| laid_out(item, indent, indent)) {
+        match lines.last_mut() {
+            Some(line) if indent + line.len() + item.len() + 3 < WIDTH => *line += &format!(", {item}"),
+            _ => lines.push(item),
+        }
+    }
+    lines
 }
 
 fn on_one_line(value: &Value) -> String {
