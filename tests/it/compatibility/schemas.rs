@@ -46,8 +46,7 @@ impl Comparison<'_> {
         self.compare_parts(direction, pointer, old, new);
         self.compare_bounds(direction, pointer, old, new);
         self.compare_other_keywords(direction, pointer, old, new);
-        let items = below(pointer, "items");
-        self.compare_schema_or_nothing(direction, &items, old.get("items"), new.get("items"));
+        self.compare_items(direction, pointer, old, new);
     }
 
     fn compare_types(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
@@ -154,19 +153,15 @@ impl Comparison<'_> {
         }
     }
 
-    /// No schema admits anything.
-    fn compare_schema_or_nothing(
-        &mut self,
-        direction: Direction,
-        pointer: &str,
-        old: Option<&Value>,
-        new: Option<&Value>,
-    ) {
-        let anything = Value::Bool(true);
-        match (old, new) {
-            (None, None) => {}
-            _ => self.compare_schema(direction, pointer, old.unwrap_or(&anything), new.unwrap_or(&anything)),
+    /// Without a schema of its own an item may be anything.
+    fn compare_items(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
+        let (old, new) = (old.get("items"), new.get("items"));
+        if old.is_none() && new.is_none() {
+            return;
         }
+        let anything = Value::Bool(true);
+        let (old, new) = (old.unwrap_or(&anything), new.unwrap_or(&anything));
+        self.compare_schema(direction, &below(pointer, "items"), old, new);
     }
 }
 
