@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use gramian::http::slug::Slug;
 use serde_json::Value;
 
+use crate::support::overwrites;
+
 const PAGE: &str = "docs/api.md";
 /// Columns that a line of an example may have.
 const WIDTH: usize = 125;
@@ -48,7 +50,7 @@ fn marked(line: &str, number: usize) -> Value {
     let whole: Value = serde_json::from_str(&text).unwrap();
     let mut part = whole.pointer(pointer).unwrap_or_else(|| panic!("no {pointer} in {file}")).clone();
     for name in left_out.split(", ").filter(|name| !name.is_empty()) {
-        let removed = part.as_object_mut().and_then(|members| members.remove(name));
+        let removed = part.as_object_mut().and_then(|members| members.shift_remove(name));
         assert!(removed.is_some(), "{PAGE}:{number}: {file} has no {name} to leave out");
     }
     part
@@ -60,7 +62,7 @@ fn examples_are_those_of_the_document() {
     let lines: Vec<_> = page.lines().collect();
     let blocks = blocks(&lines);
     assert!(blocks.len() >= 10);
-    if std::env::var("EXPECTORATE").is_ok_and(|value| value == "overwrite") {
+    if overwrites() {
         std::fs::write(at_root(PAGE), rewritten(&lines, &blocks)).unwrap();
         return;
     }
