@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::schemas::Direction;
+use super::schemas::{Direction, followed};
 use super::{Comparison, below, members};
 
 const METHODS: [&str; 8] = ["get", "put", "post", "delete", "options", "head", "patch", "trace"];
@@ -112,10 +112,11 @@ impl Comparison<'_> {
     }
 
     fn compare_response(&mut self, pointer: &str, old: &Value, new: &Value) {
-        let (old, new) = (resolve(self.released, old), resolve(self.current, new));
-        self.compare_content(Direction::Answer, pointer, old, new);
+        let ((pointer, old), (_, new)) =
+            (followed(self.released, pointer, old), followed(self.current, pointer, new));
+        self.compare_content(Direction::Answer, &pointer, old, new);
         for (name, old) in members(&old["headers"]) {
-            let pointer = below(&below(pointer, "headers"), name);
+            let pointer = below(&below(&pointer, "headers"), name);
             let is_same = |(found, _): &(&String, &Value)| found.eq_ignore_ascii_case(name);
             match members(&new["headers"]).find(is_same) {
                 Some((_, new)) => self.compare_header(&pointer, old, new),
@@ -125,11 +126,12 @@ impl Comparison<'_> {
     }
 
     fn compare_header(&mut self, pointer: &str, old: &Value, new: &Value) {
-        let (old, new) = (resolve(self.released, old), resolve(self.current, new));
+        let ((pointer, old), (_, new)) =
+            (followed(self.released, pointer, old), followed(self.current, pointer, new));
         if old["required"] == true && new["required"] != true {
-            self.report(pointer, "the header became optional");
+            self.report(&pointer, "the header became optional");
         }
-        self.compare_schema(Direction::Answer, &below(pointer, "schema"), &old["schema"], &new["schema"]);
+        self.compare_schema(Direction::Answer, &below(&pointer, "schema"), &old["schema"], &new["schema"]);
     }
 
     /// Media types may come, since clients ask for them.
@@ -151,10 +153,4 @@ impl Comparison<'_> {
 fn ways_in(document: &Value, operation: &Value) -> Vec<Value> {
     let declared = operation["security"].as_array().or(document["security"].as_array());
     declared.cloned().unwrap_or_else(|| vec![serde_json::json!({})])
-}
-
-/// What a response or header refers to, or itself.
-fn resolve<'a>(document: &'a Value, value: &'a Value) -> &'a Value {
-    let target = value["$ref"].as_str().and_then(|target| target.strip_prefix('#'));
-    target.and_then(|target| document.pointer(target)).unwrap_or(value)
 }

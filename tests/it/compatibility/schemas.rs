@@ -191,10 +191,10 @@ fn types(schema: &Value) -> BTreeSet<String> {
     one_or_many.iter().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
-/// A schema, or what it refers to, with its place.
-fn followed<'a>(document: &'a Value, pointer: &str, schema: &'a Value) -> (String, &'a Value) {
-    let Some(target) = schema["$ref"].as_str().and_then(|target| target.strip_prefix('#')) else {
-        return (pointer.to_owned(), schema);
+/// What a reference refers to, or the value itself, with its place.
+pub fn followed<'a>(document: &'a Value, pointer: &str, value: &'a Value) -> (String, &'a Value) {
+    let Some(target) = value["$ref"].as_str().and_then(|target| target.strip_prefix('#')) else {
+        return (pointer.to_owned(), value);
     };
     (target.to_owned(), document.pointer(target).unwrap_or(&Value::Null))
 }

@@ -44,6 +44,16 @@ fn take(pointer: &str, value: &str) -> Vec<String> {
     broken(|document| at(document, pointer).as_array_mut().unwrap().retain(|item| item != value))
 }
 
+/// The pointers of what is broken where a value was released as one and is now another.
+fn became(pointer: &str, released: Value, current: Value) -> Vec<String> {
+    let [released, current] = [released, current].map(|value| {
+        let mut document = document();
+        *at(&mut document, pointer) = value;
+        document
+    });
+    breaking_changes(&released, &current).into_iter().map(|change| change.pointer).collect()
+}
+
 fn property(schema: &str, name: &str) -> String {
     format!("{schema}/properties/{name}")
 }
@@ -130,14 +140,16 @@ fn statuses_media_types_and_headers_stay() {
 
 #[test]
 fn a_header_that_was_promised_is_required() {
-    let mut released = document();
     let header = "/paths/~1v1~1clouds/post/responses/201/headers/Location";
-    at(&mut released, header)["required"] = json!(true);
-    let mut current = released.clone();
-    at(&mut current, header)["required"] = json!(false);
-    let changes = breaking_changes(&released, &current);
-    assert_eq!(changes.iter().map(|change| change.pointer.as_str()).collect::<Vec<_>>(), [header]);
-    assert!(breaking_changes(&current, &released).is_empty());
+    let always = || json!({"required": true, "schema": {"type": "string"}});
+    let sometimes = || json!({"schema": {"type": "string"}});
+    assert_eq!(became(header, always(), sometimes()), [header]);
+    assert_eq!(became(header, sometimes(), always()), NOTHING);
+    let number = json!({"schema": {"type": "integer"}});
+    assert_eq!(became(header, sometimes(), number), [format!("{header}/schema/type")]);
+    // A component is named once, however many answers have it.
+    let shared = "/components/headers/X-Request-Id/schema";
+    assert_eq!(set(shared, "type", json!("integer")), [format!("{shared}/type")]);
 }
 
 #[test]
@@ -173,21 +185,37 @@ fn members_of_requests_stay_and_stay_optional() {
     assert_eq!(push(&required, json!("surface")), [property(REQUEST, "surface")]);
     assert_eq!(take(&required, "cloud"), NOTHING);
     assert_eq!(set(&properties, "radius", json!({"type": "number"})), NOTHING);
-    let nu = property("/components/schemas/Kernel", "nu");
-    for (keyword, stricter, looser) in [("maximum", 3.5, 99.5), ("minimum", 1.5, 0.0)] {
-        assert_eq!(set(&nu, keyword, json!(stricter)), [format!("{nu}/{keyword}")]);
-        assert_eq!(set(&nu, keyword, json!(looser)), NOTHING);
-        assert_eq!(remove(&nu, keyword), NOTHING);
-    }
-    assert_eq!(set(&nu, "multipleOf", json!(0.5)), [format!("{nu}/multipleOf")]);
-    assert_eq!(set(&nu, "default", json!(1.5)), [format!("{nu}/default")]);
-    assert_eq!(set(&nu, "type", json!("integer")), [format!("{nu}/type")]);
-    assert_eq!(set(&nu, "type", json!(["number", "string"])), NOTHING);
-    assert_eq!(set(&nu, "enum", json!([0.5, 1.5])), [format!("{nu}/enum")]);
     let surfaces = "/components/schemas/SurfaceChoice/enum";
     assert_eq!(take(surfaces, "offset"), [surfaces]);
     assert_eq!(push(surfaces, json!("plane")), NOTHING);
     assert_eq!(remove(REQUEST, "additionalProperties"), NOTHING);
+}
+
+#[test]
+fn a_value_of_a_request_is_still_accepted() {
+    let nu = property("/components/schemas/Kernel", "nu");
+    let number = |keyword: &str, value: Value| json!({"type": "number", keyword: value});
+    for (keyword, released, stricter) in
+        [("maximum", 8.5, 3.5), ("minimum", 0.5, 1.5), ("multipleOf", 0.5, 1.0)]
+    {
+        let [released, stricter] = [released, stricter].map(|value| number(keyword, json!(value)));
+        assert_eq!(became(&nu, released.clone(), stricter), [format!("{nu}/{keyword}")]);
+        assert_eq!(became(&nu, json!({"type": "number"}), released.clone()), [format!("{nu}/{keyword}")]);
+        assert_eq!(became(&nu, released, json!({"type": "number"})), NOTHING);
+    }
+    assert_eq!(became(&nu, number("maximum", json!(8.5)), number("maximum", json!(9.5))), NOTHING);
+    for (released, current) in [("number", "integer"), ("number", "string"), ("integer", "boolean")] {
+        let found = became(&nu, json!({"type": released}), json!({"type": current}));
+        assert_eq!(found, [format!("{nu}/type")], "{released} {current}");
+    }
+    assert_eq!(became(&nu, json!({"type": "integer"}), json!({"type": "number"})), NOTHING);
+    assert_eq!(became(&nu, json!({"type": "number"}), json!({"type": ["number", "string"]})), NOTHING);
+    assert_eq!(became(&nu, json!({}), json!({"enum": [0.5, 1.5]})), [format!("{nu}/enum")]);
+    assert_eq!(became(&nu, json!({"enum": [0.5, 1.5]}), json!({})), NOTHING);
+    // What the absence of a member means is part of its meaning.
+    let defaults = [2.5, 1.5].map(|value| number("default", json!(value)));
+    let [released, current] = defaults;
+    assert_eq!(became(&nu, released, current), [format!("{nu}/default")]);
 }
 
 /// A component of both directions may neither grow nor shrink.
