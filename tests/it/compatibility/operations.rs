@@ -57,9 +57,8 @@ impl Comparison<'_> {
     }
 
     fn compare_parameters(&mut self, pointer: &str, old: &Value, new: &Value) {
-        let parameters = |operation: &Value| operation["parameters"].as_array().cloned().unwrap_or_default();
         let is_same = |a: &Value, b: &Value| a["name"] == b["name"] && a["in"] == b["in"];
-        let (old, new) = (parameters(old), parameters(new));
+        let (old, new) = (parameters(self.released, old), parameters(self.current, new));
         let pointer = below(pointer, "parameters");
         for (index, old) in old.iter().enumerate() {
             let pointer = below(&pointer, &index.to_string());
@@ -85,8 +84,9 @@ impl Comparison<'_> {
     }
 
     fn compare_request_body(&mut self, pointer: &str, old: &Value, new: &Value) {
-        let (old, new) = (&old["requestBody"], &new["requestBody"]);
         let pointer = below(pointer, "requestBody");
+        let (pointer, old) = followed(self.released, &pointer, &old["requestBody"]);
+        let (_, new) = followed(self.current, &pointer, &new["requestBody"]);
         if new["required"] == true && old["required"] != true {
             self.report(&pointer, "a body became required");
         }
@@ -147,6 +147,12 @@ impl Comparison<'_> {
             }
         }
     }
+}
+
+/// The parameters of an operation, references followed.
+fn parameters(document: &Value, operation: &Value) -> Vec<Value> {
+    let listed = operation["parameters"].as_array().into_iter().flatten();
+    listed.map(|parameter| followed(document, "", parameter).1.clone()).collect()
 }
 
 /// The alternatives of an operation's security, its own or the document's; none declared is one that everyone has.

@@ -128,6 +128,9 @@ fn statuses_media_types_and_headers_stay() {
         assert_eq!(removed, [format!("{content}/application~1x-safetensors")]);
         assert_eq!(set(&content, "text/csv", json!({})), NOTHING);
     }
+    let body = format!("{OPERATION}/requestBody");
+    assert_eq!(became(&format!("{body}/required"), json!(false), json!(true)), [body.as_str()]);
+    assert_eq!(became(&format!("{body}/required"), json!(true), json!(false)), NOTHING);
     let created = "/paths/~1v1~1clouds/post/responses/201/headers";
     assert_eq!(remove(created, "Location"), [format!("{created}/Location")]);
     let renamed = broken(|document| {
