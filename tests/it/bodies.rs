@@ -1,55 +1,37 @@
 //! Bodies in and out: JSON, safetensors and npy, compressed or not, at once or streamed.
 
 use std::collections::HashMap;
-use std::io::{Read, Write};
+use std::io::Write;
 
-use reqwest::header::HeaderMap;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
+use crate::contract::{Received, decompressed};
 use crate::routes::{ROUTES, Route, route_of};
-use crate::support::{Server, fibonacci_sphere, numbers};
+use crate::support::{Server, fibonacci_sphere, numbers, receive};
 
 const JSON: &str = "application/json";
 const SAFETENSORS: &str = "application/x-safetensors";
 const NPY: &str = "application/x-npy";
-
-struct Binary {
-    status: u16,
-    headers: HeaderMap,
-    bytes: Vec<u8>,
-}
-
-impl Binary {
-    fn header(&self, name: &str) -> &str {
-        self.headers.get(name).map_or("", |value| value.to_str().unwrap())
-    }
-
-    fn text(&self) -> &str {
-        str::from_utf8(&self.bytes).unwrap()
-    }
-}
 
 async fn post(
     server: &Server,
     path: &str,
     headers: &[(&str, &str)],
     body: impl Into<reqwest::Body>,
-) -> Binary {
+) -> Received {
     let mut request = server.client.post(server.url(path)).body(body);
     for (name, value) in headers {
         request = request.header(*name, *value);
     }
-    let response = request.send().await.unwrap();
-    let (status, headers) = (response.status().as_u16(), response.headers().clone());
-    Binary { status, headers, bytes: response.bytes().await.unwrap().to_vec() }
+    receive(request).await
 }
 
 /// What a JSON request is answered, in a format.
-async fn ask(server: &Server, path: &str, body: &Value, accept: &str) -> Binary {
+async fn ask(server: &Server, path: &str, body: &Value, accept: &str) -> Received {
     let headers = [("content-type", JSON), ("accept", accept)];
     let answer = post(server, path, &headers, body.to_string()).await;
     assert_eq!(answer.status, 200, "{path}: {}", String::from_utf8_lossy(&answer.bytes));
@@ -226,18 +208,6 @@ fn compressed(coding: &str, bytes: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(bytes).unwrap();
     encoder.finish().unwrap()
-}
-
-fn decompressed(coding: &str, bytes: &[u8]) -> Vec<u8> {
-    if coding == "zstd" {
-        return zstd::decode_all(bytes).unwrap();
-    }
-    let mut plain = Vec::new();
-    // One member, as browsers read no others.
-    let mut decoder = flate2::bufread::GzDecoder::new(bytes);
-    decoder.read_to_end(&mut plain).unwrap();
-    assert!(decoder.into_inner().is_empty());
-    plain
 }
 
 #[tokio::test]

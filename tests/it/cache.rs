@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use crate::support::{Server, fibonacci_sphere};
+use crate::support::{Server, fibonacci_sphere, receive};
 
 fn interpolation(n: usize, queries: &[[f64; 3]]) -> Value {
     let points = fibonacci_sphere(n);
@@ -91,9 +91,9 @@ fn spawn_request(server: &Server, body: &str) -> tokio::task::JoinHandle<String>
     let request = server.client.post(server.url("/v1/interpolation"));
     let request = request.header("content-type", "application/json").body(body.to_owned());
     tokio::spawn(async move {
-        let response = request.send().await.unwrap();
-        assert_eq!(response.status(), 200);
-        response.headers()["cache-status"].to_str().unwrap().to_owned()
+        let answer = receive(request).await;
+        assert_eq!(answer.status, 200);
+        answer.header("cache-status").to_owned()
     })
 }
 

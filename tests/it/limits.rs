@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
+use crate::contract::{self, Received};
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Server, fibonacci_sphere};
 
@@ -49,10 +50,12 @@ async fn bodies_beyond_the_limit_are_refused_when_streamed() {
     stream.write_all(b"0\r\n\r\n").await.unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).await.unwrap();
-    assert!(answer.starts_with("HTTP/1.1 413 "), "{answer}");
-    let document: Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap();
-    assert_eq!((&document["type"], &document["limit"]), (&json!("/problems/body-too-large"), &json!(4000)));
+    let answer = Received::parse(&answer);
     let route = route_of("/v1/interpolation");
+    contract::check("POST", route.path, &answer);
+    let document = answer.json().unwrap();
+    assert_eq!((answer.status, &document["limit"]), (413, &json!(4000)));
+    assert_eq!(document["type"], "/problems/body-too-large");
     server.post(route.path, &route.request()).await.expect_ok();
 }
 

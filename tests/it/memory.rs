@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::process::Process;
-use crate::support::fibonacci_sphere;
+use crate::support::{fibonacci_sphere, receive};
 
 fn request(n: usize) -> Value {
     let points = fibonacci_sphere(n);
@@ -25,8 +25,8 @@ async fn peak(path: &str, request: &Value) -> f64 {
     // Every thread has buffers of its own.
     let server = Process::start(&["--threads", "2"]);
     let idle = server.peak_resident_bytes();
-    let response = reqwest::Client::new().post(server.url(path)).json(request).send().await.unwrap();
-    assert_eq!(response.status(), 200);
+    let answer = receive(reqwest::Client::new().post(server.url(path)).json(request)).await;
+    assert_eq!(answer.status, 200);
     (server.peak_resident_bytes() - idle) as f64
 }
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::support::fibonacci_sphere;
+use crate::support::{fibonacci_sphere, receive};
 
 /// The binary, serving on a port of its own; killed when dropped.
 pub struct Process {
@@ -92,15 +92,15 @@ impl Drop for Process {
 }
 
 async fn get(process: &Process, path: &str) -> (u16, Value) {
-    let response = reqwest::get(process.url(path)).await.unwrap();
-    (response.status().as_u16(), response.json().await.unwrap())
+    let answer = receive(reqwest::Client::new().get(process.url(path))).await;
+    (answer.status, answer.json().unwrap())
 }
 
 fn spawn_post(process: &Process, path: &str, body: &Value) -> tokio::task::JoinHandle<(u16, Value)> {
     let request = reqwest::Client::new().post(process.url(path)).json(body);
     tokio::spawn(async move {
-        let response = request.send().await.unwrap();
-        (response.status().as_u16(), response.json().await.unwrap())
+        let answer = receive(request).await;
+        (answer.status, answer.json().unwrap())
     })
 }
 
@@ -181,7 +181,7 @@ async fn the_log_names_requests_and_never_shows_what_they_carry() {
     for (body, id, status) in [(body, "good-1", 200), (bad, "bad-1", 422), (twins, "twins-1", 422)] {
         let request = reqwest::Client::new().post(process.url("/v1/curvatures?q=0.123456789")).json(&body);
         let request = request.header("x-request-id", id).bearer_auth("secret-key");
-        assert_eq!(request.send().await.unwrap().status(), status);
+        assert_eq!(receive(request).await.status, status);
     }
     process.terminate();
     let lines = process.finish().1;
@@ -237,10 +237,9 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
         assert_eq!(get(&process, "/v1/kernels").await.0, 401);
         let request = reqwest::Client::new().post(process.url("/v1/curvatures")).bearer_auth("two");
         let request = request.header("origin", "https://one.example").json(&curvatures(6));
-        let response = request.send().await.unwrap();
-        assert_eq!(response.headers()["access-control-allow-origin"], "https://one.example");
-        assert_eq!(response.status(), 413);
-        assert_eq!(response.json::<Value>().await.unwrap()["limit"], 5);
+        let answer = receive(request).await;
+        assert_eq!(answer.header("access-control-allow-origin"), "https://one.example");
+        assert_eq!((answer.status, &answer.json().unwrap()["limit"]), (413, &json!(5)));
     }
 }
 

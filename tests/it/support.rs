@@ -10,6 +10,8 @@ use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 
+use crate::contract::{self, Received};
+
 /// A server on a port of its own, in this process; it drains when dropped.
 pub struct Server {
     pub address: SocketAddr,
@@ -85,12 +87,8 @@ impl Server {
     }
 
     pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
-        let response = request.send().await.unwrap();
-        Answer {
-            status: response.status().as_u16(),
-            headers: response.headers().clone(),
-            text: response.text().await.unwrap(),
-        }
+        let Received { status, headers, bytes } = receive(request).await;
+        Answer { status, headers, text: String::from_utf8_lossy(&bytes).into_owned() }
     }
 
     pub async fn get(&self, path: &str) -> Answer {
@@ -106,6 +104,18 @@ impl Server {
         let request = self.client.post(self.url(path)).header("content-type", "application/json");
         self.send(request.body(body)).await
     }
+}
+
+/// Sends a request, reads its answer to the end, and checks that the document promises it.
+pub async fn receive(request: reqwest::RequestBuilder) -> Received {
+    let (client, request) = request.build_split();
+    let request = request.unwrap();
+    let (method, path) = (request.method().to_string(), request.url().path().to_owned());
+    let response = client.execute(request).await.unwrap();
+    let (status, headers) = (response.status().as_u16(), response.headers().clone());
+    let received = Received { status, headers, bytes: response.bytes().await.unwrap().to_vec() };
+    contract::check(&method, &path, &received);
+    received
 }
 
 /// n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i.

@@ -1,0 +1,81 @@
+//! What was released stays: the document of today against the documents in openapi/released.
+//!
+//! A change is breaking if a client that keeps to the released document, or code generated from it, would have to be changed.
+//! Requests and answers are mirror images: what a request may hold must not shrink, what an answer may hold must not grow, but
+//! for new members of objects, which clients pass over. A change of a keyword that the rules for schemas do not know counts
+//! as breaking, so what the document begins to use is noticed here.
+//!
+//! The crate `drift` 0.2.0 was tried first, on the document in its OpenAPI 3.0 form, with the mutations of `tests.rs`. It reports
+//! every change of members, required members, enumerations and bounds, in requests and in answers, as the same "unhandled": a
+//! member added to an answer looks like one removed. It does not see operation ids, headers and values that become null, and
+//! it panics when a media type is added or removed. So the rules are our own, and they read OpenAPI 3.1 as it is.
+
+mod operations;
+mod schemas;
+mod tests;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+const REMEDY: &str = "Clients depend on these. Either do not change them, or serve the changed operation under a new version \
+                      of its path beside the old one (docs/api.md, Versions).";
+
+/// A breaking change: where it is in the released document, and what it is.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Change {
+    pointer: String,
+    what: String,
+}
+
+/// Two documents, and what was found between them.
+struct Comparison<'a> {
+    released: &'a Value,
+    current: &'a Value,
+    changes: BTreeSet<Change>,
+    /// References that were compared already, with the direction: they may be cyclic.
+    compared: BTreeSet<(schemas::Direction, String, String)>,
+}
+
+/// Everything that breaks clients of `released` when `current` is served.
+fn breaking_changes(released: &Value, current: &Value) -> BTreeSet<Change> {
+    let mut comparison =
+        Comparison { released, current, changes: BTreeSet::new(), compared: BTreeSet::new() };
+    comparison.compare_paths();
+    comparison.compare_component_names();
+    comparison.changes
+}
+
+impl Comparison<'_> {
+    fn report(&mut self, pointer: &str, what: impl Into<String>) {
+        self.changes.insert(Change { pointer: pointer.to_owned(), what: what.into() });
+    }
+}
+
+/// The members of an object; none of anything else.
+fn members(value: &Value) -> impl Iterator<Item = (&String, &Value)> {
+    value.as_object().into_iter().flat_map(Map::iter)
+}
+
+/// A pointer one step further, by RFC 6901.
+fn below(pointer: &str, name: &str) -> String {
+    format!("{pointer}/{}", name.replace('~', "~0").replace('/', "~1"))
+}
+
+#[test]
+fn what_was_released_is_still_served() {
+    let current: Value = serde_json::from_str(&gramian::http::openapi_json()).unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi/released");
+    let mut n_released = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let released: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        let changes = breaking_changes(&released, &current);
+        let list: Vec<_> =
+            changes.iter().map(|change| format!("{}: {}", change.pointer, change.what)).collect();
+        assert!(list.is_empty(), "breaking since {}:\n- {}\n{REMEDY}", path.display(), list.join("\n- "));
+        n_released += 1;
+    }
+    assert!(n_released > 0);
+}

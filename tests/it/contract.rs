@@ -1,0 +1,176 @@
+//! The document as a contract: every answer that a test receives is checked against it.
+//!
+//! `support::receive` calls [`check`] for every request, so no test can forget it. An answer is right if the document has its
+//! path, method and status; if its media type is declared and its body is of the declared form, with no member that the
+//! document does not name; if the headers are there that must be, and no others. Two kinds of answers have no operation of
+//! their own: what is served beside the interface ([`BESIDE`]), and refusals of paths and methods that it does not have, which
+//! are problems.
+
+mod answer;
+mod closed;
+mod document;
+mod tests;
+
+use std::sync::LazyLock;
+
+use gramian::http::slug::Slug;
+use serde_json::{Value, json};
+
+pub use answer::{Received, decompressed};
+use document::{Contract, Operation, Response, Served};
+
+/// Paths beside the interface, and all below them: pages for people, and the documents themselves.
+const BESIDE: [&str; 4] = ["/", "/docs", "/openapi.json", "/openapi-3.0.json"];
+
+/// Headers that HTTP, its compression and CORS bring along with any answer. All others belong to the interface.
+const OF_HTTP: [&str; 7] =
+    ["content-type", "content-length", "content-encoding", "transfer-encoding", "connection", "date", "vary"];
+
+/// Panics if the document does not promise this answer.
+pub fn check(method: &str, path: &str, answer: &Received) {
+    static CONTRACT: LazyLock<Contract> = LazyLock::new(|| {
+        let document = serde_json::from_str(&gramian::http::openapi_json()).unwrap();
+        Contract::new(&document)
+    });
+    let mismatches = CONTRACT.mismatches(method, path, answer);
+    assert!(
+        mismatches.is_empty(),
+        "{method} {path} is answered against the document:\n- {}\n{:?}\n{:.2000}",
+        mismatches.join("\n- "),
+        answer.headers,
+        String::from_utf8_lossy(&answer.bytes)
+    );
+}
+
+impl Contract {
+    /// What the document does not promise of an answer; empty if all is well.
+    pub fn mismatches(&self, method: &str, path: &str, answer: &Received) -> Vec<String> {
+        let mut found = match self.find(method, path) {
+            Served::By(operation) => of_operation(operation, method, answer),
+            Served::OtherMethods(allowed) => of_undeclared_method(&allowed, method, answer),
+            Served::Nowhere if is_beside(path) => vec![],
+            Served::Nowhere => expect_status(404, "the document has no such path", answer),
+        };
+        if answer.status >= 400 {
+            found.extend(self.of_problem(method, answer));
+        }
+        if answer.header("x-request-id").is_empty() {
+            found.push("no x-request-id".to_owned());
+        }
+        found
+    }
+
+    /// A problem has the same form wherever it comes from, and a type with its status.
+    fn of_problem(&self, method: &str, answer: &Received) -> Vec<String> {
+        if method == "HEAD" {
+            return no_body(answer);
+        }
+        let Some(problem) = answer.json().filter(|_| answer.media_type() == "application/problem+json")
+        else {
+            return vec![format!("{} is no problem document", answer.status)];
+        };
+        let mut found = violations("problem", &self.problem, &problem);
+        let slug = problem["type"].as_str().and_then(|kind| Slug::parse(kind.strip_prefix("/problems/")?));
+        if slug.is_none_or(|slug| slug.status().as_u16() != answer.status) {
+            found.push(format!("type {} has another status than {}", problem["type"], answer.status));
+        }
+        if problem["status"] != json!(answer.status) || problem["instance"] != answer.header("x-request-id") {
+            found.push("status and instance of the problem are not those of the answer".to_owned());
+        }
+        found
+    }
+}
+
+fn is_beside(path: &str) -> bool {
+    BESIDE.iter().any(|known| {
+        path == *known || *known != "/" && path.strip_prefix(known).is_some_and(|rest| rest.starts_with('/'))
+    })
+}
+
+fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<String> {
+    let Some(response) = operation.get(&answer.status.to_string()) else {
+        let declared: Vec<_> = operation.keys().map(String::as_str).collect();
+        return vec![format!("status {}, declared are {}", answer.status, declared.join(", "))];
+    };
+    let mut found = of_headers(response, answer);
+    found.extend(if method == "HEAD" { no_body(answer) } else { of_body(response, answer) });
+    found
+}
+
+/// A method that the path does not have: the preflight of a browser where origins are configured, else 405 with those it has.
+fn of_undeclared_method(allowed: &[String], method: &str, answer: &Received) -> Vec<String> {
+    if method == "OPTIONS" && !answer.header("access-control-allow-methods").is_empty() {
+        return no_body(answer);
+    }
+    let mut found = expect_status(405, "the document has no such method", answer);
+    let mut listed: Vec<_> = answer.header("allow").split(',').map(|name| name.trim().to_owned()).collect();
+    listed.sort();
+    if listed != allowed {
+        found.push(format!("Allow: {listed:?}, declared are {allowed:?}"));
+    }
+    found
+}
+
+fn expect_status(expected: u16, why: &str, answer: &Received) -> Vec<String> {
+    if answer.status == expected {
+        return vec![];
+    }
+    vec![format!("status {} instead of {expected}: {why}", answer.status)]
+}
+
+fn of_headers(response: &Response, answer: &Received) -> Vec<String> {
+    let mut found = Vec::new();
+    for (name, header) in &response.headers {
+        match answer.headers.get(name) {
+            None if header.is_required => found.push(format!("no {name}")),
+            None => {}
+            Some(value) => {
+                let value = value.to_str().unwrap();
+                // Values are text; those that are declared as numbers, such as Retry-After, are read as such.
+                let text = json!(value);
+                let number = serde_json::from_str(value).ok().filter(Value::is_number);
+                let value = number.filter(|_| !header.schema.is_valid(&text)).unwrap_or(text);
+                found.extend(violations(name, &header.schema, &value));
+            }
+        }
+    }
+    for name in answer.headers.keys().map(reqwest::header::HeaderName::as_str) {
+        let is_expected = response.headers.contains_key(name) || OF_HTTP.contains(&name);
+        if !is_expected && !name.starts_with("access-control-") {
+            found.push(format!("{name} is not declared"));
+        }
+    }
+    found
+}
+
+fn of_body(response: &Response, answer: &Received) -> Vec<String> {
+    if response.content.is_empty() {
+        return no_body(answer);
+    }
+    let media_type = answer.media_type();
+    let Some(schema) = response.content.get(&media_type) else {
+        let declared: Vec<_> = response.content.keys().map(String::as_str).collect();
+        return vec![format!("Content-Type {media_type:?}, declared are {}", declared.join(", "))];
+    };
+    match media_type.as_str() {
+        "application/x-safetensors" => {
+            let tensors = safetensors::SafeTensors::deserialize(&answer.bytes);
+            tensors.err().map(|error| format!("no safetensors: {error}")).into_iter().collect()
+        }
+        json if json.ends_with("json") => match answer.json() {
+            Some(body) => violations("body", schema, &body),
+            None => vec!["the body is no JSON".to_owned()],
+        },
+        _ => vec![],
+    }
+}
+
+fn no_body(answer: &Received) -> Vec<String> {
+    if answer.bytes.is_empty() { vec![] } else { vec!["a body, and none is declared".to_owned()] }
+}
+
+/// What a schema finds in a value, by JSON pointer; the first few, as one mistake may be in every entry of an array.
+fn violations(name: &str, schema: &jsonschema::Validator, value: &Value) -> Vec<String> {
+    let errors = schema.iter_errors(value).take(5);
+    errors.map(|error| format!("{name}{}: {:.500}", error.instance_path(), error.to_string())).collect()
+}

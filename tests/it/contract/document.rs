@@ -1,0 +1,158 @@
+//! The document, made ready to check answers: paths as templates, schemas compiled.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use jsonschema::{Draft, Validator};
+use serde_json::{Map, Value};
+
+use super::closed::{close_parts, closed};
+
+pub struct Contract {
+    paths: Vec<Path>,
+    /// The form that every problem has.
+    pub problem: Arc<Validator>,
+}
+
+/// A path with its operations by method.
+struct Path {
+    template: String,
+    operations: BTreeMap<String, Operation>,
+}
+
+/// What an operation may answer, by status.
+pub type Operation = BTreeMap<String, Response>;
+
+#[derive(Default)]
+pub struct Response {
+    /// By media type.
+    pub content: BTreeMap<String, Arc<Validator>>,
+    /// By name in lower case.
+    pub headers: BTreeMap<String, Header>,
+}
+
+pub struct Header {
+    pub is_required: bool,
+    pub schema: Arc<Validator>,
+}
+
+/// Where the document has a request.
+pub enum Served<'a> {
+    By(&'a Operation),
+    /// The path has other methods, these.
+    OtherMethods(Vec<String>),
+    Nowhere,
+}
+
+impl Contract {
+    pub fn new(document: &Value) -> Self {
+        let mut schemas = Schemas::new(document);
+        let problem = schemas.compile(&serde_json::json!({"$ref": "#/components/schemas/Problem"}));
+        let paths = members(&document["paths"]).map(|(template, item)| Path {
+            template: template.clone(),
+            operations: schemas.operations(item),
+        });
+        Self { paths: paths.collect(), problem }
+    }
+
+    /// The operation for a request. A path without parameters goes before one with.
+    pub fn find(&self, method: &str, path: &str) -> Served<'_> {
+        let literal = self.paths.iter().find(|known| known.template == path);
+        let Some(known) = literal.or_else(|| self.paths.iter().find(|known| fits(&known.template, path)))
+        else {
+            return Served::Nowhere;
+        };
+        // HEAD is GET without its body, wherever it is not an operation of its own.
+        let by_get = || known.operations.get("GET").filter(|_| method == "HEAD");
+        match known.operations.get(method).or_else(by_get) {
+            Some(operation) => Served::By(operation),
+            None => Served::OtherMethods(known.methods()),
+        }
+    }
+}
+
+impl Path {
+    /// All methods of the path, sorted.
+    fn methods(&self) -> Vec<String> {
+        let mut methods: Vec<_> = self.operations.keys().cloned().collect();
+        if self.operations.contains_key("GET") && !self.operations.contains_key("HEAD") {
+            methods.push("HEAD".to_owned());
+        }
+        methods.sort();
+        methods
+    }
+}
+
+/// A parameter stands for one segment that is not empty.
+fn fits(template: &str, path: &str) -> bool {
+    let (template, path): (Vec<_>, Vec<_>) = (template.split('/').collect(), path.split('/').collect());
+    let is_same = |(known, found): (&&str, &&str)| {
+        known == found || known.starts_with('{') && known.ends_with('}') && !found.is_empty()
+    };
+    template.len() == path.len() && template.iter().zip(&path).all(is_same)
+}
+
+/// The schemas of a document, each compiled once however often it is used.
+struct Schemas<'a> {
+    document: &'a Value,
+    components: Value,
+    compiled: HashMap<String, Arc<Validator>>,
+}
+
+impl<'a> Schemas<'a> {
+    fn new(document: &'a Value) -> Self {
+        let mut components = document["components"].clone();
+        for schema in components["schemas"].as_object_mut().unwrap().values_mut() {
+            // Where a component is used, it is closed; there it may be a part of a composition.
+            close_parts(schema);
+        }
+        Self { document, components, compiled: HashMap::new() }
+    }
+
+    fn operations(&mut self, item: &Value) -> BTreeMap<String, Operation> {
+        let methods = members(item).filter(|(_, operation)| operation["responses"].is_object());
+        let operation = |operation: &Value, schemas: &mut Self| {
+            let responses = members(&operation["responses"]);
+            responses.map(|(status, response)| (status.clone(), schemas.response(response))).collect()
+        };
+        methods.map(|(method, found)| (method.to_ascii_uppercase(), operation(found, self))).collect()
+    }
+
+    fn response(&mut self, response: &Value) -> Response {
+        let response = self.resolve(response);
+        let content = members(&response["content"])
+            .map(|(media_type, content)| (media_type.clone(), self.compile(&content["schema"])));
+        let content = content.collect();
+        let headers = members(&response["headers"]).map(|(name, header)| {
+            let header = self.resolve(header);
+            let is_required = header["required"] == true;
+            (name.to_ascii_lowercase(), Header { is_required, schema: self.compile(&header["schema"]) })
+        });
+        Response { content, headers: headers.collect() }
+    }
+
+    /// What a response or header refers to, or itself.
+    fn resolve(&self, value: &'a Value) -> &'a Value {
+        let target = value["$ref"].as_str().and_then(|target| target.strip_prefix('#'));
+        target.map_or(value, |target| self.document.pointer(target).unwrap())
+    }
+
+    fn compile(&mut self, schema: &Value) -> Arc<Validator> {
+        if let Some(validator) = self.compiled.get(&schema.to_string()) {
+            return validator.clone();
+        }
+        // The components stand where the references of the document look for them. Without a schema, anything goes.
+        let mut used = if schema.is_null() { Value::Bool(true) } else { schema.clone() };
+        closed(&mut used);
+        let root = serde_json::json!({"allOf": [used], "components": self.components});
+        let options = jsonschema::options().with_draft(Draft::Draft202012).should_validate_formats(true);
+        let validator = Arc::new(options.build(&root).unwrap_or_else(|error| panic!("{error}: {schema}")));
+        self.compiled.insert(schema.to_string(), validator.clone());
+        validator
+    }
+}
+
+/// The members of an object; none of anything else.
+fn members(value: &Value) -> impl Iterator<Item = (&String, &Value)> {
+    value.as_object().into_iter().flat_map(Map::iter)
+}
