@@ -45,7 +45,9 @@ use routes::{
 /// The service as one router.
 pub fn router(app: Arc<App>) -> Router {
     let (v1, probes, document) = parts();
-    let [document, document_3_0] = [to_json(&document), to_json_3_0(&document)].map(serve_json);
+    let document = openapi::to_value(&document);
+    let document_3_0 = openapi::version_3_0::derive(&document);
+    let [document, document_3_0] = [document, document_3_0].map(|document| serve_json(&document));
     let v1 = v1
         .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
         .layer(from_fn_with_state(app.clone(), auth::authenticate));
@@ -65,19 +67,19 @@ pub fn router(app: Arc<App>) -> Router {
 }
 
 /// A route to a document.
-fn serve_json(text: String) -> MethodRouter<Arc<App>> {
-    let text = bytes::Bytes::from(text);
+fn serve_json(document: &serde_json::Value) -> MethodRouter<Arc<App>> {
+    let text = bytes::Bytes::from(openapi::to_text(document));
     get(move || async move { ([(header::CONTENT_TYPE, "application/json")], text) })
 }
 
 /// The OpenAPI document of this version, as JSON.
 pub fn openapi_json() -> String {
-    to_json(&parts().2)
+    openapi::to_text(&openapi::to_value(&parts().2))
 }
 
 /// The same for generators that stop at OpenAPI 3.0.
 pub fn openapi_3_0_json() -> String {
-    to_json_3_0(&parts().2)
+    openapi::to_text(&openapi::version_3_0::derive(&openapi::to_value(&parts().2)))
 }
 
 /// Routes behind keys, routes for everyone, and the document of both.
@@ -106,19 +108,6 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     document.merge(of_probes);
     openapi::complete(&mut document);
     (v1, probes, document)
-}
-
-fn to_json(document: &utoipa::openapi::OpenApi) -> String {
-    // Serialization of a document that utoipa built cannot fail; an empty one would be caught by the test of the file.
-    document.to_pretty_json().map(|json| json + "\n").unwrap_or_default()
-}
-
-fn to_json_3_0(document: &utoipa::openapi::OpenApi) -> String {
-    let derived = serde_json::to_value(document).map(|document| openapi::version_3_0::derive(&document));
-    derived
-        .and_then(|derived| serde_json::to_string_pretty(&derived))
-        .map(|json| json + "\n")
-        .unwrap_or_default()
 }
 
 /// Nothing unless origins are configured: then OPTIONS is a method like any other that no path has.

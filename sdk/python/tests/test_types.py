@@ -79,7 +79,9 @@ def test_requests_have_no_later_members() -> None:
 def test_every_model_is_a_named_schema() -> None:
     # The generator makes up names for anonymous ones, by their place: GeometryType0, KernelListKernelsItem.
     document = json.loads((Path(__file__).parents[3] / "openapi" / "openapi.json").read_text())
-    assert {model.__name__.rstrip("_") for model in MODELS} == set(document["components"]["schemas"])
+    schemas = document["components"]["schemas"]
+    named = {name for name, schema in schemas.items() if "properties" in schema or "enum" in schema}
+    assert {model.__name__.rstrip("_") for model in MODELS} == named
 
 
 def test_enumerations_are_enumerations() -> None:

@@ -8,6 +8,7 @@ mod headers;
 mod links;
 pub mod version_3_0;
 
+use serde_json::Value;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Operation, PathItem};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
@@ -72,6 +73,22 @@ fn empty_answers_to_head(document: &mut utoipa::openapi::OpenApi) {
             }
         }
     }
+}
+
+/// The document as JSON. Headers that are declared are always sent, which the library's types cannot say.
+pub fn to_value(document: &utoipa::openapi::OpenApi) -> Value {
+    // Serialization of a document that utoipa built cannot fail; an empty one would be caught by the test of the file.
+    let mut document = serde_json::to_value(document).unwrap_or_default();
+    let headers = document.pointer_mut("/components/headers").and_then(Value::as_object_mut);
+    for header in headers.into_iter().flat_map(|headers| headers.values_mut()) {
+        header["required"] = Value::Bool(true);
+    }
+    document
+}
+
+/// The text of a document, as it is served and committed.
+pub fn to_text(document: &Value) -> String {
+    format!("{document:#}\n")
 }
 
 fn operations(document: &mut utoipa::openapi::OpenApi) -> impl Iterator<Item = &mut Operation> {

@@ -1,0 +1,76 @@
+"""Makes well-formed requests meaningful, in what no schema can say: rows of equal length, one entry per point, one of two
+alternatives.
+
+Without it nearly all random clouds are ragged and refused, and nothing behind the first check is ever reached. Only
+well-formed data of the fuzzing and stateful phases is touched, and it stays well-formed; the other phases and all malformed
+data go out as Schemathesis makes them.
+"""
+
+import schemathesis
+
+PHASES = {"fuzzing", "stateful"}
+PARAMETER_OF = {"laplace": "epsilon", "matern": "nu", "wendland": "smoothness"}
+TRIANGLE = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+
+
+@schemathesis.hook
+def before_call(context, case, **kwargs):
+    meta = case.meta
+    if meta is None or not meta.generation.mode.is_positive or meta.phase.name.value not in PHASES:
+        return
+    if isinstance(case.body, dict):
+        case.body = meaningful(case.body)
+
+
+def meaningful(request):
+    """The request with one of each two alternatives, rows of one length, and lists as long as the cloud."""
+    if "cloud" not in request:
+        return rectangular(request) if "points" in request else request
+    request = with_fit(request)
+    request["cloud"] = one_cloud(request["cloud"])
+    points = request["cloud"].get("points")
+    if "geometry" in request:
+        request["geometry"] = with_fit(request["geometry"])
+        if "cloud" in request["geometry"]:
+            request["geometry"]["cloud"] = one_cloud(request["geometry"]["cloud"])
+    if points:
+        for name in {"values", "noise_variances"} & request.keys():
+            request[name] = resized(request[name], len(points))
+        if "queries" in request:
+            request["queries"] = [resized(row, len(points[0])) for row in request["queries"]]
+    return request
+
+
+def with_fit(fit):
+    """Alpha or variances of the noise; of the kernel the parameters that its family has."""
+    others = {"noise_variances"} if "alpha" in fit else set()
+    fit = {name: value for name, value in fit.items() if name not in others}
+    if "kernel" in fit:
+        family = fit["kernel"].get("family")
+        others = set(PARAMETER_OF.values()) - {PARAMETER_OF.get(family)}
+        fit["kernel"] = {name: value for name, value in fit["kernel"].items() if name not in others}
+    return fit
+
+
+def one_cloud(cloud):
+    """Its points where it has some, else its id."""
+    if "points" not in cloud:
+        return {"id": cloud["id"]} if "id" in cloud else {"points": TRIANGLE}
+    return rectangular({name: value for name, value in cloud.items() if name != "id"})
+
+
+def rectangular(cloud):
+    """Points and normals with rows as long as the first point, and as many normals as points."""
+    points = cloud["points"] or TRIANGLE
+    dimension = max(len(points[0]), 1)
+    cloud = {**cloud, "points": [resized(row, dimension) for row in points]}
+    if "normals" in cloud:
+        normals = resized(cloud["normals"] or [[]], len(points))
+        cloud["normals"] = [resized(row, dimension) for row in normals]
+    return cloud
+
+
+def resized(items, length):
+    """The numbers or rows, cut or repeated to a length; ones where there are none."""
+    items = items or [1.0]
+    return [items[i % len(items)] for i in range(length)]
