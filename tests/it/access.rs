@@ -58,11 +58,37 @@ async fn without_a_valid_key_nothing_below_v1_is_answered() {
 #[tokio::test]
 async fn probes_and_documents_need_no_key() {
     let server = Server::with_flags(&["--api-keys", "alpha-key"]).await;
-    for path in
-        ["/health/live", "/health/ready", "/version", "/openapi.json", "/docs/", "/problems/unauthorized"]
-    {
+    let documents = ["/openapi.json", "/openapi-3.0.json", "/docs/", "/problems/unauthorized"];
+    for path in ["/health/live", "/health/ready", "/version"].into_iter().chain(documents) {
         assert_eq!(server.get(path).await.status, 200, "{path}");
     }
+}
+
+#[tokio::test]
+async fn every_operation_refuses_keys_and_media_types_where_the_document_says_so() {
+    let server = Server::with_flags(&["--api-keys", "alpha-key"]).await;
+    let document: Value = serde_json::from_str(&gramian::http::openapi_json()).unwrap();
+    let mut n_refused = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let path = path.replace("{cloud_id}", &"0".repeat(64)).replace("{slug}", "unauthorized");
+        for (method, operation) in item.as_object().unwrap() {
+            let method: Method = method.to_uppercase().parse().unwrap();
+            for (status, headers) in [("401", ["wrong-key", "*/*"]), ("406", ["alpha-key", "text/csv"])] {
+                let [key, accept] = headers;
+                let headers = [("authorization", &*format!("Bearer {key}")), ("accept", accept)];
+                let answer = send(&server, method.clone(), &path, &headers, &json!({})).await;
+                let is_declared = operation["responses"].get(status).is_some();
+                assert_eq!(
+                    answer.status.to_string() == status,
+                    is_declared,
+                    "{method} {path} {}",
+                    answer.status
+                );
+                n_refused += u32::from(is_declared);
+            }
+        }
+    }
+    assert!(n_refused > 25, "{n_refused}");
 }
 
 #[tokio::test]
