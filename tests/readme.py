@@ -17,11 +17,9 @@ Exits with 1 and the differences if there are any. Needs nothing but the standar
 
 import argparse
 import json
-import os
 import re
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 from with_server import server

@@ -3,9 +3,9 @@
 
     tests/with_server.py GRAMIAN COMMAND [ARGUMENT]…
 
-Starts the binary GRAMIAN on a free port, in its default configuration whatever GRAMIAN_ variables are set, runs the
-command with the base URL of the server as GRAMIAN_URL, ends the server and exits as the command did. Needs nothing
-but the standard library.
+Starts the binary GRAMIAN on a free port, in its default configuration, runs the command with the base URL of the server as
+GRAMIAN_URL, ends the server and exits as the command did. Neither sees other GRAMIAN_ variables. Needs nothing but the
+standard library.
 """
 
 import contextlib
@@ -25,23 +25,35 @@ def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     with server(sys.argv[1]) as base:
-        outcome = subprocess.run(sys.argv[2:], env=os.environ | {"GRAMIAN_URL": base}, check=False)
+        outcome = subprocess.run(sys.argv[2:], env=environment() | {"GRAMIAN_URL": base}, check=False)
     sys.exit(outcome.returncode)
 
 
 @contextlib.contextmanager
 def server(binary):
     """A server on a port of its own choice, in its default configuration; its base URL."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
-    environment["RUST_LOG"] = "info"
     with tempfile.TemporaryFile() as log:
         command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0"]
-        process = subprocess.Popen(command, env=environment, stderr=log)
+        process = subprocess.Popen(command, env=environment() | {"RUST_LOG": "info"}, stderr=log)
         try:
             yield f"http://{address_of(process, log)}"
         finally:
-            process.terminate()
-            process.wait(SECONDS_TO_STOP)
+            stop(process)
+
+
+def environment():
+    """The variables of this program but for those that configure gramian or its clients."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
+
+
+def stop(process):
+    """Ends the server, after the requests that it still answers if they do not take too long."""
+    process.terminate()
+    try:
+        process.wait(SECONDS_TO_STOP)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def address_of(process, log):

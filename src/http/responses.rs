@@ -40,13 +40,13 @@ problem_set! {
 }
 
 problem_set! {
-    /// The description of one cloud.
-    DescribeProblems: Unauthorized, UnknownCloud, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+    /// The description of one cloud. What is not UTF-8 in the path is no path.
+    DescribeProblems: Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only look a cloud up.
-    LookUpProblems: Unauthorized, UnknownCloud, NotAcceptable, Internal
+    LookUpProblems: Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal
 }
 
 problem_set! {

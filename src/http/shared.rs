@@ -283,7 +283,8 @@ macro_rules! request {
 }
 pub(crate) use request;
 
-/// How the Gram matrix was factorized.
+/// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`, `conjugate_gradients` and `local` are reserved: no
+/// answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FactorizationUsed {
@@ -301,7 +302,7 @@ pub enum FactorizationUsed {
     Local,
 }
 
-/// The solver that was used.
+/// The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverUsed {

@@ -24,6 +24,20 @@ fn documented_id(d: u64, points: &[f64], normals: &[f64]) -> String {
 }
 
 #[tokio::test]
+async fn what_cannot_be_an_id_is_not_found() {
+    let server = Server::start().await;
+    for method in [Method::GET, Method::HEAD, Method::DELETE] {
+        let not_text = ask(&server, method.clone(), "/v1/clouds/%FF", "").await;
+        let no_id = ask(&server, method.clone(), "/v1/clouds/circle", "").await;
+        assert_eq!((not_text.status, no_id.status), (404, 404));
+        if method != Method::HEAD {
+            not_text.expect_problem(404, "not-found");
+            no_id.expect_problem(404, "unknown-cloud");
+        }
+    }
+}
+
+#[tokio::test]
 async fn a_cloud_is_created_once_found_checked_and_deleted() {
     let server = Server::start().await;
     let body = json!({"points": [[0, 0, 0], [3, 0, 0], [3, 4, 0], [3, 4, 0]]});

@@ -1,6 +1,6 @@
 //! The document as a contract: every answer that a test receives is checked against it.
 //!
-//! `support::receive` calls [`check`] for every request, so no test can forget it. An answer is right if the document has its
+//! `support::receive` calls [`check`] for every request of a `Server`, so no test can forget it. An answer is right if the document has its
 //! path, method and status; if its media type is declared and its body is of the declared form, with no member that the
 //! document does not name; if the headers are there that must be, and no others. Two kinds of answers have no operation of
 //! their own: what is served beside the interface ([`BESIDE`]), and refusals of paths and methods that it does not have, which
@@ -93,8 +93,23 @@ fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<S
         return vec![format!("status {}, declared are {}", answer.status, declared.join(", "))];
     };
     let mut found = of_headers(response, answer);
-    found.extend(if method == "HEAD" { no_body(answer) } else { of_body(response, answer) });
+    if method == "HEAD" {
+        found.extend(no_body(answer));
+        return found;
+    }
+    found.extend(of_body(response, answer));
+    if answer.status >= 400 {
+        found.extend(of_problem_type(response, answer));
+    }
     found
+}
+
+/// A problem is one of those that the operation declares for its status.
+fn of_problem_type(response: &Response, answer: &Received) -> Option<String> {
+    let problem = answer.json()?;
+    let kind = problem["type"].as_str().unwrap_or_default();
+    let is_declared = kind.strip_prefix("/problems/").is_some_and(|slug| response.problems.contains(slug));
+    (!is_declared).then(|| format!("the type {kind} is not declared for {}", answer.status))
 }
 
 /// A method that the path does not have: the preflight of a browser where origins are configured, else 405 with those it has.

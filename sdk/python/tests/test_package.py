@@ -193,6 +193,27 @@ def test_points_are_kept_as_they_were_posted(client: gramian.Client, circle: Arr
         cloud.points[0] = 7
 
 
+def test_arrays_of_other_libraries_stay_their_own(client: gramian.Client, circle: Array) -> None:
+    class Foreign:
+        def __init__(self) -> None:
+            self.numbers = circle.copy()
+
+        def __array__(self, dtype: object = None, copy: bool | None = None) -> Array:
+            return self.numbers
+
+    foreign = Foreign()
+    cloud = client.cloud(foreign)
+    assert foreign.numbers.flags.writeable
+    assert cloud.points is not None
+    assert not np.shares_memory(cloud.points, foreign.numbers)
+
+
+def test_numbers_of_numpy_are_numbers(client: gramian.Client, circle: Array) -> None:
+    kernel: gramian.KernelFields = {"family": "gauss", "length_scale": np.float64(2)}
+    answer = client.cloud(circle).normals(kernel=kernel, alpha=np.float32(0.5))
+    assert answer.diagnostics.alpha == 0.5
+
+
 def test_a_refusal_has_pointer_and_remedy(client: gramian.Client, circle: Array) -> None:
     cloud = client.cloud(np.vstack([circle, circle[:1]]))
     with pytest.raises(gramian.Problem) as caught:

@@ -173,3 +173,13 @@ def test_what_is_no_problem_document_is_a_problem_still() -> None:
             client.version()
         assert (caught.value.status, caught.value.detail) == (status, detail)
         assert (caught.value.pointer, caught.value.minimum_alpha, caught.value.limit) == (None, None, None)
+
+
+def test_what_is_no_success_is_a_problem_whoever_says_it() -> None:
+    handle, _ = service(httpx.Response(503, text="<h1>busy</h1>"), httpx.Response(308, headers={"Location": "/"}))
+    connection, _ = connect(handle, retries=0)
+    with pytest.raises(gramian.Overloaded):
+        connection.send("GET", "/version")
+    with pytest.raises(gramian.Problem) as caught:
+        connection.send("GET", "/version")
+    assert caught.value.status == 308

@@ -2,7 +2,7 @@
 
 use std::error::Error as StdError;
 
-use gramian_client::types::{self, CloudRef, Kernel, KernelFamily, PosteriorQuantity};
+use gramian_client::types::{self, CloudId, CloudRef, Kernel, KernelFamily, PosteriorQuantity};
 use gramian_client::{Client, Error};
 
 /// Eight points of the unit circle.
@@ -31,18 +31,19 @@ async fn main() -> Outcome {
     let registered = client.create_cloud().body_map(|body| body.points(rows(&POINTS))).send().await?;
     assert_eq!(registered.cloud_id.as_str(), CLOUD_ID);
 
-    curvatures_are_null_at_the_centre(&client).await?;
-    the_matrix_turns_cosines_into_their_negatives(&client).await?;
-    the_posterior_has_a_variance(&client).await?;
-    a_refusal_names_the_field(&client).await;
+    let id = &registered.cloud_id;
+    curvatures_are_null_at_the_centre(&client, id).await?;
+    the_matrix_turns_cosines_into_their_negatives(&client, id).await?;
+    the_posterior_has_a_variance(&client, id).await?;
+    a_refusal_names_the_field(&client, id).await;
     Ok(())
 }
 
-async fn curvatures_are_null_at_the_centre(client: &Client) -> Outcome {
+async fn curvatures_are_null_at_the_centre(client: &Client, id: &CloudId) -> Outcome {
     let queries = rows(&[[1.0, 0.0], [0.0, 0.0]]);
     let answer = client
         .compute_curvatures()
-        .body_map(|body| body.cloud(cloud()).queries(queries).kernel(gauss(2.0)).alpha(0.0))
+        .body_map(|body| body.cloud(cloud(id)).queries(queries).kernel(gauss(2.0)).alpha(0.0))
         .send()
         .await?;
     let on_the_circle = answer.mean_curvatures[0].expect("the circle has a curvature");
@@ -52,10 +53,10 @@ async fn curvatures_are_null_at_the_centre(client: &Client) -> Outcome {
     Ok(())
 }
 
-async fn the_matrix_turns_cosines_into_their_negatives(client: &Client) -> Outcome {
+async fn the_matrix_turns_cosines_into_their_negatives(client: &Client, id: &CloudId) -> Outcome {
     let answer = client
         .assemble_laplace_beltrami_matrix()
-        .body_map(|body| body.cloud(cloud()).kernel(gauss(2.0)).alpha(0.0))
+        .body_map(|body| body.cloud(cloud(id)).kernel(gauss(2.0)).alpha(0.0))
         .send()
         .await?;
     assert_eq!(answer.matrix.len(), POINTS.len());
@@ -70,12 +71,14 @@ async fn the_matrix_turns_cosines_into_their_negatives(client: &Client) -> Outco
     Ok(())
 }
 
-async fn the_posterior_has_a_variance(client: &Client) -> Outcome {
+async fn the_posterior_has_a_variance(client: &Client, id: &CloudId) -> Outcome {
     let queries = rows(&[[0.9, 0.1]]);
     let include = vec![PosteriorQuantity::Variance];
     let answer = client
         .compute_posterior()
-        .body_map(|body| body.cloud(cloud()).values(cosines()).queries(queries).alpha(1e-6).include(include))
+        .body_map(|body| {
+            body.cloud(cloud(id)).values(cosines()).queries(queries).alpha(1e-6).include(include)
+        })
         .send()
         .await?;
     assert_eq!(answer.means.len(), 1);
@@ -84,9 +87,9 @@ async fn the_posterior_has_a_variance(client: &Client) -> Outcome {
     Ok(())
 }
 
-async fn a_refusal_names_the_field(client: &Client) {
+async fn a_refusal_names_the_field(client: &Client, id: &CloudId) {
     let outcome =
-        client.compute_curvatures().body_map(|body| body.cloud(cloud()).kernel(gauss(-1.0))).send().await;
+        client.compute_curvatures().body_map(|body| body.cloud(cloud(id)).kernel(gauss(-1.0))).send().await;
     let Err(Error::ErrorResponse(problem)) = outcome else {
         panic!("the service should refuse a negative length, but: {outcome:?}")
     };
@@ -95,8 +98,8 @@ async fn a_refusal_names_the_field(client: &Client) {
     assert_eq!(problem.errors[0].pointer, "/kernel/length_scale");
 }
 
-fn cloud() -> types::builder::CloudRef {
-    CloudRef::builder().id(Some(CLOUD_ID.parse().expect("the id has 64 digits")))
+fn cloud(id: &CloudId) -> types::builder::CloudRef {
+    CloudRef::builder().id(Some(id.clone()))
 }
 
 /// exp(−r²/ℓ²)

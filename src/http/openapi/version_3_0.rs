@@ -4,6 +4,10 @@ use serde_json::{Map, Value, json};
 
 type Object = Map<String, Value>;
 
+const WHAT_IS_DIFFERENT: &str = " This document is for tools that stop at OpenAPI 3.0: it has bodies in JSON only, no links and \
+                                 no pages, and declares problem documents, which are sent as application/problem+json, as \
+                                 application/json.";
+
 /// Translates a document of version 3.1 to 3.0.3.
 ///
 /// What 3.0 cannot say is said its way: nullable types, exclusive bounds, descriptions beside references, licences.
@@ -13,13 +17,16 @@ pub fn derive(document: &Value) -> Value {
     let mut document = document.clone();
     document["openapi"] = json!("3.0.3");
     if let Some(license) = document.pointer_mut("/info/license").and_then(Value::as_object_mut) {
-        license.remove("identifier");
+        license.shift_remove("identifier");
     }
     if let Some(paths) = document["paths"].as_object_mut() {
         for item in paths.values_mut().filter_map(Value::as_object_mut) {
             item.retain(|_, operation| !answers_pages(operation));
         }
         paths.retain(|_, item| item.as_object().is_some_and(|item| !item.is_empty()));
+    }
+    if let Some(Value::String(description)) = document.pointer_mut("/info/description") {
+        description.push_str(WHAT_IS_DIFFERENT);
     }
     translate(&mut document);
     drop_unused_examples(&mut document);
@@ -46,9 +53,12 @@ fn translate(value: &mut Value) {
         Value::Array(items) => items.iter_mut().for_each(translate),
         Value::Object(object) => {
             for (name, member) in object.iter_mut() {
-                // Examples are data, which looks like a schema by accident at most.
-                if !matches!(name.as_str(), "example" | "examples") {
-                    translate(member);
+                match (name.as_str(), member) {
+                    // Examples are data, which looks like a schema by accident at most.
+                    ("example" | "examples", _) => {}
+                    // The names in it are those of members, not keywords.
+                    ("properties", Value::Object(properties)) => properties.values_mut().for_each(translate),
+                    (_, member) => translate(member),
                 }
             }
             if object.get("links").is_some_and(Value::is_object) {
@@ -119,6 +129,9 @@ mod tests {
         let described = json!({"$ref": reference, "description": "An A."});
         assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
         assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
+        let named_as_keywords =
+            json!({"properties": {"links": {"type": "object"}, "content": {"type": "object"}}});
+        assert_eq!(derived(named_as_keywords.clone()), named_as_keywords);
         let example = json!({"example": {"type": ["x", "null"]}});
         assert_eq!(derived(example.clone()), example);
     }

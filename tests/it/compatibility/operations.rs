@@ -140,10 +140,20 @@ impl Comparison<'_> {
             let pointer = below(&below(pointer, "content"), media_type);
             match new["content"].get(media_type) {
                 Some(new) => {
+                    self.compare_problems(&pointer, content, new);
                     let pointer = below(&pointer, "schema");
                     self.compare_schema(direction, &pointer, &content["schema"], &new["schema"]);
                 }
                 None => self.report(&pointer, "the media type was removed"),
+            }
+        }
+    }
+
+    /// The types of the problems that a response may be, which clients decide by, are the names of its examples.
+    fn compare_problems(&mut self, pointer: &str, old: &Value, new: &Value) {
+        for (slug, _) in members(&old["examples"]) {
+            if new["examples"].get(slug).is_none() {
+                self.report(&below(&below(pointer, "examples"), slug), "the type of problem was removed");
             }
         }
     }

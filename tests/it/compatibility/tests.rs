@@ -221,6 +221,27 @@ fn a_value_of_a_request_is_still_accepted() {
     assert_eq!(became(&nu, released, current), [format!("{nu}/default")]);
 }
 
+/// What stands inside of a component is compared wherever it is used in the place of another one.
+#[test]
+fn a_reference_may_not_change_what_it_means() {
+    let (diagnostics, answer) = ("/components/schemas/Diagnostics", "/components/schemas/PosteriorResponse");
+    let found = broken(|document| {
+        let mut other = at(document, diagnostics).clone();
+        other["properties"]["rank"]["type"] = json!("string");
+        at(document, "/components/schemas")["OtherDiagnostics"] = other;
+        at(document, &property(answer, "diagnostics"))["$ref"] =
+            json!("#/components/schemas/OtherDiagnostics");
+    });
+    assert_eq!(found, [format!("{}/type", property(diagnostics, "rank"))]);
+}
+
+#[test]
+fn types_of_problems_stay() {
+    let examples = format!("{OPERATION}/responses/422/content/application~1problem+json/examples");
+    assert_eq!(remove(&examples, "kernel-not-smooth"), [format!("{examples}/kernel-not-smooth")]);
+    assert_eq!(set(&examples, "cloud-too-flat", json!({})), NOTHING);
+}
+
 /// A component of both directions may neither grow nor shrink.
 #[test]
 fn what_is_both_sent_and_answered_stays_as_it_is() {

@@ -1,6 +1,6 @@
 //! The document, made ready to check answers: paths as templates, schemas compiled.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use jsonschema::{Draft, Validator};
@@ -29,6 +29,8 @@ pub struct Response {
     pub content: BTreeMap<String, Arc<Validator>>,
     /// By name in lower case.
     pub headers: BTreeMap<String, Header>,
+    /// The slugs of the problems that it may be.
+    pub problems: BTreeSet<String>,
 }
 
 pub struct Header {
@@ -128,7 +130,9 @@ impl<'a> Schemas<'a> {
             let is_required = header["required"] == true;
             (name.to_ascii_lowercase(), Header { is_required, schema: self.compile(&header["schema"]) })
         });
-        Response { content, headers: headers.collect() }
+        let headers = headers.collect();
+        let problems = members(&response["content"]["application/problem+json"]["examples"]);
+        Response { content, headers, problems: problems.map(|(slug, _)| slug.clone()).collect() }
     }
 
     /// What a response or header refers to, or itself.

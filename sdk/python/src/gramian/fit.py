@@ -103,13 +103,20 @@ class Geometry:
 
 def fit_fields(fit: Fit) -> dict[str, object]:
     """Returns the fields of a request that say how to fit."""
-    fields: dict[str, object] = dict(fit)
+    fields: dict[str, object] = {name: _plain(value) for name, value in fit.items()}
     kernel, noise_variances = fit.get("kernel"), fit.get("noise_variances")
     if isinstance(kernel, Kernel | KernelUsed):
         fields["kernel"] = kernel.to_dict()
+    elif kernel is not None:
+        fields["kernel"] = {name: _plain(value) for name, value in kernel.items()}
     if noise_variances is not None:
         fields["noise_variances"] = as_list("noise_variances", noise_variances)
     return fields
+
+
+def _plain(value: object) -> object:
+    """Returns a number of NumPy as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def given(**fields: object) -> dict[str, object]:

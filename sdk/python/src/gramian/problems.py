@@ -102,7 +102,7 @@ class Problem(Exception):
 
 
 class UnknownCloud(Problem):
-    """The service has no such cloud (any more), and the points are not at hand to post them again."""
+    """The service has no such cloud (any more), and the points are not at hand, or were forgotten at once again."""
 
 
 class NotPositiveDefinite(Problem):
@@ -116,16 +116,19 @@ class Overloaded(Problem):
 _KINDS: dict[str, type[Problem]] = {
     "unknown-cloud": UnknownCloud,
     "not-positive-definite": NotPositiveDefinite,
-    "overloaded": Overloaded,
-    "rate-limited": Overloaded,
 }
+TRY_LATER = (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE)
+"""The statuses after which the same request may succeed."""
 
 
 def problem_of(response: httpx.Response, retry_after: float | None = None) -> Problem:
-    """Returns the exception for an answer of status 400 or above."""
+    """Returns the exception for an answer that is no success."""
     document = _document(response)
-    problem = _KINDS.get(document.type_.rpartition("/")[2], Problem)
-    return problem(document, retry_after)
+    # By the status, since a proxy on the way says so without a document.
+    if response.status_code in TRY_LATER:
+        return Overloaded(document, retry_after)
+    kind = _KINDS.get(document.type_.rpartition("/")[2], Problem)
+    return kind(document, retry_after)
 
 
 def _document(response: httpx.Response) -> models.Problem:

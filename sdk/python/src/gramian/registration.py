@@ -93,8 +93,6 @@ def register(connection: Connection, points: Array, normals: Array | None) -> mo
 
 def own_copy(name: str, rows: npt.ArrayLike) -> Array:
     """Returns a read-only copy of points: the caller may change theirs, and these must stay as their id says."""
-    array = as_rows(name, rows)
-    if array is rows or array.base is not None:
-        array = array.copy()
+    array = as_rows(name, rows).copy()  # always: arrays of other libraries hand out their own buffer
     array.flags.writeable = False
     return array

@@ -10,13 +10,11 @@ from typing import Any
 
 import httpx
 
-from .problems import problem_of
+from .problems import TRY_LATER, problem_of
 from .tensors import JSON, SAFETENSORS, Format, Members, decode, encode
 
 BACKOFF_SECONDS = 0.1
 """The first wait where the service does not say how long; doubled from one attempt to the next."""
-
-_TRY_LATER = {httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE}
 
 # Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes.
 # Reading past the timeout is not among these, since the service is then busy with the first request still.
@@ -69,7 +67,7 @@ class RetryingClient(httpx.Client):
                 if waited + wait > self._max_wait:
                     raise
             else:
-                if response.status_code not in _TRY_LATER:
+                if response.status_code not in TRY_LATER:
                     return response
                 wait = _or(retry_after(response), backoff)
                 if waited + wait > self._max_wait:
@@ -110,7 +108,7 @@ class Connection:
         """Sends a request.
 
         Raises:
-            Problem: If the answer has a status of 400 or above.
+            Problem: If the answer is a refusal, or the redirection of a proxy.
             httpx.TransportError: If there is none.
         """
         try:
@@ -118,7 +116,7 @@ class Connection:
         except httpx.TransportError as error:
             error.add_note(f"There is no answer from {self.http.base_url}, see Client(base_url=…) or GRAMIAN_URL.")
             raise
-        if response.is_error:
+        if not response.is_success:
             raise problem_of(response, retry_after(response))
         return response
 

@@ -29,8 +29,11 @@ class Diagnostics:
         dimension (int): Coordinates of each point, d.
         kernel (KernelUsed): The kernel that was used, every number of it: sent back as `kernel` it gives the same
             answer.
-        solver (SolverUsed): The solver that was used.
-        factorization (FactorizationUsed): How the Gram matrix was factorized.
+        solver (SolverUsed): The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has
+            them yet.
+        factorization (FactorizationUsed): How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`,
+            `conjugate_gradients` and `local` are reserved: no
+            answer has them yet.
         rank (int): Numerical rank of the matrix.
         reciprocal_condition (float): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a
             fraction of all.
