@@ -209,8 +209,8 @@ def test_arrays_of_other_libraries_stay_their_own(client: gramian.Client, circle
 
 
 def test_numbers_of_numpy_are_numbers(client: gramian.Client, circle: Array) -> None:
-    kernel: gramian.KernelFields = {"family": "gauss", "length_scale": np.float64(2)}
-    answer = client.cloud(circle).normals(kernel=kernel, alpha=np.float32(0.5))
+    kernel: gramian.KernelFields = {"family": "gauss", "length_scale": np.float32(2)}  # type: ignore[typeddict-item]
+    answer = client.cloud(circle).normals(kernel=kernel, alpha=np.float32(0.5))  # type: ignore[arg-type]
     assert answer.diagnostics.alpha == 0.5
 
 

@@ -400,7 +400,8 @@ where that has no answer.*/
             value.parse()
         }
     }
-    ///How the Gram matrix was factorized.
+    /**How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`, `conjugate_gradients` and `local` are reserved: no
+answer has them yet.*/
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1275,7 +1276,7 @@ the noise of the points, 1e-3 at least.*/
             value.parse()
         }
     }
-    ///The solver that was used.
+    ///The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has them yet.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -6300,7 +6301,7 @@ the noise of the points, 1e-3 at least.*/
 #[derive(Clone, Debug)]
 /**Client for gramian
 
-Geometric kernel interpolation and regression on point clouds, after Guidotti. Post points once; the factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, lengths are in the client's unit, a null marks an entry without a meaningful value, and every error is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so are computed answers in JSON if Accept-Encoding asks for it.
+Geometric kernel interpolation and regression on point clouds, after Guidotti. Post points once; the factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, lengths are in the client's unit, a null marks an entry without a meaningful value, and every error is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so are computed answers in JSON if Accept-Encoding asks for it. This document is for tools that stop at OpenAPI 3.0: it has bodies in JSON only, no links and no pages, and declares problem documents, which are sent as application/problem+json, as application/json.
 
 Version: 0.1.0*/
 pub struct Client {
