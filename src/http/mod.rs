@@ -19,6 +19,7 @@ mod plain_json;
 pub mod problem;
 mod responses;
 mod routes;
+mod schemas;
 mod shared;
 pub mod slug;
 mod tensors;

@@ -1,15 +1,11 @@
 //! The objects that requests and answers share: CloudRef, Kernel, Fit, Geometry, Diagnostics, Degenerate.
 
-use std::borrow::Cow;
-
 use serde::{Deserialize, Serialize};
-use utoipa::openapi::extensions::Extensions;
-use utoipa::openapi::schema::{Schema, SchemaType, Type};
-use utoipa::openapi::{ObjectBuilder, RefOr};
-use utoipa::{PartialSchema, ToSchema};
+use utoipa::ToSchema;
 
 use super::array::finite;
 use super::body::{Points, present, present_object, present_word, word};
+use super::schemas::{CloudIdSchema, Smoothness};
 
 /// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
 #[derive(Debug, Default, Deserialize, ToSchema)]
@@ -27,25 +23,6 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub normals: Option<Points>,
-}
-
-/// The schema of the id of a cloud; requests are read as text, since what is no id is an unknown cloud.
-pub struct CloudIdSchema;
-
-impl PartialSchema for CloudIdSchema {
-    fn schema() -> RefOr<Schema> {
-        let text =
-            "The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.";
-        let schema =
-            ObjectBuilder::new().schema_type(SchemaType::Type(Type::String)).pattern(Some("^[0-9a-f]{64}$"));
-        schema.description(Some(text)).into()
-    }
-}
-
-impl ToSchema for CloudIdSchema {
-    fn name() -> Cow<'static, str> {
-        "CloudId".into()
-    }
 }
 
 /// The families of kernels; `GET /v1/kernels` has their formulas.
@@ -87,23 +64,6 @@ pub struct Kernel {
     #[schema(nullable = false, value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
-
-/// The schema of `smoothness`; requests are read as numbers, so that a refusal can say which there are.
-pub struct Smoothness;
-
-impl PartialSchema for Smoothness {
-    fn schema() -> RefOr<Schema> {
-        let names = Extensions::builder().add("x-enum-varnames", ["C2", "C4", "C6"]).build();
-        ObjectBuilder::new()
-            .schema_type(SchemaType::Type(Type::Integer))
-            .enum_values(Some([2, 4, 6]))
-            .description(Some("How often a Wendland kernel is continuously differentiable."))
-            .extensions(Some(names))
-            .into()
-    }
-}
-
-impl ToSchema for Smoothness {}
 
 /// The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

@@ -29,7 +29,7 @@ const OF_HTTP: [&str; 7] =
 /// Panics if the document does not promise this answer.
 pub fn check(method: &str, path: &str, answer: &Received) {
     static CONTRACT: LazyLock<Contract> = LazyLock::new(|| {
-        let document = serde_json::from_str(&gramian::http::openapi_json()).unwrap();
+        let document = crate::support::document();
         Contract::new(&document)
     });
     let mismatches = CONTRACT.mismatches(method, path, answer);

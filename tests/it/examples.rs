@@ -44,7 +44,7 @@ fn write(name: &str, value: &Value) {
 
 /// Methods and paths of the document with what they do, by operation id.
 fn operations() -> Map<String, Value> {
-    let document: Value = serde_json::from_str(&gramian::http::openapi_json()).unwrap();
+    let document = crate::support::document();
     let mut operations = Map::new();
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap() {

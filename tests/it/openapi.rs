@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::overwrites;
+use crate::support::{document, overwrites};
 
 #[test]
 fn the_committed_documents_are_the_generated_ones() {
@@ -23,10 +23,6 @@ fn the_committed_documents_are_the_generated_ones() {
 
 fn documents() -> [(&'static str, String); 2] {
     [("openapi.json", gramian::http::openapi_json()), ("openapi-3.0.json", gramian::http::openapi_3_0_json())]
-}
-
-fn document() -> Value {
-    serde_json::from_str(&gramian::http::openapi_json()).unwrap()
 }
 
 fn visit(value: &Value, pointer: &str, see: &mut impl FnMut(&str, &Value)) {

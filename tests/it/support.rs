@@ -144,3 +144,8 @@ pub fn numbers(value: &Value) -> Vec<f64> {
 pub fn overwrites() -> bool {
     std::env::var("EXPECTORATE").is_ok_and(|value| value == "overwrite")
 }
+
+/// The document of this build.
+pub fn document() -> Value {
+    serde_json::from_str(&gramian::http::openapi_json()).unwrap()
+}

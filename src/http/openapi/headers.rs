@@ -5,7 +5,7 @@ use utoipa::openapi::path::Operation;
 use utoipa::openapi::schema::{SchemaType, Type};
 use utoipa::openapi::{ObjectBuilder, Ref, RefOr};
 
-use super::{id_of, operations};
+use super::{id_of, is_computed, operations};
 
 /// Name, example, description.
 const HEADERS: [(&str, &str, &str); 7] = [
@@ -52,7 +52,7 @@ fn own_names(operation: &Operation) -> Vec<&'static str> {
     match id_of(operation) {
         "create_cloud" => vec!["Location"],
         "get_cloud" | "check_cloud" => vec!["ETag"],
-        _ if operation.request_body.is_some() => vec!["Server-Timing", "Cache-Status"],
+        _ if is_computed(operation) => vec!["Server-Timing", "Cache-Status"],
         _ => vec![],
     }
 }

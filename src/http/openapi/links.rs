@@ -7,7 +7,7 @@ use serde_json::json;
 use utoipa::openapi::link::{Link, LinkBuilder};
 use utoipa::openapi::{Ref, RefOr};
 
-use super::{id_of, operations};
+use super::{id_of, is_computed, operations};
 
 /// Where answers name a cloud: those about it, and those computed from it.
 const CLOUD_ID: &str = "$response.body#/cloud_id";
@@ -15,25 +15,20 @@ const CLOUD_ID_USED: &str = "$response.body#/diagnostics/cloud_id";
 
 /// Operations on a cloud of which only the id is needed.
 const ON_PATH: [&str; 3] = ["get_cloud", "check_cloud", "delete_cloud"];
-/// Operations whose request refers to the cloud. The other fields of the request are the client's.
-const IN_BODY: [&str; 8] = [
-    "compute_interpolation",
-    "compute_posterior",
-    "compute_normals",
-    "compute_curvatures",
-    "compute_surface_gradient",
-    "assemble_surface_gradient_matrix",
-    "compute_laplace_beltrami",
-    "assemble_laplace_beltrami_matrix",
-];
 const CLOUD_USED: &str = "get_cloud_used";
 
-/// Declares the links and refers to them from the answers that they start from.
+/// Declares the links and refers to them from the answers that they start from. Every request that computes refers to a
+/// cloud; its other fields are the client's.
 pub fn add(document: &mut utoipa::openapi::OpenApi) {
+    let computed: Vec<String> = operations(document)
+        .filter(|operation| is_computed(operation))
+        .map(|operation| id_of(operation).to_owned())
+        .collect();
+    let of_a_cloud: Vec<&str> = ON_PATH.into_iter().chain(computed.iter().map(String::as_str)).collect();
     for operation in operations(document) {
-        let links: Vec<&str> = match id_of(operation) {
-            "create_cloud" => ON_PATH.into_iter().chain(IN_BODY).collect(),
-            id if IN_BODY.contains(&id) => vec![CLOUD_USED],
+        let links = match id_of(operation) {
+            "create_cloud" => &of_a_cloud[..],
+            _ if is_computed(operation) => &[CLOUD_USED],
             _ => continue,
         };
         for status in ["200", "201"] {
@@ -43,10 +38,10 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
             response.links = links.iter().copied().map(refer).collect();
         }
     }
-    document.components.get_or_insert_default().links = components();
+    document.components.get_or_insert_default().links = components(&computed);
 }
 
-fn components() -> BTreeMap<String, RefOr<Link>> {
+fn components(computed: &[String]) -> BTreeMap<String, RefOr<Link>> {
     let on_path = |id: &str| link(id, "The same cloud, by its id.").parameter("cloud_id", CLOUD_ID).build();
     let in_body = |id: &str| {
         let body = json!({"cloud": {"id": CLOUD_ID}});
@@ -54,7 +49,7 @@ fn components() -> BTreeMap<String, RefOr<Link>> {
     };
     let mut links: BTreeMap<String, Link> = BTreeMap::new();
     links.extend(ON_PATH.map(|id| (id.to_owned(), on_path(id))));
-    links.extend(IN_BODY.map(|id| (id.to_owned(), in_body(id))));
+    links.extend(computed.iter().map(|id| (id.clone(), in_body(id))));
     let used = link("get_cloud", "The cloud that the request named or registered.");
     links.insert(CLOUD_USED.to_owned(), used.parameter("cloud_id", CLOUD_ID_USED).build());
     links.into_iter().map(|(name, link)| (name, RefOr::T(link))).collect()

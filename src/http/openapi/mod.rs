@@ -102,3 +102,8 @@ fn operations(document: &mut utoipa::openapi::OpenApi) -> impl Iterator<Item = &
 fn id_of(operation: &Operation) -> &str {
     operation.operation_id.as_deref().unwrap_or_default()
 }
+
+/// Whether its answers come from a factorization: every operation with a body but the registration of clouds.
+fn is_computed(operation: &Operation) -> bool {
+    operation.request_body.is_some() && id_of(operation) != "create_cloud"
+}

@@ -17,7 +17,7 @@ use crate::http::fit::{Planner, unknown_cloud};
 use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
-use crate::http::shared::CloudIdSchema;
+use crate::http::schemas::CloudIdSchema;
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::CloudId;

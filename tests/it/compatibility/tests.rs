@@ -3,14 +3,11 @@
 use serde_json::{Value, json};
 
 use super::breaking_changes;
+use crate::support::document;
 
 const OPERATION: &str = "/paths/~1v1~1curvatures/post";
 const REQUEST: &str = "/components/schemas/CurvaturesRequest";
 const ANSWER: &str = "/components/schemas/CurvaturesResponse";
-
-fn document() -> Value {
-    serde_json::from_str(&gramian::http::openapi_json()).unwrap()
-}
 
 /// The pointers of what is broken by a change.
 fn broken(change: impl FnOnce(&mut Value)) -> Vec<String> {

@@ -6,13 +6,9 @@ use serde_json::{Value, json};
 use super::document::Contract;
 use super::{BESIDE, Received, is_beside};
 use crate::routes::route_of;
-use crate::support::{Server, receive};
+use crate::support::{Server, document, receive};
 
 const PATH: &str = "/v1/curvatures";
-
-fn document() -> Value {
-    serde_json::from_str(&gramian::http::openapi_json()).unwrap()
-}
 
 /// A request to its right answer, and what the checker says once the answer is changed.
 struct Case {

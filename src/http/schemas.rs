@@ -1,0 +1,44 @@
+//! Types of the document that the code has as plain text and numbers: their schemas.
+
+use std::borrow::Cow;
+
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{Schema, SchemaType, Type};
+use utoipa::openapi::{ObjectBuilder, RefOr};
+use utoipa::{PartialSchema, ToSchema};
+
+/// The schema of the id of a cloud; requests are read as text, since what is no id is an unknown cloud.
+pub struct CloudIdSchema;
+
+impl PartialSchema for CloudIdSchema {
+    fn schema() -> RefOr<Schema> {
+        let text =
+            "The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.";
+        let schema =
+            ObjectBuilder::new().schema_type(SchemaType::Type(Type::String)).pattern(Some("^[0-9a-f]{64}$"));
+        schema.description(Some(text)).into()
+    }
+}
+
+impl ToSchema for CloudIdSchema {
+    fn name() -> Cow<'static, str> {
+        "CloudId".into()
+    }
+}
+
+/// The schema of `smoothness`; requests are read as numbers, so that a refusal can say which there are.
+pub struct Smoothness;
+
+impl PartialSchema for Smoothness {
+    fn schema() -> RefOr<Schema> {
+        let names = Extensions::builder().add("x-enum-varnames", ["C2", "C4", "C6"]).build();
+        ObjectBuilder::new()
+            .schema_type(SchemaType::Type(Type::Integer))
+            .enum_values(Some([2, 4, 6]))
+            .description(Some("How often a Wendland kernel is continuously differentiable."))
+            .extensions(Some(names))
+            .into()
+    }
+}
+
+impl ToSchema for Smoothness {}
