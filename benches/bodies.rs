@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench bodies`
 
+#![allow(clippy::disallowed_methods)]
+
 use std::hint::black_box;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -20,6 +22,7 @@ use gramian::http::body::{Points, parse_json};
 use gramian::http::encode::Encoded;
 use gramian::http::negotiation::{Coding, Format, Wanted};
 use gramian::http::problem::Problem;
+use gramian::store::Owner;
 
 const N_POINTS: usize = 1_000_000;
 const MATRIX_ROWS: usize = 4_000;
@@ -123,8 +126,10 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
         let (app, matrix) = (app.clone(), ready.lock().unwrap().pop().unwrap());
         async move {
             let wanted = Wanted { format: Format::Npy, coding: Coding::Identity };
-            let encoded = app.compute.run(0.0, move |_| Encoded::of(Matrix(matrix), wanted)).await;
-            encoded.ok().unwrap().0.ok().unwrap().into_response(&app)
+            let memory = app.factors.reserve(Owner(0), 2 * size_of_val(&*matrix)).await.unwrap();
+            let encode = move || Encoded::of(Matrix(matrix), wanted);
+            let encoded = app.compute.run_small(Owner(0), encode).await;
+            encoded.ok().unwrap().ok().unwrap().into_response(&app, memory)
         }
     };
     std::thread::spawn(move || {

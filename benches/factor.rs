@@ -3,6 +3,8 @@
 //! `cargo bench --bench factor [-- n]`; the two are measured in turn, so that a drifting machine disturbs both. With
 //! `--lockstep` a round for each line on standard input.
 
+#![allow(clippy::disallowed_methods)]
+
 mod support;
 
 use std::sync::{Arc, Mutex};

@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench kernels`
 
+#![allow(clippy::disallowed_methods)]
+
 use std::time::Instant;
 
 use gramian::numerics::cloud::Cloud;

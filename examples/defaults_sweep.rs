@@ -94,8 +94,9 @@ impl<'a> Scan<'a> {
     }
 
     fn rule(&self) -> Result<(Kernel, f64)> {
-        let noise = || estimate_noise(&self.cloud, &self.neighbours);
-        Ok(default_fit(&Scales::of(&self.cloud, &self.neighbours), Purpose::Normals, noise)?)
+        let scales = Scales::of(&self.cloud, &self.neighbours, &Unobserved)?;
+        let noise = estimate_noise(&self.cloud, &self.neighbours, &Unobserved)?;
+        Ok(default_fit(&scales, Purpose::Normals, || noise)?)
     }
 
     /// Median angle between lines, in degrees: signs are another matter.

@@ -6,15 +6,21 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use crate::config::Config;
 use crate::http::auth::Keys;
 use crate::http::compute::Compute;
-use crate::http::operation::FactorFailure;
+use crate::http::fitting::FactorFailure;
+use crate::http::problem::Problem;
+use crate::memory::Memory;
+use crate::store::budget::Budget;
 use crate::store::clouds::CloudStore;
-use crate::store::factors::FactorStore;
+use crate::store::factors::{FactorBytes, FactorStore};
 
 /// Configuration, stores and compute pool.
 pub struct App {
     pub config: Config,
+    pub memory: Memory,
     pub keys: Keys,
-    pub clouds: CloudStore,
+    /// The memory of bodies that are read, unpacked and parsed, and of requests that wait.
+    pub intake: Budget,
+    pub clouds: CloudStore<Problem>,
     pub factors: FactorStore<FactorFailure>,
     pub compute: Compute,
     /// Requests between their arrival and their answer.
@@ -29,11 +35,17 @@ impl App {
     /// # Errors
     /// If the operating system refuses the threads.
     pub fn new(config: Config) -> Result<Arc<Self>, rayon::ThreadPoolBuildError> {
+        let (memory, keys) = (Memory::of(&config), Keys::new(&config.api_keys));
+        let n_owners = keys.n_owners();
+        let of_factors =
+            FactorBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
         Ok(Arc::new(Self {
-            keys: Keys::new(&config.api_keys),
-            clouds: CloudStore::new(config.cloud_bytes),
-            factors: FactorStore::new(config.cache_bytes),
-            compute: Compute::new(config.n_threads(), config.max_queue, config.cache_bytes)?,
+            intake: Budget::new(memory.intake, n_owners),
+            clouds: CloudStore::new(memory.clouds),
+            factors: FactorStore::new(of_factors),
+            compute: Compute::new(config.n_threads(), config.max_queue, n_owners, config.deadline())?,
+            memory,
+            keys,
             n_requests: AtomicUsize::new(0),
             is_draining: AtomicBool::new(false),
             config,

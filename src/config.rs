@@ -3,6 +3,8 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use crate::memory;
+
 /// The configuration, read once in `main` and passed down.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Config {
@@ -14,14 +16,19 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0)]
     pub threads: usize,
 
-    /// Bytes of factorizations and weights kept in memory, an eighth of it for the next factorization; requests under way may
-    /// hold as much again.
-    #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value_t = 4 << 30)]
-    pub cache_bytes: u64,
+    /// Bytes of memory for everything: bodies, clouds, factorizations, work and answers. Absent: three quarters of what the
+    /// machine or the container has.
+    #[arg(long, env = "GRAMIAN_MEMORY_BYTES", value_parser = enough_bytes)]
+    pub memory_bytes: Option<usize>,
 
-    /// Bytes of registered clouds kept in memory.
+    /// Of these, bytes of factorizations and weights that are kept, an eighth of it for the next factorization; less where
+    /// work needs them.
+    #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value_t = 4 << 30)]
+    pub cache_bytes: usize,
+
+    /// Of these, bytes of registered clouds that are kept, an eighth of all at most.
     #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 256 << 20)]
-    pub cloud_bytes: u64,
+    pub cloud_bytes: usize,
 
     /// Points a cloud may have; a dense factorization takes 4 n² bytes and n³/3 flops.
     #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 20_000)]
@@ -51,6 +58,10 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_DEADLINE_SECONDS", default_value_t = 120.0, value_parser = positive_seconds)]
     pub deadline_seconds: f64,
 
+    /// Seconds that a body may be late by: it must come at 16 KiB a second otherwise, or is answered 408.
+    #[arg(long, env = "GRAMIAN_BODY_SECONDS", default_value_t = 10.0, value_parser = positive_seconds)]
+    pub body_seconds: f64,
+
     /// Bearer keys, separated by commas; none leaves the service open.
     #[arg(long, env = "GRAMIAN_API_KEYS", value_delimiter = ',', hide_env_values = true)]
     pub api_keys: Vec<String>,
@@ -69,9 +80,27 @@ impl Config {
         }
     }
 
+    /// Bytes of memory for everything.
+    pub fn memory_bytes(&self) -> usize {
+        self.memory_bytes.unwrap_or_else(memory::default_bytes)
+    }
+
+    /// How late a body may be.
+    pub fn body_timeout(&self) -> Duration {
+        Duration::from_secs_f64(self.body_seconds)
+    }
+
     /// The deadline as a duration.
     pub fn deadline(&self) -> Duration {
         Duration::from_secs_f64(self.deadline_seconds)
+    }
+}
+
+/// As many as the process needs to answer at all.
+fn enough_bytes(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(bytes) if bytes >= memory::LEAST_BYTES => Ok(bytes),
+        _ => Err(format!("must be a number of bytes, at least {}", memory::LEAST_BYTES)),
     }
 }
 

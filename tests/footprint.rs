@@ -6,16 +6,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gramian::numerics::cloud::Cloud;
+use gramian::numerics::defaults::Scales;
+use gramian::numerics::error::NumericsError;
 use gramian::numerics::geometry::{Geometry, GeometryRequest};
 use gramian::numerics::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::{GramFactor, Solution};
 use gramian::numerics::surface::Surface;
 use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
-use gramian::store::factors::{FactorStore, StoredFactor};
+use gramian::store::factors::{FactorBytes, FactorStore, StoredFactor};
 use gramian::store::key::{CloudId, FactorKey, ValuesKey};
 
 #[global_allocator]
@@ -25,9 +28,12 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 const TOLERANCE: f64 = 0.05;
 
 /// Enough for every store here: nothing is evicted.
-const BUDGET: u64 = 1 << 34;
+const BUDGET: usize = 1 << 34;
+
+const OWNER: Owner = Owner(0);
 
 type Factors = FactorStore<&'static str>;
+type Clouds = CloudStore<NumericsError>;
 
 #[tokio::test]
 async fn what_the_stores_count_is_what_they_take() {
@@ -38,15 +44,14 @@ async fn what_the_stores_count_is_what_they_take() {
         }
     };
     let clouds = |from: usize, to: usize| {
-        async move |store: &CloudStore, k: usize| keep_cloud(store, scattered(k, from, to), k)
+        async move |store: &Clouds, k: usize| keep_cloud(store, scattered(k, from, to), k).await
     };
-    let (new_factors, new_clouds) = (|| Factors::new(BUDGET), || CloudStore::new(BUDGET));
+    let bytes = FactorBytes { kept: BUDGET, spare: BUDGET / 8, budget: BUDGET, n_owners: 1 };
+    let (new_factors, new_clouds) = (|| Factors::new(bytes), || Clouds::new(BUDGET));
     let measurements = [
         growth("weights of 64 to 1,000 values", new_factors(), Factors::n_bytes, 60_000, keep_weights).await,
-        growth("clouds of 10 to 300 points", new_clouds(), CloudStore::n_bytes, 40_000, clouds(10, 300))
-            .await,
-        growth("clouds of 1,000 to 20,000", new_clouds(), CloudStore::n_bytes, 900, clouds(1000, 20_000))
-            .await,
+        growth("clouds of 10 to 300 points", new_clouds(), Clouds::n_bytes, 40_000, clouds(10, 300)).await,
+        growth("clouds of 1,000 to 20,000", new_clouds(), Clouds::n_bytes, 900, clouds(1000, 20_000)).await,
         growth("factors of 64 to 512 points", new_factors(), Factors::n_bytes, 1800, factors(false, 64, 512))
             .await,
         growth("with their surfaces", new_factors(), Factors::n_bytes, 1200, factors(true, 64, 512)).await,
@@ -67,7 +72,7 @@ async fn what_the_stores_count_is_what_they_take() {
 async fn growth<S>(
     name: &'static str,
     store: S,
-    n_bytes: impl Fn(&S) -> u64,
+    n_bytes: impl Fn(&S) -> usize,
     n: usize,
     keep: impl AsyncFn(&S, usize),
 ) -> (&'static str, f64, f64) {
@@ -98,30 +103,37 @@ async fn keep_weights(store: &Factors, k: usize) {
     store.keep_solution(key, ValuesKey::of(&[k as f64]), Arc::new(solution));
 }
 
-fn keep_cloud(store: &CloudStore, n: usize, k: usize) {
+async fn keep_cloud(store: &Clouds, n: usize, k: usize) {
     // As a parser leaves them: grown by doubling.
     let mut coordinates = Vec::new();
     (0..3 * n).for_each(|i| coordinates.push((k * 7 + i) as f64));
-    let (stored, is_new) = store.register(Owner(0), Cloud::new(coordinates, 3).unwrap(), None);
+    let (stored, is_new) = store.register(OWNER, Cloud::new(coordinates, 3).unwrap(), None);
     assert!(is_new);
     if k.is_multiple_of(20) {
-        stored.scales();
+        let cloud = stored.cloud.clone();
+        let look = || async move { Scales::of(&cloud, &Neighbours::of(&cloud), &Unobserved) };
+        store.scales(OWNER, &stored, look).await.unwrap();
     }
 }
 
 async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
     let (cloud, kernel, alpha) = (sphere(n), kernel(k), Regularization::Uniform(1e-6));
     let key = key(&cloud, &kernel, &alpha);
-    let factorize = move || async move {
+    let factorize = move |memory| async move {
         let factor = GramFactor::factorize(Arc::new(cloud), kernel, alpha, &Unobserved).unwrap();
-        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO))
+        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
     };
-    let (stored, _) = store.get_or_factorize(key, factorize).await.unwrap();
+    let memory = store.reserve(OWNER, GramFactor::n_bytes_needed(n).unwrap()).await.unwrap();
+    let (stored, _) = store.get_or_factorize(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
-        let signature = Interpolant::signature(stored.factor.clone(), &Unobserved).unwrap();
-        let surface = stored.surface(|| Surface::of(signature, None, &Unobserved)).unwrap();
+        let factor = stored.factor.clone();
+        let make = || async move {
+            let signature = Interpolant::signature(factor, &Unobserved).unwrap();
+            Ok(Surface::of(signature, None, &Unobserved).unwrap())
+        };
+        let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3)).await.unwrap();
+        let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();
         Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
-        store.reweigh(key);
     }
 }
 
@@ -131,7 +143,7 @@ fn kernel(k: usize) -> Kernel {
 }
 
 fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FactorKey {
-    FactorKey::of_dense(Owner(0), CloudId::of(cloud, None), kernel, alpha, false)
+    FactorKey::of_dense(OWNER, CloudId::of(cloud, None), kernel, alpha, false)
 }
 
 fn resident_bytes() -> f64 {

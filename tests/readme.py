@@ -42,7 +42,7 @@ def main():
     readmes = [place for place in arguments.places if "://" not in place]
     readme = Path(readmes[0] if readmes else Path(__file__).resolve().parent.parent / "README.md").resolve()
     if arguments.binary:
-        with server(arguments.binary) as base:
+        with server(arguments.binary) as (base, _):
             run(base, readme)
     else:
         run(bases[0].rstrip("/") if bases else "http://localhost:8080", readme)

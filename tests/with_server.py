@@ -24,19 +24,19 @@ SECONDS_TO_STOP = 20
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    with server(sys.argv[1]) as base:
+    with server(sys.argv[1]) as (base, _):
         outcome = subprocess.run(sys.argv[2:], env=environment() | {"GRAMIAN_URL": base}, check=False)
     sys.exit(outcome.returncode)
 
 
 @contextlib.contextmanager
-def server(binary):
-    """A server on a port of its own choice, in its default configuration; its base URL."""
+def server(binary, flags=()):
+    """A server on a port of its own choice, but for the flags in its default configuration; its base URL and process id."""
     with tempfile.TemporaryFile() as log:
-        command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0"]
+        command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0", *flags]
         process = subprocess.Popen(command, env=environment() | {"RUST_LOG": "info"}, stderr=log)
         try:
-            yield f"http://{address_of(process, log)}"
+            yield f"http://{address_of(process, log)}", process.pid
         finally:
             stop(process)
 

@@ -28,6 +28,11 @@ impl Keys {
         self.0.is_empty()
     }
 
+    /// How many owners share the service; one where it is open.
+    pub fn n_owners(&self) -> usize {
+        self.0.len().max(1)
+    }
+
     /// Finds the owner of a key in time that does not depend on the keys: hashes are compared in full, and all of them.
     pub fn owner_of(&self, key: &str) -> Option<Owner> {
         let digest: [u8; 32] = blake3::hash(key.as_bytes()).into();

@@ -2,9 +2,6 @@
 
 use std::marker::PhantomData;
 
-use axum::body::Body;
-use axum::http::{HeaderMap, header};
-use http_body_util::BodyExt;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{
     Deserialize, DeserializeOwned, Deserializer, IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Visitor,
@@ -12,18 +9,13 @@ use serde::de::{
 use serde_json::error::Category;
 
 use super::compression::decompress;
-use super::negotiation::{Coding, Format, announced};
+use super::compute::FLOPS_PER_PARSED_BYTE;
+use super::negotiation::{Coding, Format};
 use super::plain_json;
 use super::problem::Problem;
 use super::slug::Slug;
 use super::tensors::{parse_npy, parse_safetensors};
-
-/// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
-/// answer instead of a broken connection.
-const MAX_DRAINED_BYTES: usize = 64 << 20;
-
-/// Bytes that are allocated on the word of a Content-Length; beyond it the buffer grows as bytes come.
-const MAX_TRUSTED_BYTES: usize = 1 << 20;
+use crate::config::Config;
 
 /// Characters of a refused value or name that are repeated to the client.
 const MAX_SHOWN_CHARACTERS: usize = 200;
@@ -38,6 +30,34 @@ pub struct RequestBody {
 }
 
 impl RequestBody {
+    pub fn new(format: Format, coding: Coding, bytes: Vec<u8>, limit: usize) -> Self {
+        Self { format, coding, bytes, limit }
+    }
+
+    /// Bytes that [`RequestBody::parse`] takes beside the body at most: the body unpacked, and the numbers in it, of which the
+    /// limits leave so many. A number takes two bytes of JSON at least, its comma included.
+    pub fn n_bytes_to_parse(&self, config: &Config) -> usize {
+        let plain = self.n_bytes_plain();
+        let unpacked = if self.coding == Coding::Identity { 0 } else { plain };
+        let n_rows = 4 * config.max_points.saturating_add(config.max_queries);
+        let most = n_rows.saturating_mul(config.max_dimension).saturating_mul(size_of::<f64>());
+        unpacked + plain.saturating_mul(size_of::<f64>() / 2).min(most)
+    }
+
+    /// What parsing costs, in flops.
+    pub fn flops_to_parse(&self) -> f64 {
+        FLOPS_PER_PARSED_BYTE * self.n_bytes_plain() as f64
+    }
+
+    /// Bytes without compression at most.
+    fn n_bytes_plain(&self) -> usize {
+        match self.coding {
+            Coding::Identity => self.bytes.len(),
+            // A few bytes of zstd may unpack to any number.
+            Coding::Gzip | Coding::Zstd => self.limit,
+        }
+    }
+
     /// Decompresses and parses, on the pool.
     ///
     /// # Errors
@@ -48,54 +68,6 @@ impl RequestBody {
             Format::Json => parse_json(&bytes),
             Format::Safetensors => parse_safetensors(&bytes),
             Format::Npy => parse_npy(&bytes),
-        }
-    }
-}
-
-/// Reads a body of at most `limit` bytes, in one of the formats.
-///
-/// # Errors
-/// 415 unless the headers announce one of them, 413 beyond the limit, 400 if the connection breaks off.
-pub async fn read_body(
-    headers: &HeaderMap,
-    body: Body,
-    formats: &[Format],
-    limit: usize,
-) -> Result<RequestBody, Problem> {
-    let (format, coding) = announced(headers, formats)?;
-    let bytes = read_bytes(headers, body, limit).await?;
-    Ok(RequestBody { format, coding, bytes, limit })
-}
-
-async fn read_bytes(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u8>, Problem> {
-    let length = headers
-        .get(header::CONTENT_LENGTH)
-        .and_then(|length| length.to_str().ok())
-        .and_then(|length| length.parse::<usize>().ok());
-    if let Some(required) = length.filter(|&length| length > limit) {
-        drain(body).await;
-        return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, Some(required)));
-    }
-    let mut body = body;
-    let mut bytes = Vec::with_capacity(length.unwrap_or(0).min(MAX_TRUSTED_BYTES));
-    while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|_| Problem::new(Slug::MalformedBody, "the body broke off"))?;
-        let Ok(data) = frame.into_data() else { continue };
-        if bytes.len() + data.len() > limit {
-            drain(body).await;
-            return Err(Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, None));
-        }
-        bytes.extend_from_slice(&data);
-    }
-    Ok(bytes)
-}
-
-async fn drain(mut body: Body) {
-    let mut drained = 0;
-    while let Some(Ok(frame)) = body.frame().await {
-        drained += frame.into_data().map_or(0, |data| data.len());
-        if drained > MAX_DRAINED_BYTES {
-            break;
         }
     }
 }

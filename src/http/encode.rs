@@ -22,6 +22,8 @@ use super::compression::Compressor;
 use super::negotiation::{Coding, Format, Wanted};
 use super::problem::Problem;
 use crate::app::App;
+use crate::store::Owner;
+use crate::store::budget::Reservation;
 
 /// Numbers of a chunk: some 170 kB of JSON and 150 µs of one core, against some 10 µs to hand a job to the pool.
 const NUMBERS_PER_CHUNK: usize = 1 << 13;
@@ -31,6 +33,9 @@ const CHUNKS_AT_ONCE: usize = 4;
 
 /// Bytes of a chunk of a binary body that is compressed.
 const BYTES_PER_CHUNK: usize = 1 << 18;
+
+/// Bytes of chunks that are written but not sent, for each thread: two, with room for the compressor's copy.
+const BYTES_UNDER_WAY: usize = 1 << 20;
 
 /// Bodies below it are sent as they are: what compression saves of a packet or two is less than its header and its time.
 const LEAST_COMPRESSED_BYTES: usize = 1 << 10;
@@ -59,6 +64,14 @@ impl Chunk {
                 Piece::Numbers(array, range) => array.write_json(range.clone(), out),
             }
         }
+    }
+
+    fn n_bytes(&self) -> usize {
+        let of = |piece: &Piece| match piece {
+            Piece::Bytes(bytes) => bytes.len(),
+            Piece::Numbers(_, range) => range.len() * size_of::<f64>(),
+        };
+        self.0.iter().map(of).sum()
     }
 
     fn to_bytes(&self) -> Vec<u8> {
@@ -173,16 +186,28 @@ impl Encoded {
         matches!(self.body, Encoding::Chunks(..))
     }
 
-    /// The response with the headers that describe its body.
-    pub fn into_response(self, app: &Arc<App>) -> Response {
+    /// Bytes that its body holds until it is sent; pieces of numbers are held until the last of them is written.
+    pub fn n_bytes(&self) -> usize {
+        match &self.body {
+            Encoding::Whole(frames) => frames.iter().map(Bytes::len).sum(),
+            Encoding::Chunks(chunks, _) => chunks.iter().map(Chunk::n_bytes).sum(),
+        }
+    }
+
+    /// The response with the headers that describe its body, which holds `memory` until it is sent or given up.
+    pub fn into_response(self, app: &Arc<App>, mut memory: Reservation) -> Response {
+        let (owner, n_bytes) = (memory.owner(), self.n_bytes());
+        memory.shrink_to(n_bytes.saturating_add(BYTES_UNDER_WAY * app.config.n_threads()));
         let (body, length) = match self.body {
             Encoding::Whole(frames) => {
                 let length = frames.iter().map(Bytes::len).sum::<usize>();
                 let frames = stream::iter(frames.into_iter().map(Ok::<_, io::Error>));
-                (Body::from_stream(frames), Some(length))
+                (Body::from_stream(holding(frames, memory)), Some(length))
             }
             Encoding::Chunks(chunks, compressor) => {
-                (Body::from_stream(compressed(written(chunks, app.clone()), compressor, app.clone())), None)
+                let written = written(chunks, app.clone(), owner);
+                let compressed = compressed(written, compressor, app.clone(), owner);
+                (Body::from_stream(holding(compressed, memory)), None)
             }
         };
         let mut response = body.into_response();
@@ -212,10 +237,22 @@ fn split_bytes(chunks: Vec<Chunk>) -> Vec<Chunk> {
     chunks.into_iter().flat_map(split).collect()
 }
 
+/// A stream that holds something for as long as it is there.
+fn holding<S: Stream>(stream: S, held: Reservation) -> impl Stream<Item = S::Item> {
+    stream.map(move |item| {
+        let _ = &held;
+        item
+    })
+}
+
 /// The bytes of chunks in order, twice as many under way as there are threads.
-fn written(chunks: Vec<Chunk>, app: Arc<App>) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {
+fn written(
+    chunks: Vec<Chunk>,
+    app: Arc<App>,
+    owner: Owner,
+) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {
     let n_under_way = 2 * app.config.n_threads();
-    let write = move |chunk: Chunk| on_pool(app.clone(), move || Ok(chunk.to_bytes()));
+    let write = move |chunk: Chunk| on_pool(app.clone(), owner, move || Ok(chunk.to_bytes()));
     stream::iter(chunks).map(write).buffered(n_under_way)
 }
 
@@ -224,6 +261,7 @@ fn compressed(
     plain: impl Stream<Item = io::Result<Vec<u8>>> + Send,
     compressor: Box<Compressor>,
     app: Arc<App>,
+    owner: Owner,
 ) -> impl Stream<Item = io::Result<Bytes>> + Send {
     let step = move |(mut plain, compressor): (std::pin::Pin<Box<_>>, Option<Box<Compressor>>)| {
         let app = app.clone();
@@ -233,9 +271,9 @@ fn compressed(
             let (bytes, compressor) = match (next.transpose()?, &*compressor) {
                 (Some(bytes), Compressor::Identity) => (bytes, Some(compressor)),
                 (Some(bytes), _) => {
-                    on_pool(app, move || Ok((compressor.write(bytes)?, Some(compressor)))).await?
+                    on_pool(app, owner, move || Ok((compressor.write(bytes)?, Some(compressor)))).await?
                 }
-                (None, _) => (on_pool(app, move || compressor.finish()).await?, None),
+                (None, _) => (on_pool(app, owner, move || compressor.finish()).await?, None),
             };
             Ok(Some((Bytes::from(bytes), (plain, compressor))))
         }
@@ -248,11 +286,12 @@ fn compressed(
 /// Runs a job as a task of its own: it holds a permit only while it computes, whether or not it is waited for.
 async fn on_pool<T: Send + 'static>(
     app: Arc<App>,
+    owner: Owner,
     job: impl FnOnce() -> io::Result<T> + Send + 'static,
 ) -> io::Result<T> {
-    let task = tokio::spawn(async move { app.compute.run(0.0, |_| job()).await });
+    let task = tokio::spawn(async move { app.compute.run_small(owner, job).await });
     match task.await {
-        Ok(Ok((result, _))) => result,
+        Ok(Ok(result)) => result,
         // The answer is under way and can only be broken off.
         Ok(Err(_)) | Err(_) => Err(io::Error::other("a job of the encoder failed")),
     }

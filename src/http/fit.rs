@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::body::Points;
+use super::kernel::PlannedKernel;
 use super::problem::{Place, Problem};
 use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use super::slug::Slug;
@@ -14,13 +15,81 @@ use crate::numerics::duplicates::Merge;
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::Kernel as NumericalKernel;
 use crate::numerics::regularization::Regularization;
-use crate::numerics::solver::GramFactor;
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::{CloudId, FactorKey};
 
 /// Bytes that a number takes in JSON at most, with its comma.
 const BYTES_PER_NUMBER: usize = 25;
+
+/// A fit that is checked as far as the request goes; what is left out follows from the cloud.
+pub struct PlannedFit {
+    pub owner: Owner,
+    pub stored: Arc<StoredCloud>,
+    pub place: Place,
+    kernel: Option<PlannedKernel>,
+    regularization: Option<Regularization>,
+    duplicates: DuplicatePolicy,
+    purpose: Purpose,
+}
+
+impl PlannedFit {
+    /// Points that are factorized at most: without the duplicates that may be merged.
+    pub fn n_points(&self) -> usize {
+        self.stored.cloud.n_points()
+    }
+
+    /// Whether the noise is given for each point.
+    pub fn has_noise_variances(&self) -> bool {
+        matches!(self.regularization, Some(Regularization::PerPoint(_)))
+    }
+
+    /// Whether the lengths of the cloud decide, and are not known yet.
+    pub fn lacks_scales(&self) -> bool {
+        !matches!(self.kernel, Some(PlannedKernel::Given(_))) && self.stored.scales().is_none()
+    }
+
+    /// Whether the noise of the points decides, and is not known yet.
+    pub fn lacks_noise(&self) -> bool {
+        self.needs_noise() && self.stored.noise().is_none()
+    }
+
+    fn needs_noise(&self) -> bool {
+        self.kernel.is_none() && self.regularization.is_none() && self.purpose != Purpose::Values
+    }
+
+    /// Fills in what is left out, once the cloud has what it lacks.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn resolve(self) -> Result<FitPlan, Problem> {
+        let Self { owner, stored, place, .. } = self;
+        let refuse = |error| Problem::from_numerics(error, place);
+        let (kernel, default_alpha) = match &self.kernel {
+            Some(kernel) => (kernel.resolve(stored.scales(), place)?, DEFAULT_ALPHA),
+            None => {
+                let scales = stored.scales().ok_or_else(Problem::internal)?;
+                // With a regularization given, nothing follows from it.
+                let noise = || stored.noise().unwrap_or_default();
+                default_fit(scales, self.purpose, noise).map_err(refuse)?
+            }
+        };
+        let regularization = match self.regularization {
+            Some(given) => given,
+            None => Regularization::uniform(default_alpha).map_err(refuse)?,
+        };
+        kernel.check_dimension(stored.cloud.dimension()).map_err(refuse)?;
+        let merges =
+            self.duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
+        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
+        let key = FactorKey::of_dense(owner, stored.id, &kernel, &regularization, merged.is_some());
+        let (fitted, merge) = match merged {
+            None => (stored.cloud.clone(), None),
+            Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
+        };
+        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, place })
+    }
+}
 
 /// A fit whose inputs are checked and whose cost is known and admitted.
 #[derive(Clone)]
@@ -71,7 +140,7 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<FitPlan, Problem> {
+    pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<PlannedFit, Problem> {
         let place = place_of(&fit);
         let stored = self.cloud(fit.cloud, "/cloud")?;
         let (SolverChoice::Auto | SolverChoice::Dense) = fit.solver;
@@ -83,7 +152,7 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(FitPlan, FitPlan), Problem> {
+    pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(PlannedFit, PlannedFit), Problem> {
         let geometry = geometry.unwrap_or_default();
         let place = place_of(&fit);
         let surface_place = place_of_surface(&geometry, place);
@@ -122,7 +191,11 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// 413 beyond the limit, 422 for what is no list of points of this dimension.
-    pub fn queries(&self, queries: Option<Points>, fits: &mut [&mut FitPlan]) -> Result<Arc<Cloud>, Problem> {
+    pub fn queries(
+        &self,
+        queries: Option<Points>,
+        fits: &mut [&mut PlannedFit],
+    ) -> Result<Arc<Cloud>, Problem> {
         // The last fit is that of the surface, whose points are the default.
         let Some(default) = fits.last().map(|fit| (fit.stored.cloud.clone(), fit.place.points)) else {
             return Err(Problem::internal());
@@ -149,20 +222,20 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// 422 `length-mismatch`.
-    pub fn check_values(&self, values: &[f64], plan: &FitPlan) -> Result<(), Problem> {
+    pub fn check_values(&self, values: &[f64], plan: &PlannedFit) -> Result<(), Problem> {
         let (expected, found) = (plan.stored.cloud.n_points(), values.len());
         if expected == found { Ok(()) } else { Err(Problem::length_mismatch("/values", expected, found)) }
     }
 
-    /// Admits an answer of so many numbers.
+    /// Admits an answer of so many numbers, and says how many they are.
     ///
     /// # Errors
     /// 413 `problem-too-large` if it would be over the limit, or not countable.
-    pub fn check_answer(&self, n_numbers: Option<usize>) -> Result<(), Problem> {
+    pub fn check_answer(&self, n_numbers: Option<usize>) -> Result<usize, Problem> {
         let limit = self.app.config.max_response_bytes;
         let required = n_numbers.and_then(|n| n.checked_mul(BYTES_PER_NUMBER)).unwrap_or(usize::MAX);
-        if required <= limit {
-            return Ok(());
+        if let Some(n_numbers) = n_numbers.filter(|_| required <= limit) {
+            return Ok(n_numbers);
         }
         Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)))
     }
@@ -223,26 +296,10 @@ impl Planner<'_> {
         duplicates: DuplicatePolicy,
         purpose: Purpose,
         place: Place,
-    ) -> Result<FitPlan, Problem> {
-        let (kernel, regularization) = chosen.resolve(&stored, purpose, place)?;
-        kernel.check_dimension(stored.cloud.dimension()).map_err(|e| Problem::from_numerics(e, place))?;
-        let n = stored.cloud.n_points();
-        if GramFactor::n_bytes_needed(n).is_none() {
-            return Err(Problem::too_large(
-                Slug::ProblemTooLarge,
-                "points",
-                self.app.config.max_points,
-                Some(n),
-            ));
-        }
-        let merges = duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
-        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
-        let key = FactorKey::of_dense(self.owner, stored.id, &kernel, &regularization, merged.is_some());
-        let (fitted, merge) = match merged {
-            None => (stored.cloud.clone(), None),
-            Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
-        };
-        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, place })
+    ) -> Result<PlannedFit, Problem> {
+        let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(place)).transpose()?;
+        let regularization = chosen.regularization(&stored, place)?;
+        Ok(PlannedFit { owner: self.owner, stored, place, kernel, regularization, duplicates, purpose })
     }
 }
 
@@ -287,32 +344,24 @@ struct Chosen {
 }
 
 impl Chosen {
-    fn resolve(
-        self,
-        stored: &StoredCloud,
-        purpose: Purpose,
-        place: Place,
-    ) -> Result<(NumericalKernel, Regularization), Problem> {
+    /// What is given; `None` leaves it to the service.
+    fn regularization(self, stored: &StoredCloud, place: Place) -> Result<Option<Regularization>, Problem> {
         let refuse = |error| Problem::from_numerics(error, place);
-        let (kernel, default_alpha) = match &self.kernel {
-            Some(kernel) => (kernel.resolve(|| stored.scales(), place)?, DEFAULT_ALPHA),
-            None => default_fit(stored.scales(), purpose, || stored.noise()).map_err(refuse)?,
-        };
-        let regularization = match (self.alpha, self.noise_variances) {
+        match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
                 let detail = "noise_variances stands instead of alpha; give one of them";
-                return Err(Problem::invalid_request(place.regularization, detail));
+                Err(Problem::invalid_request(place.regularization, detail))
             }
-            (alpha, None) => Regularization::uniform(alpha.unwrap_or(default_alpha)).map_err(refuse)?,
+            (None, None) => Ok(None),
+            (Some(alpha), None) => Regularization::uniform(alpha).map(Some).map_err(refuse),
             (None, Some(variances)) => {
                 let (expected, found) = (stored.cloud.n_points(), variances.len());
                 if expected != found {
                     return Err(Problem::length_mismatch(place.regularization, expected, found));
                 }
-                Regularization::per_point(variances).map_err(refuse)?
+                Regularization::per_point(variances).map(Some).map_err(refuse)
             }
-        };
-        Ok((kernel, regularization))
+        }
     }
 }
 

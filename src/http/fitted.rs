@@ -33,6 +33,8 @@ pub struct Fits {
     pub main: Fitted,
     /// Present if it differs from the main one.
     pub surface: Option<Fitted>,
+    /// The surface, of operations that ask about one.
+    pub made: Option<Arc<Surface>>,
 }
 
 impl Fits {
@@ -60,7 +62,7 @@ impl Fits {
         observer: &JobObserver,
     ) -> Result<SurfaceGeometry, Problem> {
         let fitted = self.surface();
-        let surface = fitted.surface(&self.app, observer)?;
+        let surface = self.made.clone().ok_or_else(Problem::internal)?;
         let geometry =
             Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
         Ok(SurfaceGeometry { surface, geometry, orientation: request.orientation })
@@ -97,27 +99,6 @@ impl Fitted {
             Interpolant::fit(factor, &self.merged(values), observer).map_err(|error| self.refused(error))?;
         app.factors.keep_solution(self.plan.key, key, interpolant.solution.clone());
         Ok(interpolant)
-    }
-
-    /// The surface of the signature function, with the client's normals if there are any.
-    fn surface(&self, app: &App, observer: &JobObserver) -> Result<Arc<Surface>, Problem> {
-        let is_new = !self.stored.has_surface();
-        let surface = self.stored.surface(|| {
-            let (factor, given) = (self.stored.factor.clone(), self.plan.fitted_normals());
-            let key = ValuesKey::of(&vec![1.0; self.plan.stored.cloud.n_points()]);
-            let surface = match app.factors.solution(self.plan.key, key) {
-                Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
-                None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
-                    app.factors.keep_solution(self.plan.key, key, signature.solution.clone());
-                    Surface::with_jets(signature, jets, given.as_deref(), observer)
-                }),
-            };
-            surface.map_err(|error| self.refused(error))
-        })?;
-        if is_new {
-            app.factors.reweigh(self.plan.key);
-        }
-        Ok(surface)
     }
 
     /// Values at the points that are factorized: means over merged duplicates.

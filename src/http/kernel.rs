@@ -5,23 +5,45 @@ use super::shared::{Kernel, KernelFamily, KernelUsed};
 use crate::numerics::defaults::{Scales, length_scale_for};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 
+/// A kernel that is checked but for a length scale that the cloud has yet to give.
+#[derive(Debug, Clone, Copy)]
+pub enum PlannedKernel {
+    Given(NumericalKernel),
+    OfCloud { family: Family, variance: f64 },
+}
+
+impl PlannedKernel {
+    /// Fills in the length scale.
+    ///
+    /// # Errors
+    /// 422 if the cloud is too small or large for any.
+    pub fn resolve(&self, scales: Option<&Scales>, place: Place) -> Result<NumericalKernel, Problem> {
+        match *self {
+            Self::Given(kernel) => Ok(kernel),
+            Self::OfCloud { family, variance } => {
+                let scales = scales.ok_or_else(Problem::internal)?;
+                NumericalKernel::new(family, length_scale_for(scales, family), variance)
+                    .map_err(|error| Problem::from_numerics(error, place))
+            }
+        }
+    }
+}
+
 impl Kernel {
-    /// Fills in what is absent and checks the rest.
+    /// Checks what is given.
     ///
     /// # Errors
     /// 422 with a pointer to the parameter.
-    pub fn resolve<'a>(
-        &self,
-        scales: impl FnOnce() -> &'a Scales,
-        place: Place,
-    ) -> Result<NumericalKernel, Problem> {
+    pub fn plan(&self, place: Place) -> Result<PlannedKernel, Problem> {
         let family = self.resolve_family(place)?;
-        let length_scale = match self.length_scale {
-            Some(length_scale) => length_scale,
-            None => length_scale_for(scales(), family),
-        };
-        NumericalKernel::new(family, length_scale, self.variance.unwrap_or(1.0))
-            .map_err(|error| Problem::from_numerics(error, place))
+        let variance = self.variance.unwrap_or(1.0);
+        // Without a length scale the other parameters are checked with any.
+        let kernel = NumericalKernel::new(family, self.length_scale.unwrap_or(1.0), variance)
+            .map_err(|error| Problem::from_numerics(error, place))?;
+        Ok(match self.length_scale {
+            Some(_) => PlannedKernel::Given(kernel),
+            None => PlannedKernel::OfCloud { family, variance },
+        })
     }
 
     fn resolve_family(&self, place: Place) -> Result<Family, Problem> {

@@ -1,27 +1,29 @@
-//! How a compute request is served, the same for every operation: read, admit, parse, plan, factorize or find, compute,
-//! encode. An operation only says what its plan and its answer are.
+//! How a compute request is served, the same for every operation: read, admit, parse, plan, look at the cloud, reserve,
+//! factorize or find, compute, encode. An operation only says what its plan and its answer are.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use axum::extract::Request;
-use axum::http::HeaderValue;
 use axum::response::Response;
 use serde::de::DeserializeOwned;
 
 use super::answer::Answer;
-use super::body::read_body;
-use super::compute::{JobObserver, StageTimes};
+use super::compute::{Admission, JobObserver};
 use super::encode::Encoded;
-use super::fit::{FitPlan, Planner};
-use super::fitted::{Fits, Fitted};
+use super::fit::{FitPlan, PlannedFit, Planner};
+use super::fitted::Fits;
+use super::fitting::Fitting;
+use super::intake::{Intake, read_body};
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
+use super::report::Report;
+use super::sampling::sample;
 use crate::app::App;
-use crate::numerics::error::NumericsError;
 use crate::numerics::solver::GramFactor;
+use crate::numerics::surface::Surface;
 use crate::store::Owner;
-use crate::store::factors::{CacheOutcome, StoredFactor};
+use crate::store::budget::Reservation;
 
 /// A request that needs a factorization.
 pub trait Operation: DeserializeOwned + Send + 'static {
@@ -31,6 +33,9 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 
     /// What answers may be written as, the preferred one first; npy where there is one matrix.
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
+
+    /// Whether it asks about a surface: that of the plan's surface, or of its main fit.
+    const HAS_SURFACE: bool;
 
     /// Checks everything that can be checked without computing, the cost included.
     ///
@@ -48,14 +53,60 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 /// What requests that compute may be written as.
 pub const REQUEST_FORMATS: [Format; 2] = [Format::Json, Format::Safetensors];
 
-/// The factorizations that an operation needs, what it does with them, and the flops of that.
+/// The factorizations that an operation needs, what it does with them, and what that costs.
 pub struct Plan<W> {
     /// The fit of the values, or of the surface where there are no values.
-    pub main: FitPlan,
+    pub main: PlannedFit,
     /// The fit of the surface, if values and surface both play a part.
-    pub surface: Option<FitPlan>,
+    pub surface: Option<PlannedFit>,
     pub work: W,
+    pub cost: Cost,
+}
+
+/// What the work of an operation costs beside its factorizations.
+#[derive(Debug, Clone, Copy)]
+pub struct Cost {
     pub flops: f64,
+    /// Numbers of the answer.
+    pub n_numbers: usize,
+    /// Numbers that are needed on the way to it.
+    pub n_scratch: usize,
+    /// Numbers of the request beside its clouds: values and queries.
+    pub n_held: usize,
+}
+
+impl Cost {
+    /// Bytes of the answer as numbers, once more while it is put together, and of what leads to it.
+    pub fn n_bytes(&self) -> usize {
+        let n_numbers = self.n_numbers.saturating_mul(2).saturating_add(self.n_scratch);
+        n_numbers.saturating_mul(size_of::<f64>())
+    }
+}
+
+/// A plan with nothing left out of its fits.
+pub struct Resolved<W> {
+    pub main: FitPlan,
+    pub surface: Option<FitPlan>,
+    work: W,
+    pub cost: Cost,
+    /// The memory of the request, for as long as it is held.
+    intake: Reservation,
+}
+
+impl<W> Resolved<W> {
+    /// The fit of the surface.
+    pub fn of_surface(&self) -> &FitPlan {
+        self.surface.as_ref().unwrap_or(&self.main)
+    }
+
+    /// Flops of everything that may have to be computed.
+    fn total_flops(&self, has_surface: bool) -> f64 {
+        let fits = [Some(&self.main), self.surface.as_ref()];
+        let factors = fits.into_iter().flatten().map(|fit| GramFactor::flops_needed(fit.fitted.n_points()));
+        let cloud = &self.of_surface().fitted;
+        let surface = Surface::flops_needed(cloud.n_points(), cloud.dimension());
+        factors.sum::<f64>() + self.cost.flops + if has_surface { surface } else { 0.0 }
+    }
 }
 
 /// Serves one request.
@@ -65,121 +116,80 @@ pub struct Plan<W> {
 pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let wanted = Wanted::of(&parts.headers, O::FORMATS)?;
-    let body = read_body(&parts.headers, body, &REQUEST_FORMATS, app.config.max_body_bytes).await?;
-    let _admission = app.compute.admit()?;
+    let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
+    let admission = app.compute.admit(owner)?;
 
     let began = Instant::now();
-    let shared = app.clone();
-    let prepare = move |_: &JobObserver| body.parse::<O>()?.plan(&Planner { app: &shared, owner });
-    let plan = app.compute.run(0.0, prepare).await?.0?;
-    let mut report = Report { parse: began.elapsed(), ..Report::default() };
+    let plan = prepare::<O>(&app, &admission, intake).await?;
+    let mut report = Report::parsed_in(began.elapsed());
 
-    let _memory = app.compute.reserve(n_bytes_missing(&app, &plan)).await?;
-    let main = report.fitted(&app, plan.main).await?;
-    let surface = match plan.surface {
-        Some(surface) if surface.key != main.plan.key => Some(report.fitted(&app, surface).await?),
-        Some(_) | None => None,
-    };
-    let fits = Fits { app: app.clone(), main, surface };
-    let (work, flops) = (plan.work, plan.flops);
+    admission.set_flops(plan.total_flops(O::HAS_SURFACE));
+    let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
+    let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
+    let Resolved { work, cost, intake, .. } = plan;
     let job = move |observer: &JobObserver| {
         let answer = O::compute(work, &fits, observer)?;
+        drop(intake);
         let times = observer.times();
         let began = Instant::now();
         let encoded = Encoded::of(answer, wanted)?;
-        Ok::<_, Problem>((encoded, times, began.elapsed()))
+        Ok::<_, Problem>((encoded, memory, times, began.elapsed()))
     };
-    let (encoded, times, encode) = app.compute.run(flops, job).await?.0?;
-    report.add(times);
-    report.encode = (!encoded.is_streamed()).then_some(encode);
-    Ok(report.head(encoded.into_response(&app)))
+    let (encoded, memory, times, encode) = app.compute.run(&admission, cost.flops, job).await?.0?;
+    admission.finish();
+    report.computed(times, (!encoded.is_streamed()).then_some(encode));
+    Ok(report.head(encoded.into_response(&app, memory)))
 }
 
-/// Bytes of the factorizations that this request would begin.
-fn n_bytes_missing<W>(app: &App, plan: &Plan<W>) -> usize {
-    let surface = plan.surface.as_ref().filter(|surface| surface.key != plan.main.key);
-    let fits = [Some(&plan.main), surface];
-    let missing = fits.into_iter().flatten().filter(|fit| app.factors.is_missing(fit.key));
-    missing.filter_map(|fit| GramFactor::n_bytes_needed(fit.fitted.n_points())).fold(0, usize::saturating_add)
-}
-
-/// What the headers say of how the answer came about.
-#[derive(Default)]
-struct Report {
-    parse: Duration,
-    stages: StageTimes,
-    /// Absent if encoding goes on while the answer is sent.
-    encode: Option<Duration>,
-    cache: Option<CacheOutcome>,
-}
-
-impl Report {
-    async fn fitted(&mut self, app: &Arc<App>, plan: FitPlan) -> Result<Fitted, Problem> {
-        let factorization = || factorize(app.clone(), plan.clone());
-        let found = app.factors.get_or_factorize(plan.key, factorization).await;
-        let (stored, outcome) = found.map_err(|failure| match failure {
-            FactorFailure::Refused(error) => plan.refused(error),
-            FactorFailure::Broken(problem) => problem,
-        })?;
-        // With two factors the answer is a hit only if both are: the outcomes are ordered by cost.
-        self.cache = self.cache.max(Some(outcome));
-        if outcome != CacheOutcome::Hit {
-            self.stages.gram += stored.gram_time;
-            self.stages.factor += stored.factor_time;
+/// Parses and plans, and looks at the clouds if something was left out that follows from them.
+async fn prepare<O: Operation>(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    intake: Intake,
+) -> Result<Resolved<O::Work>, Problem> {
+    let (shared, owner) = (app.clone(), admission.owner);
+    let flops = intake.body.flops_to_parse();
+    let parse = move |_: &JobObserver| {
+        let Intake { body, mut memory } = intake;
+        let plan = body.parse::<O>()?.plan(&Planner { app: &shared, owner })?;
+        memory.shrink_to(n_bytes_held(&plan));
+        if lacking(&plan).is_some() {
+            Ok(Prepared::Lacking(plan, memory))
+        } else {
+            resolve(plan, memory).map(Prepared::Ready)
         }
-        Ok(Fitted { plan, stored })
-    }
-
-    fn add(&mut self, times: StageTimes) {
-        self.stages.solve += times.solve;
-        self.stages.evaluate += times.evaluate;
-    }
-
-    fn head(&self, mut response: Response) -> Response {
-        let headers = response.headers_mut();
-        let cache = match self.cache {
-            None | Some(CacheOutcome::Hit) => "gramian; hit",
-            Some(CacheOutcome::Collapsed) => "gramian; fwd=miss; collapsed",
-            Some(CacheOutcome::Stored) => "gramian; fwd=miss; stored",
-            Some(CacheOutcome::NotStored) => "gramian; fwd=miss",
-        };
-        headers.insert("cache-status", HeaderValue::from_static(cache));
-        if let Ok(timing) = HeaderValue::from_str(&self.server_timing()) {
-            headers.insert("server-timing", timing);
-        }
-        response
-    }
-
-    fn server_timing(&self) -> String {
-        let stages = [
-            ("parse", Some(self.parse)),
-            ("gram", Some(self.stages.gram)),
-            ("factor", Some(self.stages.factor)),
-            ("solve", Some(self.stages.solve)),
-            ("evaluate", Some(self.stages.evaluate)),
-            ("encode", self.encode),
-        ];
-        let entry = |(name, time): (&str, Option<Duration>)| {
-            time.map(|time| format!("{name};dur={:.3}", time.as_secs_f64() * 1e3))
-        };
-        stages.into_iter().filter_map(entry).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
-#[derive(Debug, Clone)]
-pub enum FactorFailure {
-    Refused(NumericsError),
-    Broken(Problem),
-}
-
-async fn factorize(app: Arc<App>, plan: FitPlan) -> Result<StoredFactor, FactorFailure> {
-    let flops = GramFactor::flops_needed(plan.fitted.n_points());
-    let spare = app.factors.spare().clone();
-    let job = move |observer: &JobObserver| {
-        GramFactor::factorize_with(&spare, plan.fitted, plan.kernel, plan.regularization, observer)
     };
-    let (outcome, times) = app.compute.run(flops, job).await.map_err(FactorFailure::Broken)?;
-    let factor = outcome.map_err(FactorFailure::Refused)?;
-    Ok(StoredFactor::new(factor, times.gram, times.factor))
+    let (plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
+        Prepared::Ready(resolved) => return Ok(resolved),
+        Prepared::Lacking(plan, memory) => (plan, memory),
+    };
+    while let Some(fit) = lacking(&plan) {
+        sample(app, admission, fit).await?;
+    }
+    app.compute.run(admission, 0.0, move |_| resolve(plan, memory)).await?.0
+}
+
+enum Prepared<W> {
+    Ready(Resolved<W>),
+    /// Its fits need to know more of their clouds.
+    Lacking(Plan<W>, Reservation),
+}
+
+/// A fit that needs to know more of its cloud.
+fn lacking<W>(plan: &Plan<W>) -> Option<&PlannedFit> {
+    let mut fits = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
+    fits.find(|fit| fit.lacks_scales() || fit.lacks_noise())
+}
+
+fn resolve<W>(plan: Plan<W>, intake: Reservation) -> Result<Resolved<W>, Problem> {
+    let main = plan.main.resolve()?;
+    let surface = plan.surface.map(PlannedFit::resolve).transpose()?;
+    Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake })
+}
+
+/// Bytes that a request holds until it is answered: values, queries, and clouds that may not be kept.
+fn n_bytes_held<W>(plan: &Plan<W>) -> usize {
+    let clouds = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
+    let n_bytes = clouds.map(|fit| fit.stored.n_bytes() + 2 * size_of::<f64>() * fit.n_points());
+    n_bytes.sum::<usize>() + plan.cost.n_held * size_of::<f64>()
 }

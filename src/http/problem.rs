@@ -139,11 +139,19 @@ impl Problem {
         problem
     }
 
+    /// 503 for what finds no place, no memory or no thread now.
     pub fn overloaded(retry_after_seconds: u64) -> Self {
-        let detail = format!("all places in the queue are taken; try again in {retry_after_seconds} s");
+        let detail =
+            format!("all that can be served at once is being served; try again in {retry_after_seconds} s");
         let mut problem = Self::new(Slug::Overloaded, detail);
         problem.members.retry_after_seconds = Some(retry_after_seconds);
         problem
+    }
+
+    /// Says in the detail what to do about it.
+    pub fn with_remedy(mut self, remedy: &str) -> Self {
+        self.detail = format!("{}; {remedy}", self.detail);
+        self
     }
 
     /// Says nothing internal: the log has the cause under the request id.

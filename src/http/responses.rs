@@ -27,7 +27,7 @@ macro_rules! problem_set {
 problem_set! {
     /// Operations that compute.
     ComputeProblems:
-    MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, BodyTooLarge, ProblemTooLarge,
+    MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
     UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
     KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, Internal, Overloaded, DeadlineExceeded
 }
@@ -35,7 +35,7 @@ problem_set! {
 problem_set! {
     /// The registration of a cloud.
     RegisterProblems:
-    MalformedJson, MalformedBody, Unauthorized, NotAcceptable, BodyTooLarge, ProblemTooLarge, UnsupportedMediaType,
+    MalformedJson, MalformedBody, Unauthorized, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge, UnsupportedMediaType,
     InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
 }
 

@@ -20,6 +20,7 @@ pub enum Slug {
     MethodNotAllowed,
     NotAcceptable,
     UnsupportedMediaType,
+    RequestTimeout,
     BodyTooLarge,
     ProblemTooLarge,
     Unauthorized,
@@ -29,7 +30,7 @@ pub enum Slug {
 }
 
 impl Slug {
-    pub const ALL: [Slug; 21] = [
+    pub const ALL: [Slug; 22] = [
         Self::MalformedJson,
         Self::MalformedBody,
         Self::InvalidRequest,
@@ -45,6 +46,7 @@ impl Slug {
         Self::MethodNotAllowed,
         Self::NotAcceptable,
         Self::UnsupportedMediaType,
+        Self::RequestTimeout,
         Self::BodyTooLarge,
         Self::ProblemTooLarge,
         Self::Unauthorized,
@@ -177,19 +179,27 @@ impl Slug {
                 "Send application/json or application/x-safetensors, clouds also as application/x-npy, and say so in the \
                  Content-Type header. Content-Encoding may be gzip or zstd.",
             ),
+            Self::RequestTimeout => (
+                "request-timeout",
+                StatusCode::REQUEST_TIMEOUT,
+                "The body came too slowly",
+                "A body must come at 16 KiB a second but for GRAMIAN_BODY_SECONDS. Send it again over a connection that keeps \
+                 up, compress it, or send tensors instead of JSON.",
+            ),
             Self::BodyTooLarge => (
                 "body-too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The body is too large",
-                "The body has more bytes than GRAMIAN_MAX_BODY_BYTES. Register the cloud once and refer to it by id, or split \
+                "The body has more bytes than GRAMIAN_MAX_BODY_BYTES, or than the part of GRAMIAN_MEMORY_BYTES that one request \
+                 may have. Register the cloud once and refer to it by id, or split \
                  the queries.",
             ),
             Self::ProblemTooLarge => (
                 "problem-too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The problem is too large",
-                "Points, dimension, queries or the size of the answer are over this server's limits. limit and required are \
-                 in the unit that the detail names.",
+                "Points, dimension, queries, the size of the answer or the memory for it are over this server's limits. limit \
+                 and required are in the unit that the detail names.",
             ),
             Self::Unauthorized => (
                 "unauthorized",
@@ -200,9 +210,9 @@ impl Slug {
             Self::Overloaded => (
                 "overloaded",
                 StatusCode::SERVICE_UNAVAILABLE,
-                "The queue is full",
-                "More requests wait for a thread than the server queues, or it is shutting down. Try again after the seconds \
-                 in Retry-After.",
+                "The server has all it can do",
+                "More requests wait for a thread than the server queues, the memory for requests is taken, or the server is \
+                 shutting down. Try again after the seconds in Retry-After.",
             ),
             Self::DeadlineExceeded => (
                 "deadline-exceeded",

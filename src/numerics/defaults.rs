@@ -8,6 +8,7 @@ use super::cloud::{Cloud, squared_distance};
 use super::error::NumericsError;
 use super::kernel::{Family, Kernel};
 use super::neighbours::Neighbours;
+use super::observer::Observer;
 
 /// What a fit is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +50,7 @@ const NORMALS: SurfaceRule = SurfaceRule { extents: 0.45, spacings: 4.0, smoothi
 /// Smooth enough for second derivatives at the points, which see the kernel's cusp.
 const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoothing: 3.0 };
 
-/// Lengths of a cloud, unit L; all 1 for one position alone, which has no scale.
+/// Lengths of a cloud, unit L; those that kernels follow are 1 for one position alone, which has no scale.
 #[derive(Debug, Clone, Copy)]
 pub struct Scales {
     /// Half the diagonal of the bounding box.
@@ -60,20 +61,59 @@ pub struct Scales {
     nearest: f64,
     /// h₄: median of the mean distance to the 4 nearest points elsewhere.
     spacing: f64,
+    nearest_range: Option<NearestRange>,
+}
+
+/// Distances from each point to the nearest point elsewhere, unit L.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestRange {
+    pub min: f64,
+    pub median: f64,
+    pub max: f64,
 }
 
 impl Scales {
-    pub fn of(cloud: &Cloud, neighbours: &Neighbours) -> Self {
-        let n = cloud.n_points();
-        let spacings =
-            (0..n).into_par_iter().filter_map(|point| neighbours.nearest_and_mean(cloud, point, 4));
-        let (nearest, means) = spacings.unzip();
-        match (median(nearest), median(means)) {
-            (Some(nearest), Some(spacing)) => {
-                Self { radius: cloud.radius(), extent: extent(cloud), nearest, spacing }
-            }
-            _ => Self { radius: 1.0, extent: 1.0, nearest: 1.0, spacing: 1.0 },
-        }
+    /// Looks at the neighbours of every point.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn of(
+        cloud: &Cloud,
+        neighbours: &Neighbours,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let look_around = |point: usize| {
+            observer.checkpoint()?;
+            Ok(neighbours.nearest_and_mean(cloud, point, 4))
+        };
+        let found: Vec<_> =
+            (0..cloud.n_points()).into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
+        let (nearest, means): (Vec<f64>, Vec<f64>) = found.into_iter().flatten().unzip();
+        let range = |of: fn(f64, f64) -> f64| nearest.iter().copied().reduce(of);
+        let (min, max) = (range(f64::min), range(f64::max));
+        Ok(match (min, median(nearest), max, median(means)) {
+            (Some(min), Some(median), Some(max), Some(spacing)) => Self {
+                radius: cloud.radius(),
+                extent: extent(cloud),
+                nearest: median,
+                spacing,
+                nearest_range: Some(NearestRange { min, median, max }),
+            },
+            _ => Self { radius: 1.0, extent: 1.0, nearest: 1.0, spacing: 1.0, nearest_range: None },
+        })
+    }
+
+    /// Flops of [`Scales::of`]: every search visits a few leaves, in many dimensions most of the cloud.
+    pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
+        let n = n_points as f64;
+        let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
+        // Distance, comparison and descent.
+        n * visited * (3.0 * dimension as f64 + 10.0)
+    }
+
+    /// `None` if all points coincide.
+    pub fn nearest_range(&self) -> Option<NearestRange> {
+        self.nearest_range
     }
 }
 
@@ -147,7 +187,9 @@ mod tests {
 
     fn of(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64) {
         let neighbours = Neighbours::of(cloud);
-        default_fit(&Scales::of(cloud, &neighbours), purpose, || estimate_noise(cloud, &neighbours)).unwrap()
+        let scales = Scales::of(cloud, &neighbours, &Unobserved).unwrap();
+        let noise = || estimate_noise(cloud, &neighbours, &Unobserved).unwrap();
+        default_fit(&scales, purpose, noise).unwrap()
     }
 
     #[test]

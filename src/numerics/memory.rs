@@ -55,6 +55,7 @@ impl SpareBuffer {
         self.kept().as_ref().map_or(0, |map| map.len())
     }
 
+    #[expect(clippy::disallowed_methods, reason = "one buffer, for as long as it takes to move it")]
     fn kept(&self) -> MutexGuard<'_, Option<MmapMut>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }

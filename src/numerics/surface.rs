@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::defaults::median;
+use super::defaults::{Scales, median};
 use super::degeneracy::{is_rounding, is_too_rough, turns_within_spacing};
 use super::duplicates::count_duplicates;
 use super::error::NumericsError;
@@ -267,16 +267,23 @@ impl Surface {
     /// `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999); for small clouds with a Cholesky
     /// factor only.
     pub(crate) fn left_out_misses(&self) -> Option<&[f64]> {
-        let compute = || {
-            let factor = &self.signature.factor;
-            // A repeated observation is predicted by its copy.
-            if factor.n_points() > MAX_LEFT_OUT || count_duplicates(factor.cloud()) > 0 {
-                return None;
-            }
-            let diagonal = factor.inverse_diagonal()?;
-            Some(self.signature.solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
-        };
-        self.left_out_misses.get_or_init(compute).as_deref()
+        if self.left_out_misses.get().is_none() {
+            // Outside the cell, which a thread that waits for the others would otherwise hold: the job that it takes up
+            // meanwhile may ask for the same. A few threads make it twice; the first one puts it in.
+            let made = self.compute_left_out_misses();
+            let _ = self.left_out_misses.set(made);
+        }
+        self.left_out_misses.get()?.as_deref()
+    }
+
+    fn compute_left_out_misses(&self) -> Option<Vec<f64>> {
+        let factor = &self.signature.factor;
+        // A repeated observation is predicted by its copy.
+        if factor.n_points() > MAX_LEFT_OUT || count_duplicates(factor.cloud()) > 0 {
+            return None;
+        }
+        let diagonal = factor.inverse_diagonal()?;
+        Some(self.signature.solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
     }
 
     pub(crate) fn neighbours(&self) -> &Neighbours {
@@ -328,6 +335,19 @@ impl Surface {
         let nearest = self.neighbours.nearest_positions(self.cloud(), x, SPACING_NEIGHBOURS);
         let along: f64 = nearest.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
         if along > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Bytes that [`Surface::of`] takes at most for n points, those of its work included.
+    pub fn n_bytes_needed(n_points: usize, dimension: usize) -> usize {
+        // Jets, normals and the quadric with its coefficients at every point, as small vectors that the allocator rounds up,
+        // and once more while they are collected: 4.5 kB in three dimensions, as tests/it/memory.rs has measured.
+        n_points.saturating_mul(1500 + 400 * dimension * dimension)
+    }
+
+    /// Flops of [`Surface::of`]: the sums at the points, and two searches and a quadric at each.
+    pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
+        let (n, n_columns) = (n_points as f64, (dimension * (dimension + 1) / 2) as f64);
+        60.0 * n * n + 2.0 * Scales::flops_needed(n_points, dimension) + 40.0 * n * n_columns.powi(3)
     }
 
     /// Bytes held on the heap beside the factor.

@@ -3,126 +3,169 @@
 use std::sync::{Arc, OnceLock};
 use std::time::SystemTime;
 
-use moka::sync::Cache;
-
+use super::Owner;
+use super::fair_cache::FairCache;
 use super::key::CloudId;
-use super::{Owner, bounded_cache, n_bytes_of};
+use super::single_flight::SingleFlight;
 use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::Scales;
 use crate::numerics::duplicates::count_duplicates;
-use crate::numerics::heap::{arc_payload, block_bytes};
-use crate::numerics::neighbours::Neighbours;
-use crate::numerics::noise::estimate_noise;
+use crate::numerics::heap::{arc_payload, block_bytes, vec_bytes};
 
 /// A cloud with the lengths that are derived from it once, on demand; not with the tree that they come from, which would
 /// weigh as much again and is built in a small part of their time.
+///
+/// The cells are only ever read and set: what they hold is computed elsewhere, by [`CloudStore::scales`] and
+/// [`CloudStore::noise`].
 pub struct StoredCloud {
     pub id: CloudId,
     pub cloud: Arc<Cloud>,
     /// The client's normals, `[n, d]`, not normalised.
     pub normals: Option<Cloud>,
     pub created_at: SystemTime,
-    spacings: OnceLock<Spacings>,
+    /// Points that coincide with an earlier one.
+    pub n_duplicates: usize,
+    /// The least and the greatest value of each coordinate.
+    pub bounding_box: (Vec<f64>, Vec<f64>),
     scales: OnceLock<Scales>,
     noise: OnceLock<f64>,
 }
 
-/// Distances from each point to the nearest point elsewhere, unit L, and the number of exact duplicates.
-#[derive(Debug, Clone, Copy)]
-pub struct Spacings {
-    /// Least, median and greatest; `None` if all points coincide.
-    pub min_median_max: Option<[f64; 3]>,
-    pub n_duplicates: usize,
-}
-
 impl StoredCloud {
-    pub fn spacings(&self) -> Spacings {
-        *self.spacings.get_or_init(|| {
-            let mut spacings = Neighbours::of(&self.cloud).spacings(&self.cloud);
-            spacings.sort_unstable_by(f64::total_cmp);
-            let min_median_max = match spacings.as_slice() {
-                [] => None,
-                [first, .., last] => Some([*first, spacings[spacings.len() / 2], *last]),
-                [only] => Some([*only; 3]),
-            };
-            Spacings { min_median_max, n_duplicates: count_duplicates(&self.cloud) }
-        })
+    fn new(id: CloudId, cloud: Cloud, normals: Option<Cloud>) -> Self {
+        Self {
+            id,
+            n_duplicates: count_duplicates(&cloud),
+            bounding_box: cloud.bounding_box(),
+            cloud: Arc::new(cloud.compact()),
+            normals: normals.map(Cloud::compact),
+            created_at: SystemTime::now(),
+            scales: OnceLock::new(),
+            noise: OnceLock::new(),
+        }
     }
 
-    /// The lengths that kernels are chosen by.
-    pub fn scales(&self) -> &Scales {
-        self.scales.get_or_init(|| Scales::of(&self.cloud, &Neighbours::of(&self.cloud)))
+    /// The lengths that kernels are chosen by, once they were asked for.
+    pub fn scales(&self) -> Option<&Scales> {
+        self.scales.get()
     }
 
-    /// Standard deviation of the points across the surface that they sample, unit L.
-    pub fn noise(&self) -> f64 {
-        *self.noise.get_or_init(|| estimate_noise(&self.cloud, &Neighbours::of(&self.cloud)))
+    /// Standard deviation of the points across the surface that they sample, unit L, once it was asked for.
+    pub fn noise(&self) -> Option<f64> {
+        self.noise.get().copied()
     }
 
     /// Bytes held on the heap.
-    fn n_bytes(&self) -> usize {
+    pub fn n_bytes(&self) -> usize {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Cloud>());
-        own + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
+        let (min, max) = &self.bounding_box;
+        let bounding_box = vec_bytes(min) + vec_bytes(max);
+        own + bounding_box + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
     }
 }
 
-/// The clouds of all owners within one byte budget.
-pub struct CloudStore {
-    clouds: Cache<(Owner, CloudId), Arc<StoredCloud>>,
+/// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
+pub struct CloudStore<E> {
+    clouds: FairCache<CloudId, Arc<StoredCloud>>,
+    scales: SingleFlight<(Owner, CloudId), Scales, E>,
+    noise: SingleFlight<(Owner, CloudId), f64, E>,
 }
 
-impl CloudStore {
-    pub fn new(max_bytes: u64) -> Self {
-        Self { clouds: bounded_cache(max_bytes, |stored: &Arc<StoredCloud>| stored.n_bytes()).build() }
+impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
+    pub fn new(max_bytes: usize) -> Self {
+        Self { clouds: FairCache::new(max_bytes), scales: SingleFlight::new(), noise: SingleFlight::new() }
     }
 
     /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered, not kept.
     pub fn register(&self, owner: Owner, cloud: Cloud, normals: Option<Cloud>) -> (Arc<StoredCloud>, bool) {
         let id = CloudId::of(&cloud, normals.as_ref());
-        let entry = self.clouds.entry((owner, id)).or_insert_with(|| {
-            Arc::new(StoredCloud {
-                id,
-                cloud: Arc::new(cloud.compact()),
-                normals: normals.map(Cloud::compact),
-                created_at: SystemTime::now(),
-                spacings: OnceLock::new(),
-                scales: OnceLock::new(),
-                noise: OnceLock::new(),
-            })
-        });
-        let is_new = entry.is_fresh();
-        if is_new {
-            self.clouds.run_pending_tasks();
+        if let Some(found) = self.clouds.get(owner, &id) {
+            return (found, false);
         }
-        (entry.into_value(), is_new)
+        let stored = Arc::new(StoredCloud::new(id, cloud, normals));
+        self.clouds.get_or_insert(owner, id, stored, |stored| stored.n_bytes())
     }
 
     pub fn get(&self, owner: Owner, id: CloudId) -> Option<Arc<StoredCloud>> {
-        self.clouds.get(&(owner, id))
+        self.clouds.get(owner, &id)
+    }
+
+    /// Sees to it that the cloud has its scales, which `compute` makes at most once however many ask.
+    ///
+    /// # Errors
+    /// Those of `compute`; they are not kept.
+    pub async fn scales<F>(
+        &self,
+        owner: Owner,
+        stored: &StoredCloud,
+        compute: impl FnOnce() -> F,
+    ) -> Result<(), E>
+    where
+        F: Future<Output = Result<Scales, E>> + Send + 'static,
+    {
+        fill(&stored.scales, &self.scales, (owner, stored.id), compute).await
+    }
+
+    /// Sees to it that the noise of the cloud is known, as [`CloudStore::scales`] does.
+    ///
+    /// # Errors
+    /// Those of `compute`; they are not kept.
+    pub async fn noise<F>(
+        &self,
+        owner: Owner,
+        stored: &StoredCloud,
+        compute: impl FnOnce() -> F,
+    ) -> Result<(), E>
+    where
+        F: Future<Output = Result<f64, E>> + Send + 'static,
+    {
+        fill(&stored.noise, &self.noise, (owner, stored.id), compute).await
     }
 
     /// Forgets a cloud; says whether it was there.
     pub fn remove(&self, owner: Owner, id: CloudId) -> bool {
-        self.clouds.remove(&(owner, id)).is_some()
+        self.clouds.remove(owner, &id)
     }
 
     /// Bytes of all clouds that are kept.
-    pub fn n_bytes(&self) -> u64 {
-        n_bytes_of(&self.clouds)
+    pub fn n_bytes(&self) -> usize {
+        self.clouds.n_bytes()
     }
 
     /// All clouds of an owner, oldest first, ties by id.
     pub fn list(&self, owner: Owner) -> Vec<Arc<StoredCloud>> {
-        let mut clouds: Vec<_> =
-            self.clouds.iter().filter(|(key, _)| key.0 == owner).map(|(_, stored)| stored).collect();
+        let mut clouds = self.clouds.values(owner);
         clouds.sort_by_key(|stored| (stored.created_at, stored.id));
         clouds
     }
 }
 
+/// Fills an empty cell with what a flight brings.
+async fn fill<T, E, F>(
+    cell: &OnceLock<T>,
+    flights: &SingleFlight<(Owner, CloudId), T, E>,
+    key: (Owner, CloudId),
+    compute: impl FnOnce() -> F,
+) -> Result<(), E>
+where
+    T: Clone + Send + Sync + 'static,
+    E: Clone + Send + Sync + 'static,
+    F: Future<Output = Result<T, E>> + Send + 'static,
+{
+    if cell.get().is_none() {
+        let found = flights.join(key, compute).await.1?;
+        // Of many who bring the same, the first one puts it in.
+        let _ = cell.set(found);
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::error::NumericsError;
+    use crate::numerics::neighbours::Neighbours;
+    use crate::numerics::observer::Unobserved;
 
     fn line(n: usize, offset: f64) -> Cloud {
         Cloud::new((0..n).map(|i| i as f64 + offset).collect(), 1).unwrap()
@@ -130,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_cloud_is_registered_once_and_belongs_to_its_owner() {
-        let store = CloudStore::new(1 << 20);
+        let store = CloudStore::<()>::new(1 << 20);
         let (first, is_new) = store.register(Owner(0), line(4, 0.0), None);
         assert!(is_new);
         let (again, is_new) = store.register(Owner(0), line(4, 0.0), None);
@@ -143,7 +186,7 @@ mod tests {
     #[test]
     fn the_least_recently_used_clouds_make_room() {
         // 1,000 points weigh 8 KB and less than one beside; the budget holds four of them.
-        let store = CloudStore::new(40 << 10);
+        let store = CloudStore::<()>::new(40 << 10);
         let ids: Vec<_> =
             (0..10).map(|k| store.register(Owner(0), line(1000, f64::from(k) / 16.0), None).0.id).collect();
         let kept = store.list(Owner(0)).len();
@@ -151,11 +194,19 @@ mod tests {
         assert!(store.get(Owner(0), ids[0]).is_none() && store.get(Owner(0), ids[9]).is_some());
     }
 
-    #[test]
-    fn spacings_and_duplicates_are_counted() {
+    #[tokio::test]
+    async fn spacings_and_duplicates_are_counted() {
         let cloud = Cloud::new(vec![0.0, 1.0, 1.0, 5.0], 1).unwrap();
-        let (stored, _) = CloudStore::new(1 << 20).register(Owner(0), cloud, None);
-        let spacings = stored.spacings();
-        assert_eq!((spacings.min_median_max, spacings.n_duplicates), (Some([1.0, 1.0, 4.0]), 1));
+        let store = CloudStore::<NumericsError>::new(1 << 20);
+        let (stored, _) = store.register(Owner(0), cloud, None);
+        assert!(stored.n_duplicates == 1 && stored.scales().is_none());
+        let cloud = stored.cloud.clone();
+        let compute = || async move { Scales::of(&cloud, &Neighbours::of(&cloud), &Unobserved) };
+        store.scales(Owner(0), &stored, compute).await.unwrap();
+        let range = stored.scales().and_then(Scales::nearest_range).unwrap();
+        assert_eq!((range.min, range.median, range.max), (1.0, 1.0, 4.0));
+        // What is known is not computed again.
+        let again = store.scales(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
+        assert_eq!(again, Ok(()));
     }
 }

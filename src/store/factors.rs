@@ -3,57 +3,65 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use moka::ops::compute::Op;
-use moka::sync::Cache;
-
+use super::Owner;
+use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
+use super::fair_cache::FairCache;
 use super::key::{CloudId, FactorKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
-use super::{Owner, bounded_cache, n_bytes_of};
 use crate::numerics::heap::{arc_payload, block_bytes};
 use crate::numerics::memory::SpareBuffer;
 use crate::numerics::solver::{GramFactor, Solution};
 use crate::numerics::surface::Surface;
 
 /// The share of the cache that weights may take: they are n numbers beside the n² of a factor.
-const WEIGHTS_SHARE: u64 = 16;
+const WEIGHTS_SHARE: usize = 16;
 
-/// The share of the cache that memory kept for the next factorization may take.
-const SPARE_SHARE: u64 = 8;
-
-/// A factorization with the surface of its cloud, once that was asked for, and the time it took.
+/// A factorization with the surface of its cloud, once that was asked for, and the time it took. It holds the memory that it
+/// was made in for as long as anybody holds it, kept or not.
 pub struct StoredFactor {
     pub factor: Arc<GramFactor>,
     pub gram_time: Duration,
     pub factor_time: Duration,
-    surface: OnceLock<Arc<Surface>>,
+    surface: OnceLock<StoredSurface>,
+    memory: Arc<Reservation>,
+}
+
+/// A surface with the memory that it takes, and that of the factor which it was made from: it may be that of an equal one
+/// which was let go since.
+#[derive(Clone)]
+struct StoredSurface {
+    surface: Arc<Surface>,
+    memory: Arc<Reservation>,
+    _factor_memory: Arc<Reservation>,
 }
 
 impl StoredFactor {
-    pub fn new(factor: GramFactor, gram_time: Duration, factor_time: Duration) -> Self {
-        Self { factor: Arc::new(factor), gram_time, factor_time, surface: OnceLock::new() }
+    /// Gives back what of the memory the finished factor does not take.
+    pub fn new(
+        factor: GramFactor,
+        gram_time: Duration,
+        factor_time: Duration,
+        mut memory: Reservation,
+    ) -> Self {
+        memory.shrink_to(factor.n_bytes());
+        let (factor, memory) = (Arc::new(factor), Arc::new(memory));
+        Self { factor, gram_time, factor_time, surface: OnceLock::new(), memory }
     }
 
-    /// The surface of the signature function, made at most once unless two ask at the same moment.
-    ///
-    /// # Errors
-    /// Those of `make`; they are not kept.
-    pub fn surface<E>(&self, make: impl FnOnce() -> Result<Surface, E>) -> Result<Arc<Surface>, E> {
-        if let Some(found) = self.surface.get() {
-            return Ok(found.clone());
-        }
-        let made = Arc::new(make()?);
-        Ok(self.surface.get_or_init(|| made).clone())
-    }
-
-    /// Whether the surface was made.
-    pub fn has_surface(&self) -> bool {
-        self.surface.get().is_some()
+    /// The surface of the signature function, once it was asked for.
+    pub fn surface(&self) -> Option<Arc<Surface>> {
+        self.surface.get().map(|stored| stored.surface.clone())
     }
 
     /// Bytes held on the heap, those of the surface once there is one.
     fn n_bytes(&self) -> usize {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<GramFactor>());
-        own + self.factor.n_bytes() + self.surface.get().map_or(0, |surface| surface.n_bytes())
+        own + self.factor.n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
+    }
+
+    /// Bytes that are given back when it is dropped.
+    fn n_reserved(&self) -> usize {
+        self.memory.n_bytes() + self.surface.get().map_or(0, |stored| stored.memory.n_bytes())
     }
 }
 
@@ -69,29 +77,45 @@ pub enum CacheOutcome {
     NotStored,
 }
 
-/// Factorizations and weights within one byte budget. `E` is what a computation may fail with.
+/// Bytes that a [`FactorStore`] may take.
+#[derive(Debug, Clone, Copy)]
+pub struct FactorBytes {
+    /// What factors and weights that are kept may take.
+    pub kept: usize,
+    /// What is kept for the next factorization, beside the budget.
+    pub spare: usize,
+    /// What everything that is made here may take, kept or in use.
+    pub budget: usize,
+    /// Owners who share it.
+    pub n_owners: usize,
+}
+
+/// Factorizations and weights within one byte budget, that of the work that is done with them included. `E` is what a
+/// computation may fail with.
 pub struct FactorStore<E> {
-    factors: Cache<FactorKey, Arc<StoredFactor>>,
-    solutions: Cache<(FactorKey, ValuesKey), Arc<Solution>>,
+    factors: Arc<FairCache<FactorKey, Arc<StoredFactor>>>,
+    solutions: FairCache<(FactorKey, ValuesKey), Arc<KeptSolution>>,
     flights: SingleFlight<FactorKey, (Arc<StoredFactor>, bool), E>,
-    max_factor_bytes: u64,
+    surfaces: SingleFlight<FactorKey, StoredSurface, E>,
+    budget: Budget,
     spare: Arc<SpareBuffer>,
 }
 
+struct KeptSolution {
+    solution: Arc<Solution>,
+    memory: Reservation,
+}
+
 impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
-    pub fn new(max_bytes: u64) -> Self {
-        let max_solution_bytes = max_bytes / WEIGHTS_SHARE;
-        let max_spare_bytes = max_bytes / SPARE_SHARE;
-        let max_factor_bytes = max_bytes - max_solution_bytes - max_spare_bytes;
+    pub fn new(bytes: FactorBytes) -> Self {
+        let solutions = bytes.kept / WEIGHTS_SHARE;
         Self {
-            factors: bounded_cache(max_factor_bytes, |f: &Arc<StoredFactor>| f.n_bytes()).build(),
-            solutions: bounded_cache(max_solution_bytes, |solution: &Arc<Solution>| {
-                block_bytes(arc_payload::<Solution>()) + solution.n_bytes()
-            })
-            .build(),
+            factors: Arc::new(FairCache::new(bytes.kept - solutions)),
+            solutions: FairCache::new(solutions),
             flights: SingleFlight::new(),
-            max_factor_bytes,
-            spare: SpareBuffer::up_to(usize::try_from(max_spare_bytes).unwrap_or(usize::MAX)),
+            surfaces: SingleFlight::new(),
+            budget: Budget::new(bytes.budget, bytes.n_owners),
+            spare: SpareBuffer::up_to(bytes.spare),
         }
     }
 
@@ -100,37 +124,66 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         &self.spare
     }
 
-    /// Returns the factor of `key`, computing it at most once however many ask, and where it came from.
+    /// Waits for so many bytes of memory for work; what is kept here and not in use makes room for it. Whoever waits must
+    /// hold no other memory of this store, nor wait for anybody who does.
+    ///
+    /// # Errors
+    /// [`BeyondBudget`] if there will never be so many.
+    pub async fn reserve(&self, owner: Owner, n_bytes: usize) -> Result<Reservation, BeyondBudget> {
+        self.budget.reserve(owner, n_bytes, |shortage| self.make_room(shortage)).await
+    }
+
+    /// Lets go of the least recently used: first of the owner's own, where the owner is over the share, then of whoever has most.
+    fn make_room(&self, shortage: Shortage) {
+        let let_go = |owner: Option<Owner>, mut n_bytes: usize| {
+            while n_bytes > 0 {
+                let factor = self.factors.evict(owner, |factor| Arc::strong_count(factor) == 1);
+                let freed = factor.map(|factor| factor.n_reserved()).or_else(|| {
+                    let kept = self.solutions.evict(owner, |kept| Arc::strong_count(kept) == 1)?;
+                    Some(kept.memory.n_bytes())
+                });
+                let Some(freed) = freed else { return };
+                n_bytes = n_bytes.saturating_sub(freed);
+            }
+        };
+        let_go(Some(shortage.owner), shortage.of_owner);
+        let_go(None, shortage.of_all.saturating_sub(shortage.of_owner));
+    }
+
+    /// Returns the factor of `key`, computing it at most once however many ask, and where it came from. Whoever begins does
+    /// it in `memory`, which goes back if another has begun; without memory nothing is begun, and `None` says that it is
+    /// needed.
     ///
     /// # Errors
     /// Those of `factorize`; they are not kept.
     pub async fn get_or_factorize<F>(
         &self,
         key: FactorKey,
-        factorize: impl FnOnce() -> F,
-    ) -> Result<(Arc<StoredFactor>, CacheOutcome), E>
+        memory: Option<Reservation>,
+        factorize: impl FnOnce(Reservation) -> F,
+    ) -> Result<Option<(Arc<StoredFactor>, CacheOutcome)>, E>
     where
         F: Future<Output = Result<StoredFactor, E>> + Send + 'static,
     {
-        if let Some(found) = self.factors.get(&key) {
-            return Ok((found, CacheOutcome::Hit));
+        if let Some(found) = self.factors.get(key.owner, &key) {
+            return Ok(Some((found, CacheOutcome::Hit)));
         }
-        let (factors, max_bytes) = (self.factors.clone(), self.max_factor_bytes);
+        let Some(memory) = memory else {
+            let Some(outcome) = self.flights.join_if_under_way(&key).await else { return Ok(None) };
+            return Ok(Some((outcome?.0, CacheOutcome::Collapsed)));
+        };
+        let factors = self.factors.clone();
         let (boarding, outcome) = self
             .flights
             .join(key, || {
-                let computation = factorize();
+                let computation = factorize(memory);
                 async move {
                     // A flight may have landed between the look-up and this one's beginning.
-                    if let Some(found) = factors.get(&key) {
+                    if let Some(found) = factors.get(key.owner, &key) {
                         return Ok((found, true));
                     }
                     let stored = Arc::new(computation.await?);
-                    let is_kept = stored.n_bytes() as u64 <= max_bytes;
-                    if is_kept {
-                        factors.insert(key, stored.clone());
-                        factors.run_pending_tasks();
-                    }
+                    let is_kept = factors.insert(key.owner, key, stored.clone(), stored.n_bytes());
                     Ok((stored, is_kept))
                 }
             })
@@ -141,44 +194,99 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
             (Boarding::Began, true) => CacheOutcome::Stored,
             (Boarding::Began, false) => CacheOutcome::NotStored,
         };
-        Ok((stored, outcome))
+        Ok(Some((stored, outcome)))
     }
 
-    /// Whether a factorization is neither kept nor being computed: asking for it would begin a new one.
-    pub fn is_missing(&self, key: FactorKey) -> bool {
-        !self.factors.contains_key(&key) && !self.flights.is_under_way(&key)
+    /// Returns the surface of a factor, making it at most once however many ask, in `memory`, of which it keeps what it
+    /// takes. Without memory it is not begun, and `None` says that it is needed.
+    ///
+    /// # Errors
+    /// Those of `make`; they are not kept.
+    pub async fn get_or_make_surface<F>(
+        &self,
+        key: FactorKey,
+        stored: &StoredFactor,
+        memory: Option<Reservation>,
+        make: impl FnOnce() -> F,
+    ) -> Result<Option<Arc<Surface>>, E>
+    where
+        F: Future<Output = Result<Surface, E>> + Send + 'static,
+    {
+        if let Some(found) = stored.surface() {
+            return Ok(Some(found));
+        }
+        let found = match memory {
+            None => match self.surfaces.join_if_under_way(&key).await {
+                None => return Ok(None),
+                Some(outcome) => outcome?,
+            },
+            Some(mut memory) => {
+                let factor_memory = stored.memory.clone();
+                let begin = || {
+                    let making = make();
+                    async move {
+                        let surface = Arc::new(making.await?);
+                        memory.shrink_to(surface.n_bytes());
+                        Ok(StoredSurface { surface, memory: Arc::new(memory), _factor_memory: factor_memory })
+                    }
+                };
+                self.surfaces.join(key, begin).await.1?
+            }
+        };
+        let surface = found.surface.clone();
+        if stored.surface.set(found).is_ok() {
+            self.factors.reweigh(key.owner, key, stored.n_bytes());
+        }
+        Ok(Some(surface))
+    }
+
+    /// What asking for a factor, and for its surface where `with_surface`, would have to make now.
+    pub fn missing(&self, key: FactorKey, with_surface: bool) -> Missing {
+        let factor = match self.factors.get(key.owner, &key) {
+            Some(stored) if stored.surface.get().is_some() || !with_surface => return Missing::default(),
+            Some(_) => false,
+            None => !self.flights.is_under_way(&key),
+        };
+        Missing { factor, surface: with_surface && !self.surfaces.is_under_way(&key) }
     }
 
     /// The weights of values solved before.
     pub fn solution(&self, key: FactorKey, values: ValuesKey) -> Option<Arc<Solution>> {
-        self.solutions.get(&(key, values))
+        self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone())
     }
 
+    /// Keeps weights if there is memory for them that nobody waits for.
     pub fn keep_solution(&self, key: FactorKey, values: ValuesKey, solution: Arc<Solution>) {
-        self.solutions.insert((key, values), solution);
+        let own = block_bytes(arc_payload::<KeptSolution>()) + block_bytes(arc_payload::<Solution>());
+        let n_bytes = own + solution.n_bytes();
+        if let Some(memory) = self.budget.try_reserve(key.owner, n_bytes) {
+            let kept = Arc::new(KeptSolution { solution, memory });
+            self.solutions.insert(key.owner, (key, values), kept, n_bytes);
+        }
     }
 
-    /// Weighs a factor again, whose surface was made since it was kept.
-    pub fn reweigh(&self, key: FactorKey) {
-        // Putting the value back is how moka weighs again; what was evicted or forgotten meanwhile stays away.
-        self.factors.entry(key).and_compute_with(|kept| match kept {
-            Some(entry) => Op::Put(entry.into_value()),
-            None => Op::Nop,
-        });
+    /// Bytes of all factors and weights that are kept, and of the memory for the next factorization.
+    pub fn n_bytes(&self) -> usize {
+        self.factors.n_bytes() + self.solutions.n_bytes() + self.spare.n_bytes()
     }
 
-    /// Bytes of all factors and weights that are kept.
-    pub fn n_bytes(&self) -> u64 {
-        n_bytes_of(&self.factors) + n_bytes_of(&self.solutions) + self.spare.n_bytes() as u64
+    /// Bytes of the budget that are held, by what is kept and by work.
+    pub fn n_reserved(&self) -> usize {
+        self.budget.n_held()
     }
 
     /// Forgets everything that was computed from a cloud.
     pub fn forget_cloud(&self, owner: Owner, id: CloudId) {
-        let is_of_cloud = move |key: &FactorKey| key.owner == owner && key.cloud_id == id;
-        // The caches were built with support for closures, so these cannot be refused.
-        let _ = self.factors.invalidate_entries_if(move |key, _| is_of_cloud(key));
-        let _ = self.solutions.invalidate_entries_if(move |(key, _), _| is_of_cloud(key));
+        self.factors.remove_if(owner, |key| key.cloud_id == id);
+        self.solutions.remove_if(owner, |(key, _)| key.cloud_id == id);
     }
+}
+
+/// What a request would have to make.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Missing {
+    pub factor: bool,
+    pub surface: bool,
 }
 
 #[cfg(test)]
@@ -189,6 +297,12 @@ mod tests {
     use crate::numerics::observer::Unobserved;
     use crate::numerics::regularization::Regularization;
 
+    type Store = FactorStore<&'static str>;
+
+    fn store(budget: usize) -> Store {
+        Store::new(FactorBytes { kept: budget, spare: 0, budget, n_owners: 1 })
+    }
+
     fn key(alpha: f64) -> FactorKey {
         let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
         let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
@@ -196,52 +310,73 @@ mod tests {
         FactorKey::of_dense(Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
     }
 
-    async fn factorize(n: usize) -> Result<StoredFactor, &'static str> {
+    async fn factorize(n: usize, memory: Reservation) -> Result<StoredFactor, &'static str> {
         let cloud = Arc::new(Cloud::new((0..n).map(|i| i as f64).collect(), 1).unwrap());
         let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
         let factor = GramFactor::factorize(cloud, kernel, Regularization::Uniform(1.0), &Unobserved).unwrap();
-        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO))
+        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
+    }
+
+    async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
+        let memory = store.reserve(Owner(0), GramFactor::n_bytes_needed(n).unwrap()).await.unwrap();
+        let found = store.get_or_factorize(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
+        found.unwrap().unwrap().1
     }
 
     #[tokio::test]
     async fn the_second_request_is_a_hit_until_the_cloud_is_forgotten() {
-        let store = FactorStore::<&str>::new(1 << 20);
-        let outcome = async |n| store.get_or_factorize(key(1.0), || factorize(n)).await.map(|found| found.1);
-        assert_eq!(outcome(10).await, Ok(CacheOutcome::Stored));
-        assert_eq!(outcome(10).await, Ok(CacheOutcome::Hit));
+        let store = store(1 << 20);
+        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
+        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Hit);
+        assert!(store.n_reserved() > 0);
         store.forget_cloud(Owner(0), key(1.0).cloud_id);
-        assert_eq!(outcome(10).await, Ok(CacheOutcome::Stored));
+        assert_eq!(store.n_reserved(), 0);
+        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
     }
 
     #[tokio::test]
-    async fn a_failure_does_not_poison_the_key() {
-        let store = FactorStore::<&str>::new(1 << 20);
-        let failed = store.get_or_factorize(key(1.0), || async { Err("no") }).await;
-        assert_eq!(failed.err(), Some("no"));
-        let found = store.get_or_factorize(key(1.0), || factorize(10)).await;
-        assert_eq!(found.map(|f| f.1), Ok(CacheOutcome::Stored));
-    }
-
-    #[tokio::test]
-    async fn the_bytes_of_all_factors_stay_within_the_budget() {
-        // 100 points take 50 · 112 · 8 bytes = 44 KiB in a block of 48; the budget holds two, not three.
-        let store = FactorStore::<&str>::new(150 << 10);
-        for alpha in [1.0, 2.0, 3.0] {
-            store.get_or_factorize(key(alpha), || factorize(100)).await.map(|_| ()).unwrap();
-        }
-        let is_hit = async |alpha| {
-            let found = store.get_or_factorize(key(alpha), || async { Err("absent") }).await;
-            found.is_ok_and(|f| f.1 == CacheOutcome::Hit)
+    async fn a_failure_does_not_poison_the_key_and_gives_its_memory_back() {
+        let store = store(1 << 20);
+        let memory = store.reserve(Owner(0), 1000).await.unwrap();
+        let failing = |memory: Reservation| async move {
+            drop(memory);
+            Err("no")
         };
-        assert!(!is_hit(1.0).await && is_hit(2.0).await && is_hit(3.0).await);
+        let failed = store.get_or_factorize(key(1.0), Some(memory), failing).await;
+        assert_eq!((failed.err(), store.n_reserved()), (Some("no"), 0));
+        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
     }
 
     #[tokio::test]
-    async fn a_factor_beyond_the_budget_is_served_and_not_kept() {
-        let store = FactorStore::<&str>::new(20 << 10);
-        for _ in 0..2 {
-            let found = store.get_or_factorize(key(1.0), || factorize(100)).await;
-            assert_eq!(found.map(|f| f.1), Ok(CacheOutcome::NotStored));
+    async fn without_memory_nothing_is_begun() {
+        let store = store(1 << 20);
+        let found = store.get_or_factorize(key(1.0), None, |memory| factorize(10, memory)).await;
+        assert!(found.unwrap().is_none());
+        assert_eq!(store.missing(key(1.0), false), Missing { factor: true, surface: false });
+    }
+
+    #[tokio::test]
+    async fn factors_beyond_the_budget_are_computed_each_time() {
+        // 100 points take half of 100² numbers, 40 KB, and the budget of factors keeps 15 parts of 16.
+        let bytes = FactorBytes { kept: 32 << 10, spare: 0, budget: 1 << 20, n_owners: 1 };
+        let store = Store::new(bytes);
+        assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
+        assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
+        assert_eq!((store.n_bytes(), store.n_reserved()), (0, 0));
+    }
+
+    #[tokio::test]
+    async fn what_is_kept_makes_room_for_work_unless_it_is_in_use() {
+        let store = store(400 << 10);
+        for alpha in [1.0, 2.0, 3.0] {
+            outcome_of(&store, alpha, 100).await;
         }
+        let in_use = store.get_or_factorize(key(1.0), None, |memory| factorize(100, memory)).await;
+        let in_use = in_use.unwrap().unwrap().0;
+        let work = store.reserve(Owner(0), 300 << 10).await.unwrap();
+        let is_missing = |alpha| store.missing(key(alpha), false).factor;
+        assert_eq!([1.0, 2.0, 3.0].map(is_missing), [false, true, true]);
+        drop(in_use);
+        drop(work);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use futures_util::FutureExt;
 use futures_util::future::{BoxFuture, WeakShared};
@@ -35,10 +35,23 @@ where
         Self { flights: Arc::default() }
     }
 
+    #[expect(clippy::disallowed_methods, reason = "a table, for a look-up: a flight is only awaited outside")]
+    fn flights(&self) -> MutexGuard<'_, HashMap<K, WeakFlight<V, E>>> {
+        self.flights.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Whether a flight of `key` is under way.
     pub(super) fn is_under_way(&self, key: &K) -> bool {
-        let flights = self.flights.lock().unwrap_or_else(PoisonError::into_inner);
-        flights.get(key).is_some_and(|weak| weak.upgrade().is_some())
+        self.flights().get(key).is_some_and(|weak| weak.upgrade().is_some())
+    }
+
+    /// Joins the flight of `key` if there is one.
+    pub(super) async fn join_if_under_way(&self, key: &K) -> Option<Outcome<V, E>> {
+        let flight = self.flights().get(key).and_then(WeakShared::upgrade);
+        match flight {
+            Some(flight) => Some(flight.await),
+            None => None,
+        }
     }
 
     /// Joins the flight of `key`, or begins it with `compute`.
@@ -47,7 +60,7 @@ where
         F: Future<Output = Outcome<V, E>> + Send + 'static,
     {
         let (boarding, flight) = {
-            let mut flights = self.flights.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut flights = self.flights();
             match flights.get(&key).and_then(WeakShared::upgrade) {
                 Some(flight) => (Boarding::Joined, flight),
                 None => {

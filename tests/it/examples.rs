@@ -113,7 +113,7 @@ fn every_operation_with_a_body_has_an_example() {
     }
 }
 
-/// What a request that provokes a problem is answered with. Three problems are no answer to a request as such.
+/// What a request that provokes a problem is answered with. Two problems are no answer to a request as such.
 async fn provoked(slug: Slug, sample: &Value) -> Value {
     match slug {
         Slug::Internal => return document(&Problem::internal()),
@@ -122,6 +122,11 @@ async fn provoked(slug: Slug, sample: &Value) -> Value {
             let server = Server::with_flags(&["--deadline-seconds", "0.05"]).await;
             let request = server.client.post(server.url("/v1/normals")).json(&slow_request());
             return server.send(request.header("x-request-id", REQUEST_ID)).await.json();
+        }
+        Slug::RequestTimeout => {
+            let server = Server::with_flags(&["--body-seconds", "0.1"]).await;
+            let head = format!("X-Request-Id: {REQUEST_ID}\r\nContent-Length: 100000");
+            return server.post_stalled("/v1/normals", &head, "{\"cloud\": ").await.json().unwrap();
         }
         _ => {}
     }

@@ -1,16 +1,21 @@
 //! The service over real sockets.
 
+// These threads are no pool's.
+#![allow(clippy::disallowed_methods)]
+
 mod access;
 mod bodies;
 mod cache;
 mod clouds;
 mod compatibility;
+mod contention;
 mod contract;
 mod docs;
 mod examples;
 mod fits;
 mod golden;
 mod limits;
+mod load;
 mod memory;
 mod openapi;
 mod pages;

@@ -1,9 +1,99 @@
 //! How much memory a request takes.
 
+use std::io::{Read, Write};
+use std::net::TcpStream;
+
 use serde_json::{Value, json};
 
 use crate::process::Process;
 use crate::support::{fibonacci_sphere, receive};
+
+/// Half a gigabyte, as flags.
+const BUDGET: usize = 512 << 20;
+const SMALL: [&str; 4] = ["--threads", "2", "--memory-bytes", "536870912"];
+
+/// What the process may have in all: the budget, and a tenth for what the allocator keeps.
+const LIMIT: u64 = (BUDGET + BUDGET / 10) as u64;
+
+/// A request that the server reads as it is; its answer is left unread.
+fn send(process: &Process, path: &str, head: &str, body: &[u8]) -> TcpStream {
+    let mut stream = TcpStream::connect(process.address()).unwrap();
+    write!(stream, "POST {path} HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\n{head}\r\n\r\n")
+        .unwrap();
+    stream.write_all(body).unwrap();
+    stream
+}
+
+async fn expect_alive(process: &Process) {
+    let body = request(60);
+    let answer = receive(reqwest::Client::new().post(process.url("/v1/normals")).json(&body)).await;
+    assert_eq!(answer.status, 200);
+}
+
+#[tokio::test]
+async fn answers_that_nobody_reads_are_within_the_budget() {
+    let process = Process::start(&SMALL);
+    let cloud = request(1500);
+    let registered = reqwest::Client::new().post(process.url("/v1/clouds")).json(&cloud["cloud"]);
+    let id = receive(registered).await.json().unwrap()["cloud_id"].clone();
+    let body = json!({"cloud": {"id": id}, "kernel": cloud["kernel"], "alpha": 1e-8}).to_string();
+    // Each has an answer of 18 MB, or 54: more than the budget together. Some are refused, or wait.
+    let mut streams = Vec::new();
+    for k in 0..24 {
+        let path = ["/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"][k % 2];
+        let head = format!("Accept: application/x-safetensors\r\nContent-Length: {}", body.len());
+        streams.push(send(&process, path, &head, body.as_bytes()));
+    }
+    // The first bytes of an answer are there: it was computed, and now waits for its reader.
+    let mut first = [0; 12];
+    streams[0].read_exact(&mut first).unwrap();
+    assert_eq!(&first, b"HTTP/1.1 200");
+    for _ in 0..5 {
+        expect_alive(&process).await;
+    }
+    drop(streams);
+    expect_alive(&process).await;
+    let peak = process.peak_resident_bytes();
+    assert!(peak <= LIMIT, "{peak} bytes at the peak, {LIMIT} allowed");
+}
+
+#[tokio::test]
+async fn bodies_that_never_end_are_within_the_budget() {
+    let process = Process::start(&[&SMALL[..], &["--body-seconds", "60"]].concat());
+    let piece = vec![b' '; 7 << 20];
+    // Twenty bodies of 8 MB, all but their last bytes: twice what the part for bodies has.
+    let streams: Vec<_> = (0..20).filter_map(|_| {
+        let mut stream = TcpStream::connect(process.address()).unwrap();
+        stream.set_write_timeout(Some(std::time::Duration::from_secs(5))).unwrap();
+        let head = "POST /v1/normals HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\nContent-Length: 8000000\r\n\r\n";
+        stream.write_all(head.as_bytes()).unwrap();
+        // One that was refused is closed while it is sent.
+        stream.write_all(&piece).ok().map(|()| stream)
+    }).collect();
+    assert!(!streams.is_empty());
+    let peak = process.peak_resident_bytes();
+    assert!(peak <= LIMIT / 2, "{peak} bytes at the peak, {} allowed", LIMIT / 2);
+    drop(streams);
+    expect_alive(&process).await;
+}
+
+#[tokio::test]
+async fn what_takes_more_than_the_budget_is_refused_before_it_is_begun() {
+    let process = Process::start(&SMALL);
+    let mut body = request(12_000);
+    body["queries"] = json!([[0.5, 0.5, 0.5]]);
+    let answer = receive(reqwest::Client::new().post(process.url("/v1/interpolation")).json(&{
+        body["values"] = json!(vec![1.0; 12_000]);
+        body
+    }))
+    .await;
+    let problem = answer.json().unwrap();
+    assert_eq!((answer.status, &problem["type"]), (413, &json!("/problems/problem-too-large")));
+    let required = problem["required"].as_u64().unwrap();
+    assert!(required >= 8 * 12_000 * 12_000 && problem["limit"].as_u64().unwrap() < BUDGET as u64);
+    assert!(problem["detail"].as_str().unwrap().contains("GRAMIAN_MEMORY_BYTES"));
+    assert!(process.peak_resident_bytes() < 100 << 20);
+}
 
 fn request(n: usize) -> Value {
     let points = fibonacci_sphere(n);

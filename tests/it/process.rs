@@ -57,6 +57,11 @@ impl Process {
         format!("http://{}{path}", self.address)
     }
 
+    /// Where it listens.
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
     /// The most memory it ever had.
     pub fn peak_resident_bytes(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
@@ -205,6 +210,7 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
     for name in [
         "BIND",
         "THREADS",
+        "MEMORY_BYTES",
         "CACHE_BYTES",
         "CLOUD_BYTES",
         "MAX_POINTS",
@@ -214,6 +220,7 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
         "MAX_RESPONSE_BYTES",
         "MAX_QUEUE",
         "DEADLINE_SECONDS",
+        "BODY_SECONDS",
         "API_KEYS",
         "CORS_ORIGINS",
     ] {
@@ -249,6 +256,8 @@ fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
         ("BIND", "nowhere"),
         ("THREADS", "-1"),
         ("MAX_POINTS", "many"),
+        ("MEMORY_BYTES", "1000"),
+        ("BODY_SECONDS", "0"),
         ("DEADLINE_SECONDS", "0"),
         ("DEADLINE_SECONDS", "NaN"),
     ] {

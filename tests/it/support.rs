@@ -7,7 +7,8 @@ use gramian::app::App;
 use gramian::config::Config;
 use gramian::server::serve;
 use serde_json::{Value, json};
-use tokio::net::TcpListener;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 
 use crate::contract::{self, Received};
@@ -97,6 +98,21 @@ impl Server {
 
     pub async fn post(&self, path: &str, body: &Value) -> Answer {
         self.send(self.client.post(self.url(path)).json(body)).await
+    }
+
+    /// A body that begins and never ends: these are the further lines of the head, and the bytes that come. Answers with what
+    /// came before the server closed the connection.
+    pub async fn post_stalled(&self, path: &str, head: &str, body: &str) -> Received {
+        let mut stream = TcpStream::connect(self.address).await.unwrap();
+        let request = format!(
+            "POST {path} HTTP/1.1\r\nHost: test\r\nConnection: close\r\nContent-Type: application/json\r\n{head}\r\n\r\n{body}"
+        );
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).await.unwrap();
+        let answer = Received::parse(&answer);
+        contract::check("POST", path, &answer);
+        answer
     }
 
     /// A body as it is, announced as JSON.

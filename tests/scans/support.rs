@@ -18,8 +18,9 @@ pub use crate::random::Random;
 /// The factorization for a purpose with nothing chosen by the client.
 pub fn factor(cloud: &Arc<Cloud>, purpose: Purpose) -> Arc<GramFactor> {
     let neighbours = Neighbours::of(cloud);
-    let noise = || estimate_noise(cloud, &neighbours);
-    let (kernel, alpha) = default_fit(&Scales::of(cloud, &neighbours), purpose, noise).unwrap();
+    let noise = || estimate_noise(cloud, &neighbours, &Unobserved).unwrap();
+    let (kernel, alpha) =
+        default_fit(&Scales::of(cloud, &neighbours, &Unobserved).unwrap(), purpose, noise).unwrap();
     let alpha = Regularization::uniform(alpha).unwrap();
     Arc::new(GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap())
 }

@@ -12,12 +12,16 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::body::{Points, present, read_body};
+use crate::http::body::{Points, present};
+use crate::http::compute::Admission;
 use crate::http::fit::{Planner, unknown_cloud};
+use crate::http::intake::{Intake, read_body};
 use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
+use crate::http::sampling::find_scales;
 use crate::http::schemas::CloudIdSchema;
+use crate::numerics::defaults::{NearestRange, Scales};
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::CloudId;
@@ -72,7 +76,8 @@ pub struct Cloud {
     dimension: usize,
     /// The smallest box around the points.
     bounding_box: BoundingBox,
-    /// Distances between nearest points; absent if all points coincide.
+    /// Distances between nearest points; absent if all points coincide, and in lists until the cloud was registered or
+    /// described by itself, or a kernel chosen for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     spacing: Option<Spacing>,
@@ -85,15 +90,15 @@ pub struct Cloud {
 
 impl From<&StoredCloud> for Cloud {
     fn from(stored: &StoredCloud) -> Self {
-        let (min, max) = stored.cloud.bounding_box();
-        let spacings = stored.spacings();
+        let (min, max) = stored.bounding_box.clone();
+        let nearest = stored.scales().and_then(Scales::nearest_range);
         Self {
             cloud_id: stored.id.to_string(),
             n_points: stored.cloud.n_points(),
             dimension: stored.cloud.dimension(),
             bounding_box: BoundingBox { min, max },
-            spacing: spacings.min_median_max.map(|[min, median, max]| Spacing { min, median, max }),
-            n_duplicates: spacings.n_duplicates,
+            spacing: nearest.map(|NearestRange { min, median, max }| Spacing { min, median, max }),
+            n_duplicates: stored.n_duplicates,
             created_at: humantime::format_rfc3339_millis(stored.created_at).to_string(),
         }
     }
@@ -134,16 +139,19 @@ pub async fn create_cloud(
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let formats = [Format::Json, Format::Safetensors, Format::Npy];
-    let body = read_body(&parts.headers, body, &formats, app.config.max_body_bytes).await?;
-    let _admission = app.compute.admit()?;
-    let shared = app.clone();
+    let Intake { body, memory } = read_body(&app, owner, &parts.headers, body, &formats).await?;
+    let admission = app.compute.admit(owner)?;
+    let (shared, flops) = (app.clone(), body.flops_to_parse());
     let job = move |_: &_| {
         let request: CloudRequest = body.parse()?;
         let planner = Planner { app: &shared, owner };
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
-        Ok::<_, Problem>((Cloud::from(stored.as_ref()), is_new))
+        let mut memory = memory;
+        memory.shrink_to(stored.n_bytes());
+        Ok::<_, Problem>((stored, is_new, memory))
     };
-    let (cloud, is_new) = app.compute.run(0.0, job).await?.0?;
+    let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;
+    let cloud = describe(&app, &admission, &stored).await?;
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, [(header::LOCATION, location)], axum::Json(cloud)).into_response())
@@ -177,10 +185,22 @@ pub async fn get_cloud(
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
-    let _admission = app.compute.admit()?;
-    // Spacings of a large cloud take longer than an async worker may be held.
-    let cloud = app.compute.run(0.0, move |_| Cloud::from(stored.as_ref())).await?.0;
+    let admission = app.compute.admit(owner)?;
+    let cloud = describe(&app, &admission, &stored).await?;
     Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
+}
+
+/// Describes a cloud, with what its positions say.
+async fn describe(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    stored: &StoredCloud,
+) -> Result<Cloud, Problem> {
+    let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
+    admission.set_flops(Scales::flops_needed(n, d));
+    find_scales(app, admission, stored).await?;
+    admission.finish();
+    Ok(Cloud::from(stored))
 }
 
 /// Check for a cloud
@@ -255,8 +275,9 @@ pub async fn list_clouds(
     RawQuery(query): RawQuery,
 ) -> Result<axum::Json<CloudList>, Problem> {
     let page = Page::parse(query.as_deref().unwrap_or(""))?;
-    let _admission = app.compute.admit()?;
+    let admission = app.compute.admit(owner)?;
     let shared = app.clone();
+    // Nothing is computed: it only takes longer than an async worker may be held.
     let job = move |_: &_| {
         let clouds = shared.clouds.list(owner);
         let start = match page.after {
@@ -268,7 +289,7 @@ pub async fn list_clouds(
         let next = shown.last().filter(|_| !is_last).map(|stored| Cursor::of(stored).to_string());
         CloudList { clouds: shown.iter().map(|stored| Cloud::from(stored.as_ref())).collect(), next }
     };
-    Ok(axum::Json(app.compute.run(0.0, job).await?.0))
+    Ok(axum::Json(app.compute.run(&admission, 0.0, job).await?.0))
 }
 
 struct Page {

@@ -13,7 +13,7 @@ use crate::http::body::{Points, present};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::Fits;
-use crate::http::operation::{Operation, Plan, serve};
+use crate::http::operation::{Cost, Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
 use crate::http::shared::{Diagnostics, request};
@@ -87,6 +87,7 @@ pub struct Work {
 impl Operation for InterpolationRequest {
     type Work = Work;
     type Answer = InterpolationResponse;
+    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = self.derivatives.unwrap_or(0);
@@ -96,11 +97,15 @@ impl Operation for InterpolationRequest {
         let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
         planner.check_values(&self.values, &main)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
-        let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
+        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
         let per_query = [1, 1 + d, 1 + d + d * d][usize::from(derivatives)];
-        planner.check_answer(m.checked_mul(per_query))?;
-        let flops = 40.0 * (n as f64) * (m + n) as f64;
-        Ok(Plan { main, surface: None, work: Work { values: self.values, queries, derivatives }, flops })
+        let cost = Cost {
+            flops: 40.0 * (n as f64) * (m + n) as f64,
+            n_numbers: planner.check_answer(m.checked_mul(per_query))?,
+            n_scratch: 8 * n + m * (1 + d + d * d),
+            n_held: n + m * d,
+        };
+        Ok(Plan { main, surface: None, work: Work { values: self.values, queries, derivatives }, cost })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {

@@ -139,6 +139,7 @@ pub async fn assemble_laplace_beltrami_matrix(
 impl Operation for LaplaceBeltramiRequest {
     type Work = AppliedWork;
     type Answer = LaplaceBeltramiResponse;
+    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let fit = self.take_fit();
@@ -169,6 +170,7 @@ impl Operation for LaplaceBeltramiRequest {
 impl Operation for LaplaceBeltramiMatrixRequest {
     type Work = MatrixWork;
     type Answer = LaplaceBeltramiMatrixResponse;
+    const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {

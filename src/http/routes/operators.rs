@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::surface::{check_is_surface, geometry_request};
+use super::surface::{check_is_surface, geometry_request, numbers_at_query};
 use crate::http::body::Points;
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::{Fits, SurfaceGeometry};
-use crate::http::operation::Plan;
+use crate::http::operation::{Cost, Plan};
 use crate::http::problem::Problem;
 use crate::http::shared::{Diagnostics, Fit, Geometry, OrientationChoice};
 use crate::numerics::cloud::Cloud;
@@ -66,10 +66,15 @@ pub fn plan_applied(
     planner.check_values(&values, &main)?;
     let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let m = queries.n_points();
-    planner.check_answer(m.checked_mul(numbers_per_query(queries.dimension())))?;
-    let n = (main.fitted.n_points() + surface.fitted.n_points()) as f64;
-    let flops = 60.0 * n * (n + m as f64);
-    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, flops })
+    let d = queries.dimension();
+    let n = main.n_points() + surface.n_points();
+    let cost = Cost {
+        flops: 60.0 * n as f64 * (n + m) as f64,
+        n_numbers: planner.check_answer(m.checked_mul(numbers_per_query(d)))?,
+        n_scratch: 8 * n + (numbers_at_query(d) + 1 + d + d * d) * m,
+        n_held: n + m * d,
+    };
+    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, cost })
 }
 
 /// Plans an operator as a matrix, with so many rows per query.
@@ -88,10 +93,15 @@ pub fn plan_matrix(
     check_is_surface(&main.stored.cloud)?;
     let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let n = main.stored.cloud.n_points();
-    let n_rows = queries.n_points().checked_mul(rows_per_query(queries.dimension()));
-    planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?;
-    let flops = 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64;
-    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, flops })
+    let (m, d) = (queries.n_points(), queries.dimension());
+    let n_rows = m.checked_mul(rows_per_query(d));
+    let cost = Cost {
+        n_numbers: planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?,
+        flops: 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64,
+        n_scratch: 8 * n + numbers_at_query(d) * m,
+        n_held: m * d,
+    };
+    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, cost })
 }
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.

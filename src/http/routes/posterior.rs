@@ -13,9 +13,9 @@ use crate::http::answer::answer;
 use crate::http::array::Array;
 use crate::http::body::{Points, present, present_words};
 use crate::http::compute::JobObserver;
-use crate::http::fit::{FitPlan, Planner};
+use crate::http::fit::{PlannedFit, Planner};
 use crate::http::fitted::Fits;
-use crate::http::operation::{Operation, Plan, serve};
+use crate::http::operation::{Cost, Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
 use crate::http::shared::{Diagnostics, Warning, WarningCode, request};
@@ -23,7 +23,6 @@ use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::jets::JetOrder;
 use crate::numerics::posterior::{covariance, log_marginal_likelihood, variances};
-use crate::numerics::regularization::Regularization;
 use crate::store::Owner;
 
 /// What may be asked of a posterior beside its mean.
@@ -122,6 +121,7 @@ impl Work {
 impl Operation for PosteriorRequest {
     type Work = Work;
     type Answer = PosteriorResponse;
+    const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
@@ -129,9 +129,9 @@ impl Operation for PosteriorRequest {
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let work = Work { values: self.values, queries, include: self.include.unwrap_or_default() };
         check_observation_noise(&work, &main)?;
-        let (n, m, d) = (main.fitted.n_points(), work.queries.n_points(), work.queries.dimension());
+        let (n, m, d) = (main.n_points(), work.queries.n_points(), work.queries.dimension());
         let has_covariance = work.wants(PosteriorQuantity::Covariance);
-        planner.check_answer(m.checked_mul(d + 3 + if has_covariance { m } else { 0 }))?;
+        let n_numbers = planner.check_answer(m.checked_mul(d + 3 + if has_covariance { m } else { 0 }))?;
         let whitened = has_covariance
             || work.wants(PosteriorQuantity::Variance)
             || work.wants(PosteriorQuantity::ObservationVariance);
@@ -139,7 +139,14 @@ impl Operation for PosteriorRequest {
         let flops = 40.0 * nf * (nf + mf)
             + if whitened { nf * nf * mf } else { 0.0 }
             + if has_covariance { nf * mf * mf } else { 0.0 };
-        Ok(Plan { main, surface: None, work, flops })
+        let whitened_columns = match (has_covariance, whitened) {
+            (true, _) => m,
+            (false, true) => m.min(COLUMNS_AT_ONCE),
+            (false, false) => 0,
+        };
+        let n_scratch = whitened_columns.saturating_add(8).saturating_mul(n).saturating_add(m * (2 + d));
+        let n_held = n + m * d;
+        Ok(Plan { main, surface: None, work, cost: Cost { flops, n_numbers, n_scratch, n_held } })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
@@ -189,17 +196,16 @@ impl Operation for PosteriorRequest {
 }
 
 /// A new observation's noise is only known if it is the same everywhere.
-fn check_observation_noise(work: &Work, plan: &FitPlan) -> Result<(), Problem> {
-    let wants = work.wants(PosteriorQuantity::ObservationVariance);
-    match plan.regularization {
-        Regularization::PerPoint(_) if wants => {
-            let detail =
-                "observation_variance needs alpha: with noise_variances the noise at queries is unknown";
-            Err(Problem::invalid_request("/include", detail))
-        }
-        Regularization::PerPoint(_) | Regularization::Uniform(_) => Ok(()),
+fn check_observation_noise(work: &Work, plan: &PlannedFit) -> Result<(), Problem> {
+    if !plan.has_noise_variances() || !work.wants(PosteriorQuantity::ObservationVariance) {
+        return Ok(());
     }
+    let detail = "observation_variance needs alpha: with noise_variances the noise at queries is unknown";
+    Err(Problem::invalid_request("/include", detail))
 }
+
+/// Queries whose variances are computed at once.
+const COLUMNS_AT_ONCE: usize = 512;
 
 fn warn_of_clamping(clamped: &[usize], diagnostics: &mut Diagnostics) {
     let Some(first) = clamped.first() else { return };

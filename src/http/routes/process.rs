@@ -54,7 +54,7 @@ pub async fn check_live() -> Json<Health> {
 
 /// Check that the process takes requests
 ///
-/// 503 while its queue is full and while it shuts down.
+/// 503 while its queue is full, while it shuts down, and if its compute threads do not move.
 #[utoipa::path(
     get,
     path = "/health/ready",
@@ -67,9 +67,7 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
     if app.is_draining.load(Ordering::Relaxed) {
         return Err(Problem::overloaded(1));
     }
-    if !app.compute.has_room() {
-        app.compute.admit()?;
-    }
+    app.compute.check_ready().await?;
     Ok(Json(Health { status: "ok" }))
 }
 

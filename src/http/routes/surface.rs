@@ -13,7 +13,7 @@ use crate::http::body::{Points, present, present_word};
 use crate::http::compute::JobObserver;
 use crate::http::fit::Planner;
 use crate::http::fitted::Fits;
-use crate::http::operation::{Operation, Plan, serve};
+use crate::http::operation::{Cost, Operation, Plan, serve};
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
 use crate::http::shared::{
@@ -169,6 +169,7 @@ pub struct Work {
 impl Operation for NormalsRequest {
     type Work = Work;
     type Answer = NormalsResponse;
+    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let fit = self.take_fit();
@@ -194,6 +195,7 @@ impl Operation for NormalsRequest {
 impl Operation for CurvaturesRequest {
     type Work = Work;
     type Answer = CurvaturesResponse;
+    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let fit = self.take_fit();
@@ -232,8 +234,8 @@ fn plan(
     let mut main = planner.fit(fit, purpose)?;
     check_is_surface(&main.stored.cloud)?;
     let queries = planner.queries(queries, &mut [&mut main])?;
-    let (n, m, d) = (main.fitted.n_points(), queries.n_points(), queries.dimension());
-    planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
+    let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+    let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
     // The sums over the points, and some thirty operations per entry of each shape operator.
     let sums = 60.0 * (n as f64) * (m + n) as f64 + 30.0 * m as f64 * (d as f64).powi(3);
     let offsets = match request.model {
@@ -241,7 +243,14 @@ fn plan(
         // Few queries need it; which, is not known before.
         SurfaceModel::Auto | SurfaceModel::Signature => 0.0,
     };
-    Ok(Plan { main, surface: None, work: Work { queries, request }, flops: sums + offsets })
+    let cost =
+        Cost { flops: sums + offsets, n_numbers, n_scratch: 4 * n + numbers_at_query(d) * m, n_held: m * d };
+    Ok(Plan { main, surface: None, work: Work { queries, request }, cost })
+}
+
+/// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, and what is said about it.
+pub(super) fn numbers_at_query(dimension: usize) -> usize {
+    20 + 6 * dimension * dimension
 }
 
 /// What the offset model costs at one query, in flops of a large factorization: 0.12 ms of one core.

@@ -123,6 +123,7 @@ pub async fn assemble_surface_gradient_matrix(
 impl Operation for SurfaceGradientRequest {
     type Work = AppliedWork;
     type Answer = SurfaceGradientResponse;
+    const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let fit = self.take_fit();
@@ -153,6 +154,7 @@ impl Operation for SurfaceGradientRequest {
 impl Operation for SurfaceGradientMatrixRequest {
     type Work = MatrixWork;
     type Answer = SurfaceGradientMatrixResponse;
+    const HAS_SURFACE: bool = true;
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {

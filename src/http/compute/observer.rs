@@ -1,0 +1,81 @@
+//! Watches one job: measures its stages, tells it when its client is gone.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::lane::Pulse;
+use crate::numerics::observer::{Observer, Stage};
+
+/// Time spent in each stage of a job.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StageTimes {
+    pub gram: Duration,
+    pub factor: Duration,
+    pub solve: Duration,
+    pub evaluate: Duration,
+}
+
+impl StageTimes {
+    fn of(&mut self, stage: Stage) -> &mut Duration {
+        match stage {
+            Stage::Gram => &mut self.gram,
+            Stage::Factor | Stage::Condition => &mut self.factor,
+            Stage::Solve => &mut self.solve,
+            Stage::Evaluate => &mut self.evaluate,
+        }
+    }
+}
+
+/// Watches one job: measures its stages, tells it when its client is gone.
+pub struct JobObserver {
+    cancelled: Arc<AtomicBool>,
+    pulse: Arc<Pulse>,
+    clock: Mutex<Clock>,
+}
+
+#[derive(Default)]
+struct Clock {
+    current: Option<(Stage, Instant)>,
+    times: StageTimes,
+}
+
+impl Clock {
+    fn stop(&mut self) {
+        if let Some((stage, since)) = self.current.take() {
+            *self.times.of(stage) += since.elapsed();
+        }
+    }
+}
+
+impl JobObserver {
+    pub(super) fn new(cancelled: Arc<AtomicBool>, pulse: Arc<Pulse>) -> Self {
+        Self { cancelled, pulse, clock: Mutex::default() }
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "a clock, for as long as it takes to read it")]
+    fn clock(&self) -> MutexGuard<'_, Clock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The times so far, the current stage included.
+    pub fn times(&self) -> StageTimes {
+        let mut clock = self.clock();
+        clock.stop();
+        clock.times
+    }
+}
+
+impl Observer for JobObserver {
+    fn enter(&self, stage: Stage) {
+        let mut clock = self.clock();
+        clock.stop();
+        clock.current = Some((stage, Instant::now()));
+    }
+
+    fn is_cancelled(&self) -> bool {
+        // Whoever asks is at work.
+        self.pulse.beat();
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}

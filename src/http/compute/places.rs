@@ -1,0 +1,197 @@
+//! Places of admitted requests, and when the next one will be free.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::store::Owner;
+
+/// Seconds that a flop takes until any was measured: 20 Gflop/s.
+const SECONDS_PER_FLOP: f64 = 5e-11;
+
+/// Requests below it say nothing about the speed of the machine.
+const LEAST_MEASURED_FLOPS: f64 = 1e8;
+
+/// A bounded number of places, of which several owners have at most half each.
+pub(super) struct Places {
+    n_places: usize,
+    share: usize,
+    deadline: Duration,
+    state: Mutex<State>,
+}
+
+struct State {
+    admitted: HashMap<u64, Admitted>,
+    by_owner: HashMap<Owner, usize>,
+    n_admissions: u64,
+    /// Moving average over requests of size.
+    seconds_per_flop: f64,
+}
+
+struct Admitted {
+    owner: Owner,
+    since: Instant,
+    /// Known once it is planned.
+    flops: Option<f64>,
+    /// When its turn came, after it was planned.
+    begun: Option<Instant>,
+}
+
+/// A place among the admitted requests, held until the answer is ready; work that outlives its client holds it as well.
+pub struct Admission {
+    places: Arc<Places>,
+    id: u64,
+    pub owner: Owner,
+}
+
+impl Places {
+    pub(super) fn new(n_places: usize, n_owners: usize, deadline: Duration) -> Arc<Self> {
+        let share = if n_owners > 1 { n_places.div_ceil(2) } else { n_places };
+        let state = State {
+            admitted: HashMap::new(),
+            by_owner: HashMap::new(),
+            n_admissions: 0,
+            seconds_per_flop: SECONDS_PER_FLOP,
+        };
+        Arc::new(Self { n_places, share, deadline, state: Mutex::new(state) })
+    }
+
+    /// Takes a place, or says in how many seconds there will be one.
+    pub(super) fn take(self: &Arc<Self>, owner: Owner) -> Result<Admission, u64> {
+        let mut state = self.state();
+        self.check(&state, owner)?;
+        let id = state.n_admissions;
+        state.n_admissions += 1;
+        *state.by_owner.entry(owner).or_default() += 1;
+        state.admitted.insert(id, Admitted { owner, since: Instant::now(), flops: None, begun: None });
+        Ok(Admission { places: self.clone(), id, owner })
+    }
+
+    /// Whether there is a place for an owner; if not, in how many seconds.
+    pub(super) fn look(&self, owner: Owner) -> Result<(), u64> {
+        self.check(&self.state(), owner)
+    }
+
+    /// Whether there is a place for anybody.
+    pub(super) fn look_for_any(&self) -> Result<(), u64> {
+        let state = self.state();
+        if state.admitted.len() < self.n_places { Ok(()) } else { Err(self.seconds_until_free(&state, None)) }
+    }
+
+    fn check(&self, state: &State, owner: Owner) -> Result<(), u64> {
+        let of_owner = state.by_owner.get(&owner).copied().unwrap_or(0);
+        if of_owner >= self.share {
+            return Err(self.seconds_until_free(state, Some(owner)));
+        }
+        if state.admitted.len() >= self.n_places { Err(self.seconds_until_free(state, None)) } else { Ok(()) }
+    }
+
+    /// When the first of those who have begun will have ended; whole seconds, as the header has them.
+    pub(super) fn seconds_until_any_is_free(&self) -> u64 {
+        self.seconds_until_free(&self.state(), None)
+    }
+
+    fn seconds_until_free(&self, state: &State, owner: Option<Owner>) -> u64 {
+        let now = Instant::now();
+        let meant =
+            state.admitted.values().filter(|admitted| owner.is_none_or(|owner| admitted.owner == owner));
+        let left = meant.filter_map(|admitted| {
+            let seconds = admitted.flops? * state.seconds_per_flop;
+            let until_deadline = (admitted.since + self.deadline).saturating_duration_since(now);
+            let elapsed = now.saturating_duration_since(admitted.begun?).as_secs_f64();
+            Some((seconds - elapsed).clamp(0.0, until_deadline.as_secs_f64()))
+        });
+        left.reduce(f64::min).unwrap_or(0.0).round().clamp(1.0, 600.0) as u64
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "counters, for as long as it takes to count")]
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Admission {
+    /// Says what the request will cost in all.
+    pub fn set_flops(&self, flops: f64) {
+        if let Some(admitted) = self.places.state().admitted.get_mut(&self.id) {
+            admitted.flops = Some(flops);
+        }
+    }
+
+    /// Its turn has come.
+    pub(super) fn begin(&self) {
+        if let Some(admitted) = self.places.state().admitted.get_mut(&self.id)
+            && admitted.flops.is_some()
+        {
+            admitted.begun.get_or_insert_with(Instant::now);
+        }
+    }
+
+    /// It was computed to its end: what it took says how fast the machine is.
+    pub fn finish(&self) {
+        let mut state = self.places.state();
+        let Some(Admitted { flops: Some(flops), begun: Some(begun), .. }) = state.admitted.get(&self.id)
+        else {
+            return;
+        };
+        if *flops >= LEAST_MEASURED_FLOPS {
+            let sample = begun.elapsed().as_secs_f64() / flops;
+            state.seconds_per_flop = 0.5 * state.seconds_per_flop + 0.5 * sample;
+        }
+    }
+}
+
+impl Drop for Admission {
+    fn drop(&mut self) {
+        let mut state = self.places.state();
+        state.admitted.remove(&self.id);
+        if let Some(n) = state.by_owner.get_mut(&self.owner) {
+            *n -= 1;
+            if *n == 0 {
+                state.by_owner.remove(&self.owner);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Owner = Owner(0);
+    const B: Owner = Owner(1);
+    const DEADLINE: Duration = Duration::from_secs(100);
+
+    #[test]
+    fn one_owner_leaves_half_of_the_places_to_the_others() {
+        let places = Places::new(4, 2, DEADLINE);
+        let of_a: Vec<_> = (0..2).map(|_| places.take(A).ok().unwrap()).collect();
+        assert_eq!(places.look(A), Err(1));
+        let of_b: Vec<_> = (0..2).map(|_| places.take(B).ok().unwrap()).collect();
+        assert!(places.take(B).is_err() && places.look_for_any().is_err());
+        drop(of_a);
+        assert!(places.look(A).is_ok() && places.look_for_any().is_ok() && places.look(B).is_err());
+        drop(of_b);
+        assert!(places.state().by_owner.is_empty() && places.state().admitted.is_empty());
+    }
+
+    #[test]
+    fn a_place_is_free_when_the_first_of_those_who_began_has_ended() {
+        let places = Places::new(3, 1, DEADLINE);
+        let [long, short, _waiting] = [1e12, 4e11, 1e9].map(|flops| {
+            let admission = places.take(A).ok().unwrap();
+            admission.set_flops(flops);
+            admission
+        });
+        long.begin();
+        short.begin();
+        // At 20 Gflop/s; who has not begun will end later than whoever has.
+        assert_eq!(places.look(A), Err(20));
+        drop(short);
+        assert!(places.look(A).is_ok());
+        assert_eq!(places.seconds_until_any_is_free(), 50);
+        // None lasts beyond its deadline.
+        long.set_flops(1e15);
+        assert_eq!(places.seconds_until_any_is_free(), 100);
+    }
+}

@@ -1,0 +1,200 @@
+//! From plans to factorizations and surfaces: found, or made once for all who ask, in memory that was taken for them.
+
+use std::sync::{Arc, OnceLock};
+
+use super::compute::{Admission, JobObserver, StageTimes};
+use super::fit::FitPlan;
+use super::fitted::{Fits, Fitted};
+use super::operation::Cost;
+use super::problem::Problem;
+use super::report::Report;
+use super::slug::Slug;
+use crate::app::App;
+use crate::numerics::error::NumericsError;
+use crate::numerics::interpolant::Interpolant;
+use crate::numerics::solver::GramFactor;
+use crate::numerics::surface::Surface;
+use crate::store::budget::{BeyondBudget, Reservation};
+use crate::store::factors::{Missing, StoredFactor};
+use crate::store::key::ValuesKey;
+
+/// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
+const LEAST_BYTES: usize = 16 << 10;
+
+/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
+#[derive(Debug, Clone)]
+pub enum FactorFailure {
+    Refused(NumericsError),
+    Broken(Problem),
+}
+
+impl FactorFailure {
+    fn of(self, plan: &FitPlan) -> Problem {
+        match self {
+            Self::Refused(error) => plan.refused(error),
+            Self::Broken(problem) => problem,
+        }
+    }
+}
+
+/// Brings the factorizations of one request.
+pub struct Fitting<'a> {
+    pub app: &'a Arc<App>,
+    pub admission: &'a Arc<Admission>,
+    /// Whether the surface is asked for as well.
+    pub has_surface: bool,
+}
+
+/// What a request takes of the memory for work, taken at once: who waits for a part while holding another may wait for ever.
+struct Memory {
+    work: Reservation,
+    main: Option<Reservation>,
+    other: Option<Reservation>,
+    surface: Option<Reservation>,
+}
+
+impl Fitting<'_> {
+    /// The fits with their factorizations, and the memory for the work with them.
+    ///
+    /// # Errors
+    /// 413 if it takes more memory than there is, and what factorizing refuses.
+    pub async fn fits(
+        &self,
+        main: &FitPlan,
+        surface: Option<&FitPlan>,
+        cost: Cost,
+        report: &mut Report,
+    ) -> Result<(Fits, Reservation), Problem> {
+        let other = surface.filter(|surface| surface.key != main.key);
+        loop {
+            let Memory { work, main: for_main, other: for_other, surface: for_surface } =
+                self.reserve(main, other, cost).await?;
+            // What was there when the memory was counted may be gone: then everything goes back, and is counted again.
+            let Some(fitted) = self.fitted(main, for_main, report).await? else { continue };
+            let other = match other {
+                None => None,
+                Some(plan) => match self.fitted(plan, for_other, report).await? {
+                    None => continue,
+                    Some(fitted) => Some(fitted),
+                },
+            };
+            let mut fits = Fits { app: self.app.clone(), main: fitted, surface: other, made: None };
+            if self.has_surface {
+                let Some(made) = self.surface(fits.surface(), for_surface, report).await? else { continue };
+                fits.made = Some(made);
+            }
+            return Ok((fits, work));
+        }
+    }
+
+    async fn reserve(&self, main: &FitPlan, other: Option<&FitPlan>, cost: Cost) -> Result<Memory, Problem> {
+        let missing = |plan: &FitPlan, with_surface| {
+            let Missing { factor, surface } = self.app.factors.missing(plan.key, with_surface);
+            let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
+            let factor = if factor { n_bytes_of_factor(plan) } else { Some(0) };
+            let surface = if surface { Surface::n_bytes_needed(n, d) } else { 0 };
+            (factor.unwrap_or(usize::MAX), surface)
+        };
+        let (for_main, of_main) = missing(main, self.has_surface && other.is_none());
+        let (for_other, of_other) = other.map_or((0, 0), |other| missing(other, self.has_surface));
+        let for_surface = of_main + of_other;
+        let work = LEAST_BYTES.saturating_add(cost.n_bytes());
+        let total = [for_main, for_other, for_surface, work].into_iter().fold(0, usize::saturating_add);
+        let reserved = self.app.factors.reserve(self.admission.owner, total).await;
+        let mut work = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))?;
+        let mut part = |n_bytes: usize| (n_bytes > 0).then(|| work.split(n_bytes));
+        let (main, other, surface) = (part(for_main), part(for_other), part(for_surface));
+        Ok(Memory { work, main, other, surface })
+    }
+
+    /// `None` if it is to be factorized, without memory for it.
+    async fn fitted(
+        &self,
+        plan: &FitPlan,
+        memory: Option<Reservation>,
+        report: &mut Report,
+    ) -> Result<Option<Fitted>, Problem> {
+        let begin =
+            |memory: Reservation| factorize(self.app.clone(), self.admission.clone(), plan.clone(), memory);
+        let found = self.app.factors.get_or_factorize(plan.key, memory, begin).await;
+        let Some((stored, outcome)) = found.map_err(|failure| failure.of(plan))? else { return Ok(None) };
+        report.found(&stored, outcome);
+        Ok(Some(Fitted { plan: plan.clone(), stored }))
+    }
+
+    /// `None` if it is to be made, without memory for it.
+    async fn surface(
+        &self,
+        fitted: &Fitted,
+        memory: Option<Reservation>,
+        report: &mut Report,
+    ) -> Result<Option<Arc<Surface>>, Problem> {
+        let factors = &self.app.factors;
+        let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
+        let begin = || make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone());
+        let found = factors.get_or_make_surface(key, &fitted.stored, memory, begin).await;
+        if let Some(&times) = times.get() {
+            report.made_surface(times);
+        }
+        found.map_err(|failure| failure.of(&fitted.plan))
+    }
+}
+
+/// Half the matrix or, where the fallback needs it, all of it, and what lies beside it.
+fn n_bytes_of_factor(plan: &FitPlan) -> Option<usize> {
+    let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
+    GramFactor::n_bytes_needed(n)?.checked_add(n.checked_mul((d + 10) * size_of::<f64>())?)
+}
+
+fn beyond(limit: usize, required: usize) -> Problem {
+    let remedy = "take fewer points or queries, or raise GRAMIAN_MEMORY_BYTES";
+    Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(required)).with_remedy(remedy)
+}
+
+async fn factorize(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    plan: FitPlan,
+    memory: Reservation,
+) -> Result<StoredFactor, FactorFailure> {
+    let flops = GramFactor::flops_needed(plan.fitted.n_points());
+    let spare = app.factors.spare().clone();
+    let job = move |observer: &JobObserver| {
+        let factor =
+            GramFactor::factorize_with(&spare, plan.fitted, plan.kernel, plan.regularization, observer);
+        // The memory goes with the job: it may run on for a moment when nobody waits any more.
+        factor.map(|factor| (factor, memory))
+    };
+    let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
+    let (factor, memory) = outcome.map_err(FactorFailure::Refused)?;
+    Ok(StoredFactor::new(factor, times.gram, times.factor, memory))
+}
+
+/// The surface of the signature function, with the client's normals if there are any.
+fn make_surface(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    fitted: &Fitted,
+    times: Arc<OnceLock<StageTimes>>,
+) -> impl Future<Output = Result<Surface, FactorFailure>> + Send + 'static {
+    let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
+    let flops = Surface::flops_needed(plan.fitted.n_points(), plan.fitted.dimension());
+    let shared = app.clone();
+    let job = move |observer: &JobObserver| {
+        let (factor, given) = (stored.factor.clone(), plan.fitted_normals());
+        let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
+        match shared.factors.solution(plan.key, key) {
+            Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
+            None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
+                shared.factors.keep_solution(plan.key, key, signature.solution.clone());
+                Surface::with_jets(signature, jets, given.as_deref(), observer)
+            }),
+        }
+    };
+    async move {
+        let (surface, taken) =
+            app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
+        let _ = times.set(taken);
+        surface.map_err(FactorFailure::Refused)
+    }
+}

@@ -1,0 +1,381 @@
+//! Bytes that many share: taken before they are used, given back when what they pay for is dropped.
+//!
+//! WHY NOT A SEMAPHORE. A semaphore serves its waiters in order, so that whoever wants a kilobyte waits behind whoever wants a
+//! gigabyte. Here small reservations never wait behind large ones: a part of the budget is closed to the large. Among the
+//! large, those of the owner who holds least come first, and of equals the earliest; none of them is passed by another
+//! that its owner may have, so that each has its turn. With several owners none may hold more than half.
+//!
+//! NO WAITING WHILE HOLDING. Whoever waits here must hold nothing that the others who wait here need; callers take all that
+//! they need at once, and split it afterwards.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::Notify;
+
+use super::Owner;
+
+/// The part of a budget that large reservations leave free.
+const SMALL_SHARE: usize = 8;
+
+/// A reservation is small up to this part of what the large leave free, so that several of them fit there at once.
+const SMALL_PARTS: usize = 16;
+
+/// How often a waiting reservation looks again, beside being woken: caches may have become able to give something up.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
+
+/// A number of bytes, and who holds how many of them.
+pub struct Budget {
+    ledger: Arc<Ledger>,
+}
+
+struct Ledger {
+    total: usize,
+    /// What one owner may hold.
+    share: usize,
+    state: Mutex<State>,
+    released: Notify,
+}
+
+#[derive(Default)]
+struct State {
+    held: usize,
+    by_owner: HashMap<Owner, usize>,
+    /// Large reservations that wait, in the order of their arrival.
+    waiting: Vec<Waiting>,
+    n_arrived: u64,
+}
+
+#[derive(Clone, Copy)]
+struct Waiting {
+    arrival: u64,
+    owner: Owner,
+    n_bytes: usize,
+}
+
+/// More than an owner may ever hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BeyondBudget {
+    pub limit: usize,
+}
+
+impl Budget {
+    /// A budget of so many bytes for so many owners.
+    pub fn new(total: usize, n_owners: usize) -> Self {
+        let share = if n_owners > 1 { total / 2 } else { total };
+        let ledger = Ledger { total, share, state: Mutex::default(), released: Notify::new() };
+        Self { ledger: Arc::new(ledger) }
+    }
+
+    /// The largest reservation that there can be.
+    pub fn largest(&self) -> usize {
+        self.ledger.largest()
+    }
+
+    /// Bytes that are held.
+    pub fn n_held(&self) -> usize {
+        self.ledger.state().held
+    }
+
+    /// Takes so many bytes if they are to be had now, whoever waits.
+    pub fn try_reserve(&self, owner: Owner, n_bytes: usize) -> Option<Reservation> {
+        let mut state = self.ledger.state();
+        self.ledger.has_room(&state, owner, n_bytes).then(|| self.take(&mut state, owner, n_bytes))
+    }
+
+    /// Takes so many bytes when it is their turn. Before each look `make_room` is called with what is missing, to let go of
+    /// what can be done without.
+    ///
+    /// # Errors
+    /// [`BeyondBudget`] if there will never be so many.
+    pub async fn reserve(
+        &self,
+        owner: Owner,
+        n_bytes: usize,
+        make_room: impl Fn(Shortage),
+    ) -> Result<Reservation, BeyondBudget> {
+        if n_bytes > self.largest() {
+            return Err(BeyondBudget { limit: self.largest() });
+        }
+        let place = self.queue(owner, n_bytes);
+        loop {
+            let released = self.ledger.released.notified();
+            tokio::pin!(released);
+            released.as_mut().enable();
+            if let Some(reservation) = self.take_turn(&place) {
+                return Ok(reservation);
+            }
+            if let Some(shortage) = self.shortage(owner, n_bytes) {
+                make_room(shortage);
+                if let Some(reservation) = self.take_turn(&place) {
+                    return Ok(reservation);
+                }
+            }
+            // Either way it looks again.
+            let _ = tokio::time::timeout(LOOK_AGAIN, released).await;
+        }
+    }
+
+    /// Grows a reservation within `patience`; says whether it could. It waits while it holds what others may wait for, so it
+    /// must not wait for long.
+    pub async fn grow(&self, reservation: &mut Reservation, n_bytes: usize, patience: Duration) -> bool {
+        let growing = async {
+            loop {
+                let released = self.ledger.released.notified();
+                tokio::pin!(released);
+                released.as_mut().enable();
+                if reservation.try_grow(n_bytes) {
+                    return;
+                }
+                let _ = tokio::time::timeout(LOOK_AGAIN, released).await;
+            }
+        };
+        tokio::time::timeout(patience, growing).await.is_ok()
+    }
+
+    /// What is missing for a reservation, apart from its turn.
+    pub fn shortage(&self, owner: Owner, n_bytes: usize) -> Option<Shortage> {
+        let state = self.ledger.state();
+        let of_owner = (state.of(owner) + n_bytes).saturating_sub(self.ledger.share);
+        let free = self.ledger.total - state.held;
+        let of_all = (n_bytes + self.ledger.closed_to(n_bytes)).saturating_sub(free);
+        (of_owner > 0 || of_all > 0).then_some(Shortage { owner, of_owner, of_all })
+    }
+
+    fn queue(&self, owner: Owner, n_bytes: usize) -> Place<'_> {
+        let mut state = self.ledger.state();
+        let waiting = Waiting { arrival: state.n_arrived, owner, n_bytes };
+        state.n_arrived += 1;
+        if self.ledger.is_large(n_bytes) {
+            state.waiting.push(waiting);
+        }
+        Place { ledger: &self.ledger, waiting }
+    }
+
+    fn take_turn(&self, place: &Place<'_>) -> Option<Reservation> {
+        let Waiting { arrival, owner, n_bytes } = place.waiting;
+        let mut state = self.ledger.state();
+        if !self.ledger.has_room(&state, owner, n_bytes) || !self.ledger.is_next(&state, place.waiting) {
+            return None;
+        }
+        state.waiting.retain(|waiting| waiting.arrival != arrival);
+        Some(self.take(&mut state, owner, n_bytes))
+    }
+
+    fn take(&self, state: &mut State, owner: Owner, n_bytes: usize) -> Reservation {
+        state.held += n_bytes;
+        *state.by_owner.entry(owner).or_default() += n_bytes;
+        Reservation { ledger: self.ledger.clone(), owner, n_bytes }
+    }
+}
+
+impl Ledger {
+    #[expect(clippy::disallowed_methods, reason = "counters, for as long as it takes to count")]
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn largest(&self) -> usize {
+        self.share.min(self.total - self.total / SMALL_SHARE)
+    }
+
+    fn is_large(&self, n_bytes: usize) -> bool {
+        n_bytes > self.total / SMALL_SHARE / SMALL_PARTS
+    }
+
+    /// What a reservation of this size must leave free.
+    fn closed_to(&self, n_bytes: usize) -> usize {
+        if self.is_large(n_bytes) { self.total / SMALL_SHARE } else { 0 }
+    }
+
+    fn may_hold(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
+        state.of(owner) + n_bytes <= self.share
+    }
+
+    fn has_room(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
+        let free = self.total - state.held;
+        self.may_hold(state, owner, n_bytes) && n_bytes.saturating_add(self.closed_to(n_bytes)) <= free
+    }
+
+    fn is_next(&self, state: &State, candidate: Waiting) -> bool {
+        let rank = |waiting: &Waiting| (state.of(waiting.owner), waiting.arrival);
+        let eligible = state.waiting.iter().filter(|w| self.may_hold(state, w.owner, w.n_bytes));
+        !self.is_large(candidate.n_bytes)
+            || eligible.min_by_key(|w| rank(w)).is_none_or(|first| first.arrival == candidate.arrival)
+    }
+}
+
+impl State {
+    fn of(&self, owner: Owner) -> usize {
+        self.by_owner.get(&owner).copied().unwrap_or(0)
+    }
+}
+
+/// Bytes that must be let go before a reservation fits: by its owner, and by all together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shortage {
+    pub owner: Owner,
+    pub of_owner: usize,
+    pub of_all: usize,
+}
+
+/// A place among those who wait, given up when dropped.
+struct Place<'a> {
+    ledger: &'a Ledger,
+    waiting: Waiting,
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        if self.ledger.is_large(self.waiting.n_bytes) {
+            let mut state = self.ledger.state();
+            let n_before = state.waiting.len();
+            state.waiting.retain(|waiting| waiting.arrival != self.waiting.arrival);
+            if state.waiting.len() < n_before {
+                drop(state);
+                self.ledger.released.notify_waiters();
+            }
+        }
+    }
+}
+
+/// Bytes that are held until this is dropped; it travels with what they pay for.
+pub struct Reservation {
+    ledger: Arc<Ledger>,
+    owner: Owner,
+    n_bytes: usize,
+}
+
+impl Reservation {
+    pub fn n_bytes(&self) -> usize {
+        self.n_bytes
+    }
+
+    pub fn owner(&self) -> Owner {
+        self.owner
+    }
+
+    /// Cuts off a part, at most all of it.
+    pub fn split(&mut self, n_bytes: usize) -> Reservation {
+        let n_bytes = n_bytes.min(self.n_bytes);
+        self.n_bytes -= n_bytes;
+        Reservation { ledger: self.ledger.clone(), owner: self.owner, n_bytes }
+    }
+
+    /// Gives back what is beyond so many bytes.
+    pub fn shrink_to(&mut self, n_bytes: usize) {
+        drop(self.split(self.n_bytes.saturating_sub(n_bytes)));
+    }
+
+    /// Takes more if it is to be had now; says whether it was.
+    pub fn try_grow(&mut self, n_bytes: usize) -> bool {
+        let mut state = self.ledger.state();
+        if !self.ledger.has_room(&state, self.owner, n_bytes) {
+            return false;
+        }
+        state.held += n_bytes;
+        *state.by_owner.entry(self.owner).or_default() += n_bytes;
+        self.n_bytes += n_bytes;
+        true
+    }
+}
+
+impl Drop for Reservation {
+    fn drop(&mut self) {
+        if self.n_bytes == 0 {
+            return;
+        }
+        let mut state = self.ledger.state();
+        state.held -= self.n_bytes;
+        if let Some(held) = state.by_owner.get_mut(&self.owner) {
+            *held -= self.n_bytes;
+            if *held == 0 {
+                state.by_owner.remove(&self.owner);
+            }
+        }
+        drop(state);
+        self.ledger.released.notify_waiters();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Owner = Owner(0);
+    const B: Owner = Owner(1);
+
+    fn keep_everything(_: Shortage) {}
+
+    #[tokio::test]
+    async fn small_reservations_pass_large_ones_that_wait() {
+        let budget = Budget::new(1 << 20, 1);
+        let most = budget.reserve(A, 700 << 10, keep_everything).await.unwrap();
+        let mut large = Box::pin(budget.reserve(A, 600 << 10, keep_everything));
+        assert!(futures_util::poll!(&mut large).is_pending());
+        let small = budget.reserve(A, 4 << 10, keep_everything).await.unwrap();
+        drop(most);
+        assert_eq!(large.await.unwrap().n_bytes(), 600 << 10);
+        drop(small);
+        assert_eq!(budget.n_held(), 0);
+    }
+
+    #[tokio::test]
+    async fn large_reservations_are_not_passed_by_large_ones_that_come_later() {
+        let budget = Budget::new(1 << 20, 1);
+        let first = budget.reserve(A, 500 << 10, keep_everything).await.unwrap();
+        let mut second = Box::pin(budget.reserve(A, 800 << 10, keep_everything));
+        let mut third = Box::pin(budget.reserve(A, 100 << 10, keep_everything));
+        assert!(
+            futures_util::poll!(&mut second).is_pending() && futures_util::poll!(&mut third).is_pending()
+        );
+        drop(second);
+        assert!(third.await.is_ok());
+        drop(first);
+    }
+
+    #[tokio::test]
+    async fn no_owner_holds_more_than_half_and_the_poorer_comes_first() {
+        let budget = Budget::new(1 << 20, 2);
+        assert_eq!(
+            budget.reserve(A, 600 << 10, keep_everything).await.err(),
+            Some(BeyondBudget { limit: 512 << 10 })
+        );
+        let of_a = budget.reserve(A, 400 << 10, keep_everything).await.unwrap();
+        let mut more_of_a = Box::pin(budget.reserve(A, 200 << 10, keep_everything));
+        assert!(futures_util::poll!(&mut more_of_a).is_pending());
+        // It may not, so that it holds up nobody else.
+        let of_b = budget.reserve(B, 400 << 10, keep_everything).await.unwrap();
+        assert!(budget.try_reserve(A, 200 << 10).is_none());
+        drop(of_a);
+        assert!(more_of_a.await.is_ok());
+        drop(of_b);
+    }
+
+    #[tokio::test]
+    async fn room_is_made_before_anybody_waits() {
+        let budget = Budget::new(1 << 20, 1);
+        let cached = Mutex::new(vec![budget.try_reserve(A, 400 << 10), budget.try_reserve(A, 400 << 10)]);
+        let make_room = |shortage: Shortage| {
+            assert_eq!((shortage.of_owner, shortage.of_all > 0), (0, true));
+            cached.lock().unwrap().pop();
+        };
+        let found = budget.reserve(A, 500 << 10, make_room).await.unwrap();
+        assert_eq!((found.n_bytes(), cached.lock().unwrap().len()), (500 << 10, 1));
+    }
+
+    #[test]
+    fn parts_of_a_reservation_are_given_back_one_by_one() {
+        let budget = Budget::new(1 << 20, 1);
+        let mut whole = budget.try_reserve(A, 1000).unwrap();
+        let part = whole.split(300);
+        assert_eq!((whole.n_bytes(), part.n_bytes(), budget.n_held()), (700, 300, 1000));
+        drop(part);
+        whole.shrink_to(100);
+        assert_eq!(budget.n_held(), 100);
+        assert!(whole.try_grow(50) && !whole.try_grow(2 << 20));
+        drop(whole);
+        assert_eq!(budget.n_held(), 0);
+    }
+}

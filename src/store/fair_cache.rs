@@ -1,0 +1,256 @@
+//! Values of many owners within one number of bytes, least recently used out first, whoever has most.
+//!
+//! An owner who holds no more than an equal share of the bytes loses nothing to the others: what is evicted is that of the
+//! owner who holds most, and somebody holds more than an equal share when all together hold too much. What nobody else
+//! needs, one owner may have.
+//!
+//! Not a concurrent map: the lock is held for a look-up in a table, and never while a value is made or dropped.
+
+use std::collections::HashMap;
+use std::hash::Hash;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use lru::LruCache;
+
+use super::Owner;
+
+/// Bytes that an entry takes beside key and value: two links, their node and a slot of the table at its usual filling.
+/// As measured by tests/footprint.rs.
+const ENTRY_BYTES: usize = 64;
+
+/// A bounded cache; values are handles that are cheap to clone.
+pub(super) struct FairCache<K, V> {
+    max_bytes: usize,
+    entries: Mutex<Entries<K, V>>,
+}
+
+struct Entries<K, V> {
+    of: HashMap<Owner, OfOwner<K, V>>,
+    n_bytes: usize,
+}
+
+struct OfOwner<K, V> {
+    by_use: LruCache<K, Entry<V>>,
+    n_bytes: usize,
+}
+
+struct Entry<V> {
+    value: V,
+    n_bytes: usize,
+}
+
+impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
+    /// An empty cache of at most so many bytes.
+    pub(super) fn new(max_bytes: usize) -> Self {
+        Self { max_bytes, entries: Mutex::new(Entries { of: HashMap::new(), n_bytes: 0 }) }
+    }
+
+    /// Finds a value, which is the most recently used one then.
+    pub(super) fn get(&self, owner: Owner, key: &K) -> Option<V> {
+        self.lock().of.get_mut(&owner)?.by_use.get(key).map(|entry| entry.value.clone())
+    }
+
+    /// Keeps a value of so many bytes in place of what the key had, and lets go of others that have no room beside it.
+    /// What is larger than the cache is not kept; says whether it was.
+    pub(super) fn insert(&self, owner: Owner, key: K, value: V, n_bytes: usize) -> bool {
+        let mut gone = Vec::new();
+        let mut entries = self.lock();
+        let is_kept = self.keep(&mut entries, owner, key, value, n_bytes, &mut gone);
+        drop(entries);
+        is_kept
+    }
+
+    /// Finds the value of a key, or keeps this one; says whether it is new. What is larger than the cache is new and not kept.
+    pub(super) fn get_or_insert(
+        &self,
+        owner: Owner,
+        key: K,
+        value: V,
+        n_bytes: impl FnOnce(&V) -> usize,
+    ) -> (V, bool) {
+        let n_bytes = n_bytes(&value);
+        let mut gone = Vec::new();
+        let mut entries = self.lock();
+        let found =
+            entries.of.get_mut(&owner).and_then(|of| of.by_use.get(&key)).map(|entry| entry.value.clone());
+        let is_new = found.is_none();
+        if is_new {
+            self.keep(&mut entries, owner, key, value.clone(), n_bytes, &mut gone);
+        }
+        drop(entries);
+        (found.unwrap_or(value), is_new)
+    }
+
+    /// Weighs a value again that has grown; one that is gone stays away.
+    pub(super) fn reweigh(&self, owner: Owner, key: K, n_bytes: usize) {
+        let value =
+            self.lock().of.get(&owner).and_then(|of| of.by_use.peek(&key)).map(|entry| entry.value.clone());
+        if let Some(value) = value {
+            self.insert(owner, key, value, n_bytes);
+        }
+    }
+
+    /// Lets go of the least recently used value for which `may_go` holds: of one owner, or of whoever has most.
+    pub(super) fn evict(&self, owner: Option<Owner>, may_go: impl Fn(&V) -> bool) -> Option<V> {
+        self.lock().evict(owner, may_go).map(|entry| entry.value)
+    }
+
+    /// Forgets a value; says whether it was there.
+    pub(super) fn remove(&self, owner: Owner, key: &K) -> bool {
+        let gone = self.lock().remove(owner, key);
+        gone.is_some()
+    }
+
+    /// Forgets all values of an owner whose key is meant.
+    pub(super) fn remove_if(&self, owner: Owner, is_meant: impl Fn(&K) -> bool)
+    where
+        K: Clone,
+    {
+        let mut entries = self.lock();
+        let of_owner = entries.of.get(&owner);
+        let meant: Vec<K> = of_owner
+            .into_iter()
+            .flat_map(|of| of.by_use.iter())
+            .map(|(key, _)| key)
+            .filter(|key| is_meant(key))
+            .cloned()
+            .collect();
+        let gone: Vec<_> = meant.iter().filter_map(|key| entries.remove(owner, key)).collect();
+        drop(entries);
+        drop(gone);
+    }
+
+    /// All values of an owner, in no order.
+    pub(super) fn values(&self, owner: Owner) -> Vec<V> {
+        let entries = self.lock();
+        let of_owner = entries.of.get(&owner);
+        of_owner.into_iter().flat_map(|of| of.by_use.iter()).map(|(_, entry)| entry.value.clone()).collect()
+    }
+
+    /// Bytes of all values that are kept.
+    pub(super) fn n_bytes(&self) -> usize {
+        self.lock().n_bytes
+    }
+
+    /// What is let go is handed out, to be dropped when the lock is free.
+    fn keep(
+        &self,
+        entries: &mut Entries<K, V>,
+        owner: Owner,
+        key: K,
+        value: V,
+        n_bytes: usize,
+        gone: &mut Vec<Entry<V>>,
+    ) -> bool {
+        let n_bytes = n_bytes + ENTRY_BYTES + size_of::<K>();
+        if n_bytes > self.max_bytes {
+            return false;
+        }
+        gone.extend(entries.remove(owner, &key));
+        entries.add(owner, key, Entry { value, n_bytes });
+        while entries.n_bytes > self.max_bytes
+            && let Some(evicted) = entries.evict(None, |_| true)
+        {
+            gone.push(evicted);
+        }
+        true
+    }
+
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "a table, for a look-up: values are made and dropped outside"
+    )]
+    fn lock(&self) -> MutexGuard<'_, Entries<K, V>> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<K: Hash + Eq, V> Entries<K, V> {
+    fn add(&mut self, owner: Owner, key: K, entry: Entry<V>) {
+        let of =
+            self.of.entry(owner).or_insert_with(|| OfOwner { by_use: LruCache::unbounded(), n_bytes: 0 });
+        self.n_bytes += entry.n_bytes;
+        of.n_bytes += entry.n_bytes;
+        of.by_use.put(key, entry);
+    }
+
+    fn remove(&mut self, owner: Owner, key: &K) -> Option<Entry<V>> {
+        let entry = self.of.get_mut(&owner)?.by_use.pop(key)?;
+        self.account_for(owner, entry)
+    }
+
+    fn evict(&mut self, owner: Option<Owner>, may_go: impl Fn(&V) -> bool) -> Option<Entry<V>> {
+        let richest = || self.of.iter().max_by_key(|(_, of)| of.n_bytes).map(|(owner, _)| *owner);
+        let owner = owner.or_else(richest)?;
+        let of = self.of.get_mut(&owner)?;
+        for _ in 0..of.by_use.len() {
+            let (key, entry) = of.by_use.pop_lru()?;
+            if may_go(&entry.value) {
+                return self.account_for(owner, entry);
+            }
+            // It is in use, and by that the most recently used one.
+            of.by_use.put(key, entry);
+        }
+        None
+    }
+
+    fn account_for(&mut self, owner: Owner, entry: Entry<V>) -> Option<Entry<V>> {
+        let of = self.of.get_mut(&owner)?;
+        of.n_bytes -= entry.n_bytes;
+        self.n_bytes -= entry.n_bytes;
+        if of.by_use.is_empty() {
+            self.of.remove(&owner);
+        }
+        Some(entry)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Owner = Owner(0);
+    const B: Owner = Owner(1);
+
+    /// Bytes of an entry beside its value.
+    const OWN: usize = ENTRY_BYTES + size_of::<u32>();
+
+    fn keys(cache: &FairCache<u32, u32>, owner: Owner) -> Vec<u32> {
+        let mut values = cache.values(owner);
+        values.sort_unstable();
+        values
+    }
+
+    #[test]
+    fn the_least_recently_used_makes_room() {
+        let cache = FairCache::new(3 * (100 + OWN));
+        (0..3).for_each(|k| assert!(cache.insert(A, k, k, 100)));
+        assert_eq!(cache.get(A, &0), Some(0));
+        assert!(cache.insert(A, 3, 3, 100));
+        assert_eq!((keys(&cache, A), cache.n_bytes()), (vec![0, 2, 3], 3 * (100 + OWN)));
+        assert!(!cache.insert(A, 4, 4, 1000));
+        cache.reweigh(A, 0, 150);
+        assert_eq!(keys(&cache, A), [0, 3]);
+        assert!(cache.remove(A, &0) && !cache.remove(A, &0));
+        cache.remove_if(A, |&key| key == 3);
+        assert_eq!(cache.n_bytes(), 0);
+    }
+
+    #[test]
+    fn an_owner_within_an_equal_share_loses_nothing_to_another() {
+        let cache = FairCache::new(10 * (100 + OWN));
+        (0..5).for_each(|k| assert!(cache.insert(B, k, k, 100)));
+        (0..100).for_each(|k| assert!(cache.insert(A, k, k, 100)));
+        assert_eq!((keys(&cache, A), keys(&cache, B)), ((95..100).collect(), (0..5).collect()));
+    }
+
+    #[test]
+    fn what_is_in_use_is_spared() {
+        let cache = FairCache::new(1 << 20);
+        (0..4).for_each(|k| assert!(cache.insert(A, k, k, 100)));
+        assert_eq!(cache.evict(None, |&value| value >= 2), Some(2));
+        assert_eq!(cache.evict(Some(A), |&value| value >= 4), None);
+        assert_eq!(cache.evict(Some(B), |_| true), None);
+        assert_eq!(keys(&cache, A), [0, 1, 3]);
+    }
+}

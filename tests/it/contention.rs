@@ -1,0 +1,79 @@
+//! Equal requests at the same moment: what many want is made once, and nobody waits for ever.
+
+use std::time::Duration;
+
+use futures_util::future::join_all;
+use serde_json::{Value, json};
+
+use crate::routes::ROUTES;
+use crate::support::Server;
+
+/// Requests at once.
+const N_CLIENTS: usize = 8;
+
+/// Clouds that no request has named before, one after the other, on every route.
+const N_ROUNDS: usize = 200;
+
+/// Points of a cloud: enough for the sums over them to be split between threads.
+const N_POINTS: usize = 100;
+
+/// All the requests of one route, some of whose rounds take milliseconds: that long on any machine only if they hang.
+const PATIENCE: Duration = Duration::from_secs(240);
+
+/// A sphere that differs from round to round.
+fn cloud(route: usize, round: usize) -> Value {
+    let mut points = crate::support::fibonacci_sphere(N_POINTS);
+    points[0][0] += 1e-6 * (1 + round + N_ROUNDS * route) as f64;
+    json!(points)
+}
+
+/// Eight requests at once of each round, without parameters, so that the service looks at the cloud to choose them. They
+/// arrive while the first of them is being planned, which takes several jobs of the pool.
+async fn rounds(n_threads: usize) {
+    let server = Server::with_flags(&["--threads", &n_threads.to_string()]).await;
+    for (index, route) in ROUTES.iter().enumerate() {
+        let all = async {
+            for round in 0..N_ROUNDS {
+                let mut body = json!({"cloud": {"points": cloud(index, round)}});
+                if route.has_values {
+                    body["values"] = json!(vec![1.0; N_POINTS]);
+                }
+                let answers = join_all((0..N_CLIENTS).map(|_| server.post(route.path, &body))).await;
+                let first = &answers[0];
+                assert_eq!(first.status, 200, "{}: {}", route.path, first.text);
+                for answer in &answers {
+                    assert_eq!(answer.text, first.text, "{} in round {round}", route.path);
+                }
+            }
+        };
+        let outcome = tokio::time::timeout(PATIENCE, all).await;
+        assert!(outcome.is_ok(), "{} hangs on {n_threads} threads", route.path);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn equal_requests_at_once_are_answered_on_two_threads() {
+    rounds(2).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn equal_requests_at_once_are_answered_on_sixteen_threads() {
+    rounds(16).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_new_cloud_registered_by_many_at_once_is_described_to_all() {
+    let server = Server::with_flags(&["--threads", "16"]).await;
+    for round in 0..N_ROUNDS {
+        let body = json!({"points": cloud(ROUTES.len(), round)});
+        let registering = join_all((0..N_CLIENTS).map(|_| server.post("/v1/clouds", &body)));
+        let answers = tokio::time::timeout(PATIENCE, registering).await.expect("hangs");
+        let n_created = answers.iter().filter(|answer| answer.status == 201).count();
+        assert_eq!(n_created, 1, "round {round}");
+        assert!(
+            answers
+                .iter()
+                .all(|answer| answer.text == answers[0].text && answer.json()["spacing"].is_object())
+        );
+    }
+}

@@ -1,0 +1,113 @@
+//! More than the server can do at once: what is small is not held up by what is large, nor one key by another.
+
+use std::time::Instant;
+
+use futures_util::future::join_all;
+use serde_json::{Value, json};
+
+use crate::limits::slow_request;
+use crate::routes::{lattice, route_of};
+use crate::support::{Answer, Server, fibonacci_sphere};
+
+/// A request whose cloud no other has, of n points.
+fn request_of(n: usize, k: usize) -> Value {
+    let mut points = fibonacci_sphere(n);
+    points[0][0] += 1e-6 * (k + 1) as f64;
+    json!({"cloud": {"points": points}, "kernel": {"family": "matern", "length_scale": 0.5}, "alpha": 1e-6})
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn small_requests_are_answered_while_large_ones_compute_and_wait_for_memory() {
+    // Of the budget some 300 MB are for work: one factorization of 5,000 points takes 200 MB while it is made.
+    let server = Server::with_flags(&["--threads", "2", "--memory-bytes", "536870912"]).await;
+    let large: Vec<_> = (0..3)
+        .map(|k| {
+            let request = server.client.post(server.url("/v1/normals")).json(&request_of(5000, k));
+            tokio::spawn(request.send())
+        })
+        .collect();
+    // The first of them is under way once its cloud is there, the others wait behind it.
+    while server.get("/v1/clouds").await.expect_ok()["clouds"].as_array().unwrap().len() < 3 {}
+    for k in 0..20 {
+        server.post("/v1/normals", &request_of(100, k)).await.expect_ok();
+    }
+    let n_waiting = large.iter().filter(|large| !large.is_finished()).count();
+    assert!(n_waiting >= 2, "only {n_waiting} of 3 were still waiting");
+    for answer in join_all(large).await {
+        assert_eq!(answer.unwrap().unwrap().status(), 200);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn looking_at_a_cloud_ends_with_its_deadline_and_lists_look_at_none() {
+    let server = Server::with_flags(&["--threads", "2", "--deadline-seconds", "1"]).await;
+    // In so many dimensions every point is compared with most others.
+    let body = json!({"points": lattice(20_000, 16)});
+    server.post("/v1/clouds", &body).await.expect_problem(504, "deadline-exceeded");
+    let list = server.get("/v1/clouds").await.expect_ok();
+    let cloud = &list["clouds"][0];
+    assert_eq!((&cloud["n_points"], &cloud["n_duplicates"]), (&json!(20_000), &json!(0)));
+    assert!(cloud.get("spacing").is_none() && cloud["bounding_box"]["min"].is_array());
+    // The threads are free again: this one is small, and would otherwise be late as well.
+    let small = server.post("/v1/clouds", &json!({"points": lattice(50, 16)})).await;
+    assert!(small.json()["spacing"]["median"].as_f64().unwrap() > 0.0);
+    let list = server.get("/v1/clouds").await.expect_ok();
+    assert!(list["clouds"][1]["spacing"].is_object());
+}
+
+async fn post_as(server: &Server, key: &str, path: &str, body: &Value) -> Answer {
+    server.send(server.client.post(server.url(path)).bearer_auth(key).json(body)).await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_key_leaves_places_turns_and_memory_to_another() {
+    let flags = ["--threads", "1", "--max-queue", "5", "--api-keys", "greedy,modest"];
+    let server = Server::with_flags(&flags).await;
+    let slow: Vec<_> = (0..3)
+        .map(|k| {
+            let mut body = slow_request();
+            body["cloud"]["points"][0][0] = json!(0.01 * f64::from(k));
+            let request = server.client.post(server.url("/v1/curvatures")).bearer_auth("greedy");
+            tokio::spawn(request.json(&body).send())
+        })
+        .collect();
+    let small = route_of("/v1/normals").request();
+    while post_as(&server, "greedy", "/v1/normals", &small).await.status != 503 {}
+    let refused = post_as(&server, "greedy", "/v1/normals", &small).await;
+    refused.expect_problem(503, "overloaded");
+    for k in 0..5 {
+        post_as(&server, "modest", "/v1/normals", &request_of(60, k)).await.expect_ok();
+    }
+    // Nor does it wait for all that the other has begun: theirs is the next turn.
+    post_as(&server, "modest", "/v1/normals", &request_of(2500, 0)).await.expect_ok();
+    assert!(slow.iter().any(|slow| !slow.is_finished()), "the slow ones were over too soon");
+    slow.iter().for_each(tokio::task::JoinHandle::abort);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn retry_after_is_when_there_is_a_place() {
+    let server = Server::with_flags(&["--threads", "1", "--max-queue", "0"]).await;
+    // The first one says how fast this machine is.
+    server.post("/v1/normals", &request_of(2500, 100)).await.expect_ok();
+    let mut ratios = Vec::new();
+    for k in 0..3 {
+        let slow = server.client.post(server.url("/v1/normals")).json(&request_of(5000, k));
+        let slow = tokio::spawn(slow.send());
+        let refused = loop {
+            let answer = server.post("/v1/normals", &request_of(30, k)).await;
+            // A moment later it has begun, and with it the prediction.
+            if answer.status == 503 && answer.header("retry-after") != "1" || slow.is_finished() {
+                break answer;
+            }
+        };
+        let refused_at = Instant::now();
+        assert_eq!(slow.await.unwrap().unwrap().status(), 200);
+        if let Ok(seconds) = refused.header("retry-after").parse::<f64>() {
+            ratios.push(seconds / refused_at.elapsed().as_secs_f64());
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios.get(ratios.len() / 2).copied();
+    // Where it takes no more than a second, there is nothing to say but 1.
+    assert!(median.is_none_or(|median| (0.5..=2.0).contains(&median)), "{ratios:?}");
+}

@@ -1,0 +1,313 @@
+#!/usr/bin/env python3
+"""Loads a server for some minutes as many careless clients would, and says whether it held.
+
+    tests/soak.py GRAMIAN [--minutes 10] [--report FILE]
+
+Clients post new clouds to every route, eight at a time the same one, list clouds, read slowly or not at all, send bodies
+that never end, leave midway, and ask for more than there is memory. Meanwhile a probe sends small requests, whose clouds
+are new or known. At the end:
+
+- every request that was read to its end was answered within its deadline and two seconds;
+- there was no status of 500 and above but refusals, 503, and deadlines, 504;
+- the resident memory never exceeded the budget by more than a tenth, and was flat within 5 % over the second half;
+- small requests took at most ten times as long, at the 99th percentile, as on the idle server.
+
+Needs nothing but the standard library. What was measured goes to standard output, as a table, and to the report, as JSON.
+"""
+
+import argparse
+import contextlib
+import http.client
+import json
+import math
+import os
+import random
+import socket
+import statistics
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from with_server import server  # noqa: E402
+
+BUDGET = 1 << 30
+DEADLINE = 20.0
+# Beyond the deadline, and beside the network: what the issue of an answer may take.
+GRACE = 2.0
+FLAGS = [
+    *("--threads", "2", "--memory-bytes", str(BUDGET), "--cache-bytes", str(192 << 20)),
+    *("--cloud-bytes", str(16 << 20), "--deadline-seconds", str(DEADLINE), "--body-seconds", "3"),
+    *("--max-queue", "32"),
+]
+GEOMETRY = ["/v1/normals", "/v1/curvatures", "/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"]
+VALUES = ["/v1/interpolation", "/v1/posterior", "/v1/surface-gradient", "/v1/laplace-beltrami"]
+N_PROBES_IDLE = 300
+
+
+class Soak:
+    """A run: what was asked, what came back, and how much memory the server had."""
+
+    def __init__(self, address, pid, minutes):
+        self.host, port = address.removeprefix("http://").rsplit(":", 1)
+        self.port, self.pid = int(port), pid
+        self.until = time.monotonic() + 60 * minutes
+        self.minutes = minutes
+        self.lock = threading.Lock()
+        self.statuses = Counter()
+        self.slowest = 0.0
+        self.failures = []
+        self.resident = []
+        self.serial = 0
+
+    def goes_on(self):
+        return time.monotonic() < self.until
+
+    def connection(self):
+        return http.client.HTTPConnection(self.host, self.port, timeout=DEADLINE + 30)
+
+    def number(self):
+        with self.lock:
+            self.serial += 1
+            return self.serial
+
+    def note(self, path, status, seconds):
+        with self.lock:
+            self.statuses[status] += 1
+            self.slowest = max(self.slowest, seconds)
+            if seconds > DEADLINE + GRACE:
+                self.failures.append(f"{path} took {seconds:.1f} s")
+            if status >= 500 and status not in (503, 504):
+                self.failures.append(f"{path} answered {status}")
+
+    def call(self, method, path, body=None, connection=None):
+        """One request, read to its end; its status and the seconds that it took."""
+        own = connection is None
+        connection = connection or self.connection()
+        began = time.monotonic()
+        try:
+            headers = {"Content-Type": "application/json"} if body else {}
+            connection.request(method, path, body, headers)
+            response = connection.getresponse()
+            response.read()
+        except (OSError, http.client.HTTPException) as error:
+            connection.close()
+            with self.lock:
+                self.failures.append(f"{path}: {type(error).__name__}: {error}")
+            return 0, time.monotonic() - began
+        seconds = time.monotonic() - began
+        self.note(path, response.status, seconds)
+        if own:
+            connection.close()
+        return response.status, seconds
+
+
+def cloud(n, k, dimension=3):
+    """A sphere that no other request has, or points in a cube of more dimensions."""
+    if dimension != 3:
+        source = random.Random(k)
+        return [[source.random() for _ in range(dimension)] for _ in range(n)]
+    golden = math.pi * (1 + math.sqrt(5))
+    points = []
+    for i in range(n):
+        z = 1 - (2 * i + 1) / n
+        r = math.sqrt(1 - z * z)
+        points.append([r * math.cos(golden * i), r * math.sin(golden * i), z])
+    points[0][0] += 1e-7 * k
+    return points
+
+
+def request_of(source, soak, n):
+    """A path and its body: any route, with parameters or without."""
+    path = source.choice(GEOMETRY + VALUES)
+    request = {"cloud": {"points": cloud(n, soak.number())}}
+    if path in VALUES:
+        request["values"] = [math.sin(i) for i in range(n)]
+    if source.random() < 0.5:
+        request |= {"kernel": {"family": "matern", "length_scale": 0.4}, "alpha": 1e-6}
+    if "matrix" in path:
+        request["queries"] = request["cloud"]["points"][:50]
+    return path, json.dumps(request)
+
+
+def post_new_clouds(soak, source):
+    connection = soak.connection()
+    while soak.goes_on():
+        path, body = request_of(source, soak, source.choice([30, 100, 300, 800, 2000]))
+        if soak.call("POST", path, body, connection)[0] == 503:
+            time.sleep(0.2)
+
+
+def post_large(soak, source):
+    while soak.goes_on():
+        _, body = request_of(source, soak, source.choice([3500, 5000, 7000]))
+        request = json.loads(body)
+        request.pop("values", None)
+        request["queries"] = request["cloud"]["points"][:100]
+        soak.call("POST", "/v1/normals", json.dumps(request))
+        # Many dimensions make the search for neighbours slow, and these points are no surface.
+        soak.call("POST", "/v1/clouds", json.dumps({"points": cloud(3000, soak.number(), 12)}))
+
+
+def post_equal(soak, source):
+    while soak.goes_on():
+        path, body = request_of(source, soak, source.choice([200, 1000]))
+        threads = [threading.Thread(target=soak.call, args=("POST", path, body)) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        time.sleep(0.5)
+
+
+def list_clouds(soak, source):
+    while soak.goes_on():
+        soak.call("GET", "/v1/clouds?limit=1000")
+        soak.call("GET", "/health/ready")
+        time.sleep(source.uniform(0.05, 0.3))
+
+
+def send(soak, path, body, length=None):
+    """A request over a socket of its own, of which `length` was announced."""
+    stream = socket.create_connection((soak.host, soak.port), timeout=DEADLINE + 30)
+    head = f"POST {path} HTTP/1.1\r\nHost: soak\r\nContent-Type: application/json\r\n"
+    stream.sendall(f"{head}Content-Length: {length or len(body)}\r\n\r\n{body}".encode())
+    return stream
+
+
+def read_slowly(soak, source):
+    """Asks for a matrix of some 20 MB and reads a little of it, or nothing, for up to half a minute."""
+    while soak.goes_on():
+        with contextlib.suppress(OSError):
+            n = 900
+            body = json.dumps({"cloud": {"points": cloud(n, soak.number())}, "kernel": {"family": "gauss"}, "alpha": 1e-3})
+            with send(soak, "/v1/laplace-beltrami/matrix", body) as stream:
+                rest = time.monotonic() + source.uniform(1, 30)
+                while time.monotonic() < min(rest, soak.until):
+                    if source.random() < 0.5 and not stream.recv(4096):
+                        break
+                    time.sleep(0.2)
+
+
+def send_slowly(soak, source):
+    """Begins bodies that never end."""
+    while soak.goes_on():
+        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+            streams = [
+                stack.enter_context(send(soak, "/v1/normals", " " * source.randint(0, 4 << 20), 8 << 20)) for _ in range(6)
+            ]
+            time.sleep(source.uniform(0.5, 6))
+            del streams
+
+
+def leave(soak, source):
+    """Asks and leaves before the answer comes."""
+    while soak.goes_on():
+        with contextlib.suppress(OSError):
+            path, body = request_of(source, soak, source.choice([100, 1500, 3000]))
+            with send(soak, path, body):
+                time.sleep(source.uniform(0, 0.5))
+
+
+def probe(soak, source, until=None, count=None):
+    """Small requests, one after the other: cold clouds and a known one in turn. Their seconds."""
+    connection, seconds = soak.connection(), {"cold": [], "warm": []}
+    known = json.dumps({"cloud": {"points": cloud(100, 0)}})
+    while (count is None or len(seconds["warm"]) < count) and (until is None or time.monotonic() < until):
+        body = json.dumps({"cloud": {"points": cloud(100, soak.number())}})
+        for kind, body in (("cold", body), ("warm", known)):
+            status, taken = soak.call("POST", "/v1/normals", body, connection)
+            if status == 200:
+                seconds[kind].append(taken)
+            else:
+                time.sleep(0.1)
+        time.sleep(0.02)
+    return seconds
+
+
+def watch(soak):
+    """Notes the resident memory of the server twice a second."""
+    began = time.monotonic()
+    while soak.goes_on():
+        status = Path(f"/proc/{soak.pid}/status").read_text()
+        kib = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS:"))
+        soak.resident.append((time.monotonic() - began, kib << 10))
+        time.sleep(0.5)
+
+
+def percentile(values, share):
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else math.inf
+
+
+def run(soak):
+    idle = probe(soak, random.Random(0), count=N_PROBES_IDLE)
+    soak.until = time.monotonic() + 60 * soak.minutes
+    roles = [post_new_clouds] * 8 + [post_large] * 2 + [post_equal, list_clouds, list_clouds]
+    roles += [read_slowly] * 8 + [send_slowly] * 2 + [leave] * 3
+    threads = [threading.Thread(target=role, args=(soak, random.Random(k))) for k, role in enumerate(roles)]
+    threads.append(threading.Thread(target=watch, args=(soak,)))
+    for thread in threads:
+        thread.start()
+    loaded = probe(soak, random.Random(99), until=soak.until)
+    for thread in threads:
+        thread.join()
+    return idle, loaded
+
+
+def judge(soak, idle, loaded):
+    """The figures, and what of them does not hold."""
+    half = soak.resident[len(soak.resident) // 2 :]
+    third, last = half[: len(half) // 2], half[len(half) // 2 :]
+    mean = [statistics.fmean(n_bytes for _, n_bytes in part) for part in (third, last)]
+    peak = max(n_bytes for _, n_bytes in soak.resident)
+    figures = {
+        "minutes": soak.minutes,
+        "requests read to their end": sum(soak.statuses.values()),
+        "by status": dict(sorted(soak.statuses.items())),
+        "slowest, seconds": round(soak.slowest, 2),
+        "deadline, seconds": DEADLINE,
+        "budget, MiB": BUDGET >> 20,
+        "peak resident, MiB": peak >> 20,
+        "resident in the third quarter, MiB": int(mean[0]) >> 20,
+        "resident in the last quarter, MiB": int(mean[1]) >> 20,
+    }
+    failures = list(soak.failures)
+    for kind in ("cold", "warm"):
+        of_idle, of_loaded = percentile(idle[kind], 0.99), percentile(loaded[kind], 0.99)
+        figures[f"small, {kind}: p99 idle, ms"] = round(1e3 * of_idle, 1)
+        figures[f"small, {kind}: p99 under load, ms"] = round(1e3 * of_loaded, 1)
+        figures[f"small, {kind}: ratio of medians"] = round(
+            percentile(loaded[kind], 0.5) / percentile(idle[kind], 0.5), 1
+        )
+    if peak > 1.1 * BUDGET:
+        failures.append(f"the resident memory reached {peak / BUDGET:.2f} of the budget")
+    if abs(mean[1] / mean[0] - 1) > 0.05:
+        failures.append(f"the resident memory went from {mean[0]:.3g} to {mean[1]:.3g} bytes")
+    return figures, failures
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("binary")
+    arguments.add_argument("--minutes", type=float, default=10)
+    arguments.add_argument("--report", type=Path)
+    arguments = arguments.parse_args()
+    with server(arguments.binary, FLAGS) as (base, pid):
+        soak = Soak(base, pid, arguments.minutes)
+        idle, loaded = run(soak)
+        figures, failures = judge(soak, idle, loaded)
+        os.kill(pid, 0)
+    for name, figure in figures.items():
+        print(f"{name}: {figure}")
+    if arguments.report:
+        arguments.report.write_text(json.dumps(figures | {"failures": failures}, indent=2) + "\n")
+    for failure in failures[:20]:
+        print(f"failed: {failure}", file=sys.stderr)
+    sys.exit(bool(failures))
+
+
+if __name__ == "__main__":
+    main()
