@@ -51,16 +51,16 @@ def recorded(request: httpx.Request) -> httpx.Response:
     raise Sent(request)
 
 
-def client() -> Any:  # noqa: ANN401 (what these tests give is not what the types say)
+def client() -> Any:
     return gramian.Client("http://service", format="json", transport=httpx.MockTransport(recorded))
 
 
-def cloud() -> Any:  # noqa: ANN401
+def cloud() -> Any:
     """A cloud of eight points in the plane, of a service that raises what it is sent."""
     return gramian.Cloud(client()._connection, models.Cloud.from_dict(DESCRIPTION))
 
 
-def sent(method: str, **arguments: object) -> Any:  # noqa: ANN401
+def sent(method: str, **arguments: object) -> Any:
     """The body that a call of a method sends, beside the cloud."""
     with pytest.raises(Sent) as caught:
         getattr(cloud(), method)(**{**METHODS[method], **arguments})
@@ -68,7 +68,7 @@ def sent(method: str, **arguments: object) -> Any:  # noqa: ANN401
     return caught.value.body
 
 
-def posted(points: object, normals: object = None) -> Any:  # noqa: ANN401
+def posted(points: object, normals: object = None) -> Any:
     """The body that registering points sends."""
     with pytest.raises(Sent) as caught:
         client().cloud(points, normals)

@@ -31,7 +31,7 @@ LATER_MEMBERS = "additional_properties"
 NAMES = {model.__name__: model for model in MODELS} | {"Unset": Unset, "File": File}
 
 
-def parts(hint: Any) -> Iterator[Any]:  # noqa: ANN401 (hints have no common type)
+def parts(hint: Any) -> Iterator[Any]:
     """The type and all types in it."""
     yield hint
     for part in get_args(hint):
