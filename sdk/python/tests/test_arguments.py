@@ -244,6 +244,7 @@ BAD_ROWS: dict[str, tuple[Any, type[Exception], str]] = {
     "dates": (np.zeros((8, 2), dtype="M8[s]"), TypeError, r"{} has dates"),
     "fields": (np.zeros(8, dtype="f8,f8"), TypeError, r"{} has no plain numbers .*structured_to_unstructured"),
     "objects": (CIRCLE.astype(object), TypeError, r"{0} is an array of Python objects; np.asarray\({0}, dtype=float\)"),
+    "decimals": ([[Decimal(1), Decimal(2)]] * 8, TypeError, r"{0} is an array of Python objects; np.asarray\({0}, "),
     "nothing": (with_entry(None, object), TypeError, r"{}\[5, 1\] is None \(NoneType\), and only numbers can be sent"),
     "an object": (with_entry("a", object), TypeError, r"{}\[5, 1\] is 'a' \(str\)"),
     "big": (with_entry(2**53 + 1, "i8"), ValueError, r"{}\[5, 1\] is 9007199254740993, which float64 does not have"),
@@ -318,7 +319,7 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
         ((8, 1), r"must have the shape \[n\] = \[8\], not \[8, 1\]; np.ravel\(.*\) is flat$"),
         ((1, 8), r"must have the shape \[n\] = \[8\], not \[1, 8\]; np.ravel\(.*\) is flat$"),
         ((8, 2), r"must have the shape \[n\] = \[8\], not \[8, 2\]$"),
-        ((), r"must have the shape \[n\] = \[8\], not \[\]$"),
+        ((), r"must have the shape \[n\] = \[8\], not \[\]: one number for each point of the cloud"),
         ((0,), r"must have the shape \[n\] = \[8\], not \[0\]: it is empty$"),
     ],
 )
@@ -342,6 +343,12 @@ def test_queries_have_the_dimension_of_the_cloud(method: str) -> None:
         ValueError, match=r"not \[2\]: rows are points; np.reshape\(queries, \(1, -1\)\) is one of 2 coord"
     ):
         sent(method, queries=[1, 0])
+
+
+@every_method
+def test_one_noise_for_all_points_is_alpha(method: str) -> None:
+    with pytest.raises(ValueError, match=r"one number for each point of the cloud; one for all of them is alpha$"):
+        sent(method, noise_variances=0.1)
 
 
 def test_a_cloud_on_a_line_says_how_to_write_its_queries() -> None:
@@ -501,7 +508,7 @@ def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected:
         (
             {"family": "gauss", "lenght_scale": 2},
             TypeError,
-            r"kernel has no 'lenght_scale'; did you mean 'length_scale'\?$",
+            r"kernel has no 'lenght_scale', but 'family', 'length_scale', .*; did you mean 'length_scale'\?$",
         ),
         (
             object(),
@@ -561,7 +568,9 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
     assert sent(method, geometry=Geometry(cloud=other.id, noise_variances=[1]))["geometry"]["noise_variances"] == [1]
     with pytest.raises(TypeError, match=r"^geometry.cloud is to be a Cloud, as .* returns, not of the type ndarray$"):
         sent(method, geometry={"cloud": CIRCLE})
-    with pytest.raises(TypeError, match=r"^geometry has no 'kernal'; did you mean 'kernel'\?$"):
+    with pytest.raises(ValueError, match=r"^geometry.cloud is 'gauss', and ids of clouds are 64 hexadecimal digits$"):
+        sent(method, geometry="gauss")
+    with pytest.raises(TypeError, match=r"^geometry has no 'kernal', but 'kernel', .*; did you mean 'kernel'\?$"):
         sent(method, geometry={"kernal": "gauss"})
     with pytest.raises(TypeError, match=r"^Geometry\(\) has no parameter 'kernal'; did you mean 'kernel'\?$"):
         Geometry(kernal="gauss")  # type: ignore[call-arg]
@@ -603,6 +612,14 @@ def test_a_misspelt_keyword_names_the_nearest(method: str, misspelt: str, meant:
         sent(method, **{misspelt: 1})
     with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'xyz'$"):
         sent(method, xyz=1)
+
+
+@every_method
+def test_a_parameter_of_the_kernel_is_said_to_be_one(method: str) -> None:
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'length_scale'; it is one of a Kernel$"):
+        sent(method, kernel="gauss", length_scale=2)
+    with pytest.raises(TypeError, match=r"^kernel has no 'gauss', but 'family', 'length_scale', "):
+        sent(method, kernel={"gauss": 2})
 
 
 def test_so_it_does_for_the_client() -> None:

@@ -311,6 +311,15 @@ def test_numbers_of_numpy_configure_a_client() -> None:
         next(client.clouds(page_size=1.5))  # type: ignore[arg-type]
 
 
+def test_times_may_be_infinite() -> None:
+    with gramian.Client(timeout=float("inf"), max_wait=float("inf")) as client:
+        assert client.version().name == "gramian"
+    overloaded = http("503 Service Unavailable", b"", f"Retry-After: {'9' * 400}")
+    with server(overloaded) as (address, _), pytest.raises(gramian.Overloaded) as caught:
+        gramian.Client(address, max_wait=float("inf")).version()
+    assert caught.value.retry_after == float("inf")  # nobody can wait for that
+
+
 def test_a_key_is_shown_nowhere() -> None:
     client = gramian.Client(unused_address(), api_key="secret", retries=0)
     with pytest.raises(httpx.ConnectError) as caught:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 
 import httpx
 import numpy as np
@@ -18,6 +19,7 @@ import pytest
 
 import gramian
 from gramian import Cloud, Geometry, Kernel, KernelFamily
+from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
 from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
 from gramian.tensors import Array, Format
@@ -275,6 +277,24 @@ def test_arrays_of_any_layout_are_sent_right(client: gramian.Client, circle: Arr
         circle.astype(">f8"),
     ]
     assert {client.cloud(same).id for same in layouts} == {cloud.id}
+
+
+def test_what_is_accepted_is_so_for_type_checkers(client: gramian.Client, circle: Array) -> None:
+    cloud, other = client.cloud(circle), client.cloud(2 * circle)
+    answer = cloud.posterior(range(8), kernel="gauss", alpha=np.float32(0.5), include="variance")
+    said = answer.diagnostics
+    cloud.posterior([0.5] * 8, kernel=said.kernel, alpha=said.alpha, solver=said.solver, include=["variance"])
+    cloud.interpolate(np.arange(8), derivatives=np.int64(1), **answer.fit)
+    cloud.normals(kernel=client.kernels()[0], alpha=np.array(0.5), surface="auto")
+    cloud.curvatures(kernel={"family": "gauss", "length_scale": np.float32(2)}, alpha=Fraction(1, 2))
+    cloud.normals(kernel=models.Kernel(family=KernelFamily.GAUSS), noise_variances=np.full(8, 0.1, dtype=np.float32))
+    operator = cloud.laplace_beltrami_matrix(geometry={"kernel": Kernel("gauss"), "alpha": np.int64(1)})
+    cloud.laplace_beltrami_matrix(**operator.fit)
+    cloud.laplace_beltrami(range(8), geometry=other)
+    assert not isinstance(operator.diagnostics.geometry, gramian.Unset)
+    cloud.surface_gradient(range(8), geometry=operator.diagnostics.geometry)
+    fit: gramian.Fit = {"kernel": "matern", "alpha": 0}
+    cloud.surface_gradient_matrix(geometry=Geometry(kernel="gauss", alpha=said.alpha), **fit)
 
 
 def test_answers_and_problems_can_be_pickled_and_copied(client: gramian.Client, circle: Array) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set, Sized
+from decimal import Decimal
 from numbers import Real
 from typing import Any, TypeAlias
 
@@ -99,7 +100,7 @@ def _refuse_objects(name: str, value: object, array: AnyArray) -> None:
     if array.ndim == 0:
         raise TypeError(f"{name} is to be an array of numbers, not of the type {type(value).__name__}")
     for place, entry in np.ndenumerate(array):
-        if isinstance(entry, bool) or not isinstance(entry, Real):
+        if isinstance(entry, bool) or not isinstance(entry, Real | Decimal):
             raise TypeError(f"{name}{list(place)} is {entry!r} ({type(entry).__name__}), and only numbers can be sent")
     raise TypeError(f"{name} is an array of Python objects; np.asarray({name}, dtype=float) makes numbers of them")
 
@@ -134,8 +135,10 @@ def _advice(name: str, array: AnyArray, wanted: Sequence[int | None]) -> str:
     if array.size == 0:
         return ": it is empty"
     if len(wanted) == 1:
-        flat = array.ndim > 1 and max(array.shape) == array.size
-        return f"; np.ravel({name}) is flat" if flat else ": one number for each point of the cloud" * (array.ndim == 1)
+        if array.ndim < 2:
+            one_for_all = "; one for all of them is alpha" if array.ndim == 0 and "noise" in name else ""
+            return f": one number for each point of the cloud{one_for_all}"
+        return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
     rows = ROWS.get(name.rpartition(".")[2], "points")
     if array.ndim == 1:
         one = f"np.reshape({name}, (1, -1)) is one of {len(array)} coordinates"

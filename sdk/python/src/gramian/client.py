@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from types import TracebackType
@@ -45,7 +46,8 @@ class Client:
     api_key : str, optional
         A key, where the service wants one; if absent the environment variable `GRAMIAN_API_KEY`.
     timeout : float or httpx.Timeout, optional
-        Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent.
+        Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent. `math.inf` for no
+        limit.
     retries : int, optional
         How often a request is repeated at most, after 429, 503 or a lost connection; 4 if absent.
     max_wait : float, optional
@@ -83,7 +85,7 @@ class Client:
         http = RetryingClient(
             base_url=_url(base_url or os.environ.get("GRAMIAN_URL") or DEFAULT_URL),
             headers={"Authorization": f"Bearer {key}"} if key else {},
-            timeout=timeout if isinstance(timeout, httpx.Timeout) else bounds.get("timeout", DEFAULT_TIMEOUT),
+            timeout=timeout if isinstance(timeout, httpx.Timeout) else _timeout(bounds.get("timeout")),
             retries=bounds.get("retries", 4),
             max_wait=bounds.get("max_wait", 60.0),
             transport=transport,
@@ -208,6 +210,13 @@ def _url(address: str) -> str:
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"base_url is {address!r}, and is to be as {DEFAULT_URL!r}: with http:// or https://")
     return str(url)
+
+
+def _timeout(seconds: float | None) -> httpx.Timeout:
+    """Returns these seconds for each part of an exchange; httpx has no infinite ones."""
+    if seconds is None:
+        return DEFAULT_TIMEOUT
+    return httpx.Timeout(None if seconds == math.inf else seconds)
 
 
 def _key(key: str | None) -> str | None:

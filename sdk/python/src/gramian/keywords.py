@@ -7,6 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
+from .normalise import KERNEL
 from .scalars import nearest
 
 C = TypeVar("C", bound=type)
@@ -30,7 +31,8 @@ def _suggesting(function: Callable[P, T]) -> Callable[P, T]:
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:
         for name in kwargs:
             if name not in names:
-                raise TypeError(f"{called}() has no parameter {name!r}{nearest(name, names)}")
+                advice = "; it is one of a Kernel" if name in KERNEL and "kernel" in names else nearest(name, names)
+                raise TypeError(f"{called}() has no parameter {name!r}{advice}")
         return function(*args, **kwargs)
 
     return checked

@@ -18,6 +18,7 @@ as a negative length scale, is for the service to refuse.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
@@ -65,7 +66,8 @@ def normalise(
     """
     for name in fields:
         if name not in rules:
-            raise TypeError(f"{path.removesuffix('.') or 'the request'} has no {name!r}{nearest(name, rules)}")
+            place, known = path.removesuffix(".") or "the request", ", ".join(map(repr, rules))
+            raise TypeError(f"{place} has no {name!r}, but {known}{nearest(name, rules)}")
     _check_alpha(fields, path)
     given = {name: value for name, value in fields.items() if not _is_absent(value)}
     for name in fields:
@@ -152,6 +154,8 @@ def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa:
     if not isinstance(found, str):
         kind = type(value).__name__
         raise TypeError(f"{name} is to be a Cloud, as Client.cloud(points) returns, not of the type {kind}")
+    if not re.fullmatch("[0-9a-f]{64}", found):
+        raise ValueError(f"{name} is {found!r}, and ids of clouds are 64 hexadecimal digits")
     return {"id": str(found)}
 
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
+from threading import TIMEOUT_MAX
 from typing import Any, TypeVar
 
 import httpx
@@ -48,7 +49,7 @@ class RetryingClient(httpx.Client):
         """Takes the bounds, the function that waits, and the options of `httpx.Client`."""
         super().__init__(**options)
         self._retries = retries
-        self._max_wait = max_wait
+        self._max_wait = min(max_wait, TIMEOUT_MAX)  # nobody can sleep longer
         self._sleep = sleep
 
     def __del__(self) -> None:
