@@ -114,6 +114,9 @@ def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: 
     said = ask(cloud, method, noise_variances=NOISE).diagnostics
     with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
         ask(cloud, method, geometry=said.geometry)
+    for geometry in [Geometry(alpha=said.geometry.alpha), {"alpha": said.geometry.alpha}]:
+        with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
+            ask(cloud, method, geometry=geometry)
     with pytest.raises(ValueError, match=r"^alpha is absent from these diagnostics"):
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
 

@@ -35,6 +35,13 @@ class Foreign:
         return self.numbers
 
 
+class Broken:
+    """An array that another library does not give away."""
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        raise RuntimeError("detach it first")
+
+
 # Numbers
 
 HALVES = [
@@ -256,6 +263,10 @@ BAD_ROWS: dict[str, tuple[Any, type[Exception], str]] = {
         ValueError,
         r"{0} cannot be read.*: {0}\[0\] has the length 2, {0}\[1\] the length 1",
     ),
+    "masked entry": ([*CIRCLE[:5], np.ma.array([1, 2], mask=[False, True])], ValueError, r"{}\[5, 1\] is masked"),
+    "masked alone": (np.ma.masked, ValueError, r"{} is masked, and nothing can be sent for it"),
+    "too large": ([[1.0, 10**400]] * 8, TypeError, r"{} is an array of Python objects; "),
+    "broken": (Broken(), ValueError, r"{} cannot be read as an array: detach it first$"),
     "nested": ([[1, 2], 3], ValueError, r"{} cannot be read as an array: "),
     "dictionary": ({"x": [1]}, TypeError, r"{} is to be an array, not a dict; list\(…\)"),
     "iterator": (zip([1], [2], strict=True), TypeError, r"{} is to be an array, not a zip; list\(…\)"),
@@ -505,6 +516,7 @@ def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected:
         ("Gauss", ValueError, r"kernel.family is 'Gauss', .*; did you mean 'gauss'\?$"),
         ({"length_scale": 2}, TypeError, "kernel.family is missing$"),
         ({}, TypeError, "kernel.family is missing$"),
+        ({1: 2}, TypeError, "kernel has no 1, but 'family', "),
         (
             {"family": "gauss", "lenght_scale": 2},
             TypeError,
@@ -640,5 +652,7 @@ def test_every_parameter_of_a_fit_is_in_signature_and_docstring(method: str) -> 
         assert parameters[name].kind is inspect.Parameter.KEYWORD_ONLY
         assert parameters[name].default is None
     assert not any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
+    section, _, returned = section.partition("\n\nReturns\n-------\n")
+    assert returned.startswith(inspect.signature(function).return_annotation + "\n")
     names = [line.partition(" : ")[0] for line in section.splitlines() if not line.startswith(" ")]
     assert names == [name for name in parameters if name != "self"]

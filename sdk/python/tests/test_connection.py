@@ -250,6 +250,24 @@ def test_every_process_makes_its_own_client() -> None:
     assert found[0] == pytest.approx(2 * found[1], rel=1e-6)
 
 
+def ask_in_a_fork(client: gramian.Client, answers: multiprocessing.SimpleQueue[str]) -> None:
+    try:
+        answers.put(client.version().name)
+    except RuntimeError as error:
+        answers.put(str(error))
+
+
+def test_a_client_does_not_share_its_sockets_with_a_fork(client: gramian.Client) -> None:
+    client.version()
+    context = multiprocessing.get_context("fork")
+    answers = context.SimpleQueue()
+    child = context.Process(target=ask_in_a_fork, args=(client, answers))
+    child.start()
+    assert answers.get() == "a Client cannot be used after a fork: every process makes its own"
+    child.join()
+    assert client.version().name == "gramian"
+
+
 def test_a_client_needs_no_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     address = os.environ["GRAMIAN_URL"]
     monkeypatch.setenv("GRAMIAN_URL", f" {address}\n")
@@ -308,7 +326,7 @@ def test_numbers_of_numpy_configure_a_client() -> None:
     client.cloud(CIRCLE)
     assert next(client.clouds(page_size=np.uint8(1))).n_points > 0
     with pytest.raises(ValueError, match=r"^page_size is to be a whole number, not 1.5$"):
-        next(client.clouds(page_size=1.5))  # type: ignore[arg-type]
+        client.clouds(page_size=1.5)  # type: ignore[arg-type]
 
 
 def test_times_may_be_infinite() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterator, Mapping, Sequence, Set, Sized
 from decimal import Decimal
 from numbers import Real
@@ -77,8 +78,9 @@ def _refuse_masked(name: str, value: object) -> AnyArray:
     rows = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
     try:
         array = np.ma.array(value) if rows else np.asanyarray(value)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"{name} cannot be read as an array: {_ragged(name, value) or error}") from error
+    except (OverflowError, RuntimeError, TypeError, ValueError) as error:
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"{name} cannot be read as an array: {_ragged(name, value) or error}") from error
     if isinstance(array, np.ma.MaskedArray):
         hint = f"and nothing can be sent for it; leave such rows out, or {name}.filled(…)"
         _refuse_first(name, np.ma.getmaskarray(array), None, hint)
@@ -101,7 +103,9 @@ def _refuse_objects(name: str, value: object, array: AnyArray) -> None:
         raise TypeError(f"{name} is to be an array of numbers, not of the type {type(value).__name__}")
     for place, entry in np.ndenumerate(array):
         if isinstance(entry, bool) or not isinstance(entry, Real | Decimal):
-            raise TypeError(f"{name}{list(place)} is {entry!r} ({type(entry).__name__}), and only numbers can be sent")
+            raise TypeError(
+                f"{name}{list(place)} is {reprlib.repr(entry)} ({type(entry).__name__}), and only numbers can be sent"
+            )
     raise TypeError(f"{name} is an array of Python objects; np.asarray({name}, dtype=float) makes numbers of them")
 
 

@@ -161,8 +161,10 @@ class Client:
         page_size : int, optional
             How many the service is asked for at a time; its own choice if absent.
         """
-        asked = normalise({"page_size": page_size}, CLIENT)
-        parameters: dict[str, Any] = {"limit": asked["page_size"]} if asked else {}
+        asked = normalise({"page_size": page_size}, CLIENT)  # here, where the caller is: pages are asked for later
+        return self._pages({"limit": asked["page_size"]} if asked else {})
+
+    def _pages(self, parameters: dict[str, Any]) -> Iterator[Cloud]:
         while True:
             page = self._get("/v1/clouds", CloudList, parameters)
             yield from (Cloud(self._connection, description) for description in page.clouds)

@@ -34,6 +34,7 @@ from .rest.models import (
     SolverUsed,
     SurfaceChoice,
 )
+from .rest.models import Geometry as GeneratedGeometry
 from .rest.types import Unset
 from .scalars import as_number, as_whole, as_word, as_words, nearest, unwrapped
 
@@ -134,10 +135,11 @@ def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """The rule for the surface of an operator."""
     if isinstance(value, Diagnostics):
         value = {"cloud": value, "kernel": value.kernel, "alpha": value.alpha, "solver": value.solver}
+    elif isinstance(value, GeneratedGeometry):
+        # Its UNSET is what nobody has said, not what diagnostics lack.
+        value = {field: None if _is_absent(said := getattr(value, field)) else said for field in GEOMETRY}
     elif hasattr(value, "surface"):
-        value = {field: getattr(value, field, None) for field in GEOMETRY}
-        if isinstance(value["alpha"], Unset):  # of the generated Geometry, where it means nothing special
-            value["alpha"] = None
+        value = {field: getattr(value, field) for field in GEOMETRY}
     elif not isinstance(value, Mapping):
         value = {"cloud": value}
     if not _is_absent(value.get("cloud")):

@@ -49,6 +49,11 @@ class OperatorsOnCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
+        Returns
+        -------
+        SurfaceGradient
+            `gradients` at the queries, NaN where there is none; `degenerate` says why.
+
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
@@ -101,6 +106,11 @@ class OperatorsOnCloud(RegisteredCloud):
             `"dense"`, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        SurfaceGradientMatrix
+            `matrices`, `[d, m, n]`, whose rows are NaN where there is no gradient; `degenerate` says why.
 
         Examples
         --------
@@ -158,6 +168,11 @@ class OperatorsOnCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
+        Returns
+        -------
+        LaplaceBeltrami
+            `values` of Δu at the queries, NaN where there is none; `degenerate` says why.
+
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
@@ -210,6 +225,11 @@ class OperatorsOnCloud(RegisteredCloud):
             `"dense"`, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        LaplaceBeltramiMatrix
+            `matrix`, `[m, n]`, whose rows are NaN where there is no value; `degenerate` says why.
 
         Examples
         --------

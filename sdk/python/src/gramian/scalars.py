@@ -105,9 +105,9 @@ def unwrapped(name: str, value: object) -> object:
     return value
 
 
-def nearest(word: str, words: Iterable[str]) -> str:
+def nearest(word: object, words: Iterable[str]) -> str:
     """Returns a question for the word that was probably meant, or nothing."""
-    near = difflib.get_close_matches(word.lower(), list(words), n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(word).lower(), list(words), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 

@@ -49,6 +49,11 @@ class SurfaceOfCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
+        Returns
+        -------
+        Normals
+            `normals` at the queries, NaN where there is none; `degenerate` says why.
+
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
@@ -109,6 +114,12 @@ class SurfaceOfCloud(RegisteredCloud):
             `"dense"`, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Curvatures
+            `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN where there
+            are none; `degenerate` says why.
 
         Examples
         --------

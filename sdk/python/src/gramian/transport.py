@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
@@ -51,6 +52,7 @@ class RetryingClient(httpx.Client):
         self._retries = retries
         self._max_wait = min(max_wait, TIMEOUT_MAX)  # nobody can sleep longer
         self._sleep = sleep
+        self._process = os.getpid()
 
     def __del__(self) -> None:
         # Five lines of a notebook close nothing. Without this, sockets would warn when they are collected.
@@ -59,6 +61,8 @@ class RetryingClient(httpx.Client):
 
     def send(self, request: httpx.Request, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.send)
         """Sends a request, again if need be."""
+        if os.getpid() != self._process:  # both would read from one socket, and get each other's answers
+            raise RuntimeError("a Client cannot be used after a fork: every process makes its own")
         request.read()  # a body that is read from a file can be sent once only
         waited = 0.0
         for attempt in range(self._retries):

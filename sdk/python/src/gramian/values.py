@@ -53,6 +53,11 @@ class ValuesOfCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
+        Returns
+        -------
+        Interpolation
+            `values` of u at the queries, and `gradients` and `hessians` where asked for.
+
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
@@ -112,6 +117,11 @@ class ValuesOfCloud(RegisteredCloud):
             `"dense"`, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Posterior
+            `means` at the queries, and what `include` asks for.
 
         Examples
         --------
