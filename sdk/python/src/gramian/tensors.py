@@ -1,4 +1,4 @@
-"""Requests and answers as bytes: safetensors, or JSON where that package is absent.
+"""Requests and answers as bytes: safetensors, or JSON where that package is absent or a request has no arrays.
 
 In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`), and all
 other fields are JSON text in the metadata entry `request`; an answer has the entry `response`, and NaN where JSON has
@@ -47,13 +47,13 @@ def encode(request: Mapping[str, object], format: Format) -> tuple[bytes, str]: 
     ModuleNotFoundError
         If safetensors is asked for and not installed.
     """
-    if format == "json":
-        return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
-    if save_safetensors is None:
+    if format == "safetensors" and save_safetensors is None:
         raise ModuleNotFoundError(
             "safetensors is not installed: pip install 'gramian[safetensors]'", name="safetensors"
         )
     tensors, fields = _split(request)
+    if format == "json" or save_safetensors is None or not tensors:  # safetensors 0.4.3 cannot write a file without
+        return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
     return save_safetensors(tensors, metadata={"request": json.dumps(fields, allow_nan=False)}), SAFETENSORS
 
 
