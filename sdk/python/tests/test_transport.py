@@ -8,11 +8,13 @@ from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 
 import httpx
+import numpy as np
 import pytest
 
 import gramian
 from gramian.rest.api.process import get_version
 from gramian.rest.models import Version
+from gramian.tensors import JSON, SAFETENSORS
 from gramian.transport import Connection, RetryingClient
 
 OK = {"name": "gramian", "version": "0.1.0", "api": "v1", "instruction_set": "v3", "threads": 1}
@@ -112,6 +114,17 @@ def test_lost_connections_are_tried_again(lost: type[httpx.TransportError]) -> N
     connection.post("/v1/normals", {"cloud": {"id": "a"}})
     assert waits == [0.1]
     assert requests[0].content == requests[1].content
+
+
+def test_a_request_without_arrays_needs_no_safetensors() -> None:
+    handle, requests = service(httpx.Response(200, json=OK), httpx.Response(200, json=OK))
+    http = httpx.Client(base_url="http://service", transport=httpx.MockTransport(handle))
+    connection = Connection(http, "safetensors")
+    connection.post("/v1/normals", {"cloud": {"id": "a"}})
+    connection.post("/v1/normals", {"cloud": {"id": "a"}, "queries": np.zeros((1, 2))})
+    assert [request.headers["Content-Type"] for request in requests] == [JSON, SAFETENSORS]
+    assert [request.headers["Accept"] for request in requests] == [SAFETENSORS] * 2
+    assert requests[0].read() == b'{"cloud": {"id": "a"}}'
 
 
 def test_a_connection_lost_too_often_is_an_error() -> None:

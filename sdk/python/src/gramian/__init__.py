@@ -26,7 +26,7 @@ from .answers import (
 )
 from .client import Client
 from .cloud import Cloud
-from .fit import Fit, Geometry, KernelFields, KernelLike
+from .fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, OperatorFit
 from .problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
 from .rest.models import (
     Degenerate,
@@ -34,7 +34,6 @@ from .rest.models import (
     Diagnostics,
     DuplicatePolicy,
     FactorizationUsed,
-    Kernel,
     KernelDescription,
     KernelFamily,
     KernelUsed,
@@ -64,6 +63,8 @@ __all__ = [
     "FactorizationUsed",
     "Fit",
     "Geometry",
+    "GeometryFields",
+    "GeometryLike",
     "Interpolation",
     "Kernel",
     "KernelDescription",
@@ -75,6 +76,7 @@ __all__ = [
     "LaplaceBeltramiMatrix",
     "Normals",
     "NotPositiveDefinite",
+    "OperatorFit",
     "OrientationChoice",
     "Overloaded",
     "Posterior",

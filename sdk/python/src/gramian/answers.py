@@ -3,7 +3,7 @@
 n is the number of points of the cloud, d their dimension, m the number of queries; L is the unit of the coordinates
 and V that of the values. Arrays keep the order of the request, are read-only views of the answer's bytes (`.copy()`
 them to change them), and have NaN where there is no meaningful number; `degenerate` then says why. Answers can be
-pickled and used by several threads.
+pickled and used by several threads. `repr` shows arrays by their shapes.
 """
 
 from __future__ import annotations
@@ -11,25 +11,44 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
+from .describe import described
+from .fit import Fit, OperatorFit, fit_used, operator_fit_used
 from .rest.models import Degenerate, Diagnostics, SurfaceUsed
 from .tensors import Array, Members
 
 
-@dataclass(frozen=True, eq=False)
-class Interpolation:
+class Answer:
+    """What all answers have in common: they show arrays by their shapes, and leave out what is absent."""
+
+    def __repr__(self) -> str:
+        # The fit repeats the diagnostics and the request.
+        members = {name: value for name, value in vars(self).items() if name != "fit"}
+        return described(type(self).__name__, members)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Interpolation(Answer):
     """A function u through the values (close to them, if `alpha` > 0), at the queries.
 
-    Attributes:
-        values: `[m]`, V. u at each query.
-        gradients: `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
-        hessians: `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
-        diagnostics: The kernel and α used, how the system was solved, and how well.
+    Attributes
+    ----------
+    values
+        `[m]`, V. u at each query.
+    gradients
+        `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
+    hessians
+        `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
     """
 
     values: Array
     gradients: Array | None
     hessians: Array | None
     diagnostics: Diagnostics
+    fit: Fit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -40,21 +59,32 @@ class Interpolation:
             gradients=members.optional("gradients", d),
             hessians=members.optional("hessians", d, d),
             diagnostics=members.diagnostics,
+            fit=fit_used(members.diagnostics, members.request),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
+@dataclass(frozen=True, eq=False, repr=False)
+class Posterior(Answer):
     """A Gaussian process given the values, at the queries. What was not asked for is None.
 
-    Attributes:
-        means: `[m]`, V.
-        variances: `[m]`, V². Of the latent function, no noise added; ≥ 0.
-        observation_variances: `[m]`, V². Of a new, noisy observation.
-        covariance: `[m, m]`, V². Of the latent function between queries.
-        gradients: `[m, d]`, V/L. Of the mean.
-        log_marginal_likelihood: −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-        diagnostics: The kernel and α used, how the system was solved, and how well.
+    Attributes
+    ----------
+    means
+        `[m]`, V.
+    variances
+        `[m]`, V². Of the latent function, no noise added; ≥ 0.
+    observation_variances
+        `[m]`, V². Of a new, noisy observation.
+    covariance
+        `[m, m]`, V². Of the latent function between queries.
+    gradients
+        `[m, d]`, V/L. Of the mean.
+    log_marginal_likelihood
+        −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
     """
 
     means: Array
@@ -64,6 +94,7 @@ class Posterior:
     gradients: Array | None
     log_marginal_likelihood: float | None
     diagnostics: Diagnostics
+    fit: Fit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -77,20 +108,30 @@ class Posterior:
             gradients=members.optional("gradients", diagnostics.dimension),
             log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
             diagnostics=diagnostics,
+            fit=fit_used(diagnostics, members.request),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Normals:
+@dataclass(frozen=True, eq=False, repr=False)
+class Normals(Answer):
     """Unit normals of the surface at the queries.
 
-    Attributes:
-        normals: `[m, d]`, of length 1, outward unless asked for otherwise.
-        gradient_norms: `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
-        levels: `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
-        surfaces: m entries. The function whose level surface was used.
-        degenerate: The queries without a normal, or with a doubtful one.
-        diagnostics: The kernel and α used, how the system was solved, and how well.
+    Attributes
+    ----------
+    normals
+        `[m, d]`, of length 1, outward unless asked for otherwise.
+    gradient_norms
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+    levels
+        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+    surfaces
+        m entries. The function whose level surface was used.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
     """
 
     normals: Array
@@ -99,6 +140,7 @@ class Normals:
     surfaces: tuple[SurfaceUsed, ...]
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: Fit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -111,25 +153,39 @@ class Normals:
             surfaces=_surfaces(members),
             degenerate=members.degenerate,
             diagnostics=diagnostics,
+            fit=fit_used(diagnostics, members.request),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Curvatures:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curvatures(Answer):
     """Curvatures of the surface at the queries: with outward normals, a sphere of radius r has +1/r everywhere.
 
-    Attributes:
-        principal_curvatures: `[m, d − 1]`, 1/L, ascending.
-        principal_directions: `[m, d − 1, d]`, of length 1, the largest component positive; any basis where curvatures
-            coincide.
-        mean_curvatures: `[m]`, 1/L. The average of the principal curvatures.
-        gaussian_curvatures: `[m]`, 1/L^(d − 1). Their product.
-        normals: `[m, d]`, of length 1.
-        gradient_norms: `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
-        levels: `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
-        surfaces: m entries. The function whose level surface was used.
-        degenerate: The queries without curvatures, or with doubtful ones.
-        diagnostics: The kernel and α used, how the system was solved, and how well.
+    Attributes
+    ----------
+    principal_curvatures
+        `[m, d − 1]`, 1/L, ascending.
+    principal_directions
+        `[m, d − 1, d]`, of length 1, the largest component positive; any basis where curvatures
+        coincide.
+    mean_curvatures
+        `[m]`, 1/L. The average of the principal curvatures.
+    gaussian_curvatures
+        `[m]`, 1/L^(d − 1). Their product.
+    normals
+        `[m, d]`, of length 1.
+    gradient_norms
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+    levels
+        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+    surfaces
+        m entries. The function whose level surface was used.
+    degenerate
+        The queries without curvatures, or with doubtful ones.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
     """
 
     principal_curvatures: Array
@@ -142,6 +198,7 @@ class Curvatures:
     surfaces: tuple[SurfaceUsed, ...]
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: Fit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -159,90 +216,124 @@ class Curvatures:
             surfaces=_surfaces(members),
             degenerate=members.degenerate,
             diagnostics=diagnostics,
+            fit=fit_used(diagnostics, members.request),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceGradient:
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradient(Answer):
     """Surface gradients ∇u − (∇u·ν)ν of the values at the queries.
 
-    Attributes:
-        gradients: `[m, d]`, V/L, tangent to the surface.
-        degenerate: The queries without a normal, or with a doubtful one.
-        diagnostics: Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    Attributes
+    ----------
+    gradients
+        `[m, d]`, V/L, tangent to the surface.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
     """
 
     gradients: Array
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: OperatorFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
         """Reads the answer of `/v1/surface-gradient`."""
         diagnostics = members.diagnostics
-        return cls(members.array("gradients", diagnostics.dimension), members.degenerate, diagnostics)
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.array("gradients", diagnostics.dimension), members.degenerate, diagnostics, fit)
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceGradientMatrix:
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradientMatrix(Answer):
     """The surface gradient as matrices, one per coordinate.
 
-    Attributes:
-        matrices: `[d, m, n]`, 1/L. `matrices @ values` has the shape `[d, m]`.
-        degenerate: The queries without a normal, or with a doubtful one.
-        diagnostics: Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    Attributes
+    ----------
+    matrices
+        `[d, m, n]`, 1/L. `matrices @ values` has the shape `[d, m]`.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
     """
 
     matrices: Array
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: OperatorFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
         """Reads the answer of `/v1/surface-gradient/matrix`."""
         diagnostics = members.diagnostics
-        return cls(members.arrays("matrices", diagnostics.n_points), members.degenerate, diagnostics)
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.arrays("matrices", diagnostics.n_points), members.degenerate, diagnostics, fit)
 
 
-@dataclass(frozen=True, eq=False)
-class LaplaceBeltrami:
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltrami(Answer):
     """The Laplace–Beltrami operator of the values at the queries: on the unit circle Δ cos θ = −cos θ.
 
-    Attributes:
-        values: `[m]`, V/L². Δu.
-        degenerate: The queries without a normal, or with a doubtful one.
-        diagnostics: Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    Attributes
+    ----------
+    values
+        `[m]`, V/L². Δu.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
     """
 
     values: Array
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: OperatorFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
         """Reads the answer of `/v1/laplace-beltrami`."""
-        return cls(members.array("values"), members.degenerate, members.diagnostics)
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.array("values"), members.degenerate, diagnostics, fit)
 
 
-@dataclass(frozen=True, eq=False)
-class LaplaceBeltramiMatrix:
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltramiMatrix(Answer):
     """The Laplace–Beltrami operator as a matrix: on the unit circle `matrix @ cos θ` is −cos θ.
 
-    Attributes:
-        matrix: `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric in general.
-        degenerate: The queries without a normal, or with a doubtful one.
-        diagnostics: Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    Attributes
+    ----------
+    matrix
+        `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric in general.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
     """
 
     matrix: Array
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
+    fit: OperatorFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
         """Reads the answer of `/v1/laplace-beltrami/matrix`."""
         diagnostics = members.diagnostics
-        return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics)
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics, fit)
 
 
 def _surfaces(members: Members) -> tuple[SurfaceUsed, ...]:

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, NoReturn, Self, SupportsFloat, TypeVar
 
 import httpx
+import numpy as np
 import numpy.typing as npt
 
 from . import rest
+from .arrays import Sizes
 from .cloud import Cloud
-from .registration import own_copy, register
+from .fit import Whole
+from .keywords import suggest_names
+from .normalise import CLIENT, REQUEST, normalise
+from .problems import Problem
+from .registration import register
 from .rest.models import CloudList, KernelDescription, KernelList, Version
-from .tensors import Format, available_format
+from .tensors import Array, Format, available_format
 from .transport import Connection, RetryingClient
+
+T = TypeVar("T", CloudList, KernelList, Version)
 
 DEFAULT_URL = "http://127.0.0.1:8080"
 
@@ -23,12 +32,35 @@ DEFAULT_TIMEOUT = httpx.Timeout(150.0, connect=10.0)
 """In seconds. Longer than the service's own deadline, 120 s if not configured, so that it can say what was too slow."""
 
 
+@suggest_names
 class Client:
     """A gramian service.
 
     Keeps connections open; `close()` it, or use it in a `with` statement. May be shared by threads; cannot be pickled,
     so every process makes its own.
 
+    Parameters
+    ----------
+    base_url : str, optional
+        Its address; if absent the environment variable `GRAMIAN_URL`, or else `http://127.0.0.1:8080`.
+    api_key : str, optional
+        A key, where the service wants one; if absent the environment variable `GRAMIAN_API_KEY`.
+    timeout : float or httpx.Timeout, optional
+        Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent. `math.inf` for no
+        limit.
+    retries : int, optional
+        How often a request is repeated at most, after 429, 503 or a lost connection; 4 if absent.
+    max_wait : float, optional
+        Seconds that all waits of a request together may take; 60 if absent. `Retry-After` is honoured within them; if
+        it asks for more, `Overloaded` is raised at once, with `retry_after`.
+    format : str, optional
+        How arrays travel, `"safetensors"` or `"json"`: the former if absent and that package is installed. The numbers
+        are the same.
+    transport : httpx.BaseTransport, optional
+        Instead of the network, as in `httpx.Client`.
+
+    Examples
+    --------
     >>> with gramian.Client() as client:
     ...     client.version().name
     'gramian'
@@ -39,35 +71,26 @@ class Client:
         base_url: str | None = None,
         *,
         api_key: str | None = None,
-        timeout: float | httpx.Timeout = DEFAULT_TIMEOUT,
-        retries: int = 4,
-        max_wait: float = 60.0,
+        timeout: SupportsFloat | httpx.Timeout | None = None,
+        retries: Whole | None = None,
+        max_wait: SupportsFloat | None = None,
         format: Format | None = None,  # noqa: A002
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        """Says where the service is; nothing is sent yet.
-
-        Args:
-            base_url: Its address; if absent the environment variable `GRAMIAN_URL`, or else `http://127.0.0.1:8080`.
-            api_key: A key, where the service wants one; if absent the environment variable `GRAMIAN_API_KEY`.
-            timeout: Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent.
-            retries: How often a request is repeated at most, after 429, 503 or a lost connection.
-            max_wait: Seconds that all waits of a request together may take. `Retry-After` is honoured within them; if
-                it asks for more, `Overloaded` is raised at once, with `retry_after`.
-            format: How arrays travel: `"safetensors"` if that package is installed, else `"json"`. The numbers are the
-                same.
-            transport: Instead of the network, as in `httpx.Client`.
-        """
-        key = api_key or os.environ.get("GRAMIAN_API_KEY")
+        """Says where the service is; nothing is sent yet."""
+        seconds = None if isinstance(timeout, httpx.Timeout) else timeout
+        given = {"timeout": seconds, "retries": retries, "max_wait": max_wait, "format": format}
+        bounds: dict[str, Any] = normalise(given, CLIENT)
+        key = _key(api_key or os.environ.get("GRAMIAN_API_KEY"))
         http = RetryingClient(
-            base_url=base_url or os.environ.get("GRAMIAN_URL") or DEFAULT_URL,
+            base_url=_url(base_url or os.environ.get("GRAMIAN_URL") or DEFAULT_URL),
             headers={"Authorization": f"Bearer {key}"} if key else {},
-            timeout=timeout,
-            retries=retries,
-            max_wait=max_wait,
+            timeout=timeout if isinstance(timeout, httpx.Timeout) else _timeout(bounds.get("timeout")),
+            retries=bounds.get("retries", 4),
+            max_wait=bounds.get("max_wait", 60.0),
             transport=transport,
         )
-        self._connection = Connection(http, format or available_format())
+        self._connection = Connection(http, bounds.get("format", available_format()))
 
     def __repr__(self) -> str:
         return f"Client({str(self._connection.http.base_url)!r})"
@@ -79,6 +102,9 @@ class Client:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Client cannot be pickled, since it has connections: every process makes its own")
 
     def close(self) -> None:
         """Closes the connections."""
@@ -102,27 +128,45 @@ class Client:
     def cloud(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None) -> Cloud:
         """Registers points, and remembers them in case the service forgets them.
 
-        Args:
-            points: `[n, d]`, a row of coordinates for each.
-            normals: `[n, d]`, of any length but 0, if known: their side is the outward one.
+        Parameters
+        ----------
+        points : array_like, `[n, d]`
+            A row of coordinates for each, also on a line: `[[0.0], [0.5]]`.
+        normals : array_like, `[n, d]`, optional
+            Of any length but 0, if known: their side is the outward one.
 
+        Examples
+        --------
         >>> gramian.Client().cloud([[0, 0], [1, 0], [0, 1]])
         Cloud(id='f70083fe…', n_points=3, dimension=2)
         """
-        own_points = own_copy("points", points)
-        own_normals = None if normals is None else own_copy("normals", normals)
-        description = register(self._connection, own_points, own_normals)
+        own_points = _own_array("points", points)
+        n, d = own_points.shape
+        own_normals = None if normals is None else _own_array("normals", normals, {"n": n, "d": d})
+        try:
+            description = register(self._connection, own_points, own_normals)
+        except Problem as problem:
+            if n < d:
+                problem.add_note(f"Rows are points, so these are {n} of {d} coordinates each. Did you mean points.T?")
+            raise
         return Cloud(self._connection, description, own_points, own_normals)
 
-    def clouds(self, page_size: int | None = None) -> Iterator[Cloud]:
+    def clouds(self, page_size: Whole | None = None) -> Iterator[Cloud]:
         """Yields the clouds registered with this key, oldest first, page by page.
 
         They have no points, and so cannot be posted again.
+
+        Parameters
+        ----------
+        page_size : int, optional
+            How many the service is asked for at a time; its own choice if absent.
         """
-        parameters: dict[str, str | int] = {} if page_size is None else {"limit": page_size}
+        asked = normalise({"page_size": page_size}, CLIENT)  # here, where the caller is: pages are asked for later
+        return self._pages({"limit": asked["page_size"]} if asked else {})
+
+    def _pages(self, parameters: dict[str, Any]) -> Iterator[Cloud]:
         while True:
-            response = self._connection.send("GET", "/v1/clouds", params=parameters)
-            page = CloudList.from_dict(response.json())
+            page = self._get("/v1/clouds", CloudList, parameters)
             yield from (Cloud(self._connection, description) for description in page.clouds)
             if not page.next_:
                 return
@@ -131,11 +175,55 @@ class Client:
     def kernels(self) -> list[KernelDescription]:
         """Lists the families of kernels, with their formulas and parameters.
 
+        Examples
+        --------
         >>> [kernel.family.value for kernel in gramian.Client().kernels()]
         ['gauss', 'laplace', 'matern', 'wendland', 'inverse_multiquadric']
         """
-        return KernelList.from_dict(self._connection.send("GET", "/v1/kernels").json()).kernels
+        return self._get("/v1/kernels", KernelList).kernels
 
     def version(self) -> Version:
         """Says what is running."""
-        return Version.from_dict(self._connection.send("GET", "/version").json())
+        return self._get("/version", Version)
+
+    def _get(self, path: str, kind: type[T], parameters: Mapping[str, Any] | None = None) -> T:
+        return self._connection.read(kind.from_dict, self._connection.send("GET", path, params=parameters))
+
+
+def _own_array(name: str, rows: npt.ArrayLike, sizes: Sizes | None = None) -> Array:
+    """Returns a read-only copy of rows: the caller may change theirs, and these must stay as their id says."""
+    array: Array = np.array(normalise({name: rows}, REQUEST, sizes)[name])  # always: others hand out their own buffer
+    array.flags.writeable = False
+    return array
+
+
+def _url(address: str) -> str:
+    """Returns an address that can be asked.
+
+    Raises
+    ------
+    ValueError
+        If it has another scheme than HTTP, or none.
+    """
+    try:
+        url = httpx.URL(str(address).strip())
+    except httpx.InvalidURL as error:
+        raise ValueError(f"base_url is {address!r}, which is no address: {error}") from error
+    if url.scheme not in ("http", "https") or not url.host:
+        raise ValueError(f"base_url is {address!r}, and is to be as {DEFAULT_URL!r}: with http:// or https://")
+    return str(url)
+
+
+def _timeout(seconds: float | None) -> httpx.Timeout:
+    """Returns these seconds for each part of an exchange; httpx has no infinite ones."""
+    if seconds is None:
+        return DEFAULT_TIMEOUT
+    return httpx.Timeout(None if seconds == math.inf else seconds)
+
+
+def _key(key: str | None) -> str | None:
+    """Returns a key that a header can have; one that is blank is none."""
+    key = (key or "").strip()
+    if not (key.isascii() and key.isprintable()):
+        raise ValueError("api_key has characters that no header can have")
+    return key or None

@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Required, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from .describe import described
+from .keywords import suggest_names
+from .normalise import KERNEL, normalise
+from .rest import models
 from .rest.models import (
+    Diagnostics,
     DuplicatePolicy,
-    Kernel,
+    KernelDescription,
     KernelFamily,
     KernelUsed,
     OrientationChoice,
     PosteriorQuantity,
     SolverChoice,
+    SolverUsed,
     SurfaceChoice,
 )
-from .tensors import Array
+from .rest.types import Unset
 
 if TYPE_CHECKING:
-    from .cloud import Cloud
+    from .registration import RegisteredCloud
+
+Number: TypeAlias = SupportsFloat | Unset
+"""A real number: of Python or NumPy, an array without axes, a fraction; what `diagnostics` has. No bool or complex."""
+
+Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
+"""A whole number: of Python or NumPy, an array without axes."""
 
 # Every enumeration of the service may also be given as a plain string; tests/test_types.py compares the two.
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
-Solver: TypeAlias = SolverChoice | Literal["auto", "dense"]
+Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
@@ -35,115 +48,200 @@ Quantity: TypeAlias = (
 )
 
 
-class KernelFields(TypedDict, total=False):
-    """A kernel as a dictionary: `{"family": "gauss", "length_scale": 2.0}`.
+@suggest_names
+@dataclass(frozen=True, init=False, repr=False)
+class Kernel:
+    """A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`.
 
-    `k(x, y) = variance · φ(|x − y|²/length_scale²)`; `Kernel` documents the parameters, `Client.kernels()` the
-    families.
+    What is None is chosen by the service. `Client.kernels()` lists the families with their formulas.
+
+    Attributes
+    ----------
+    family
+        What determines φ.
+    length_scale
+        ℓ, unit of the coordinates; chosen from the cloud if absent.
+    variance
+        The factor of φ, unit of the values squared; 1 if absent.
+    epsilon
+        Of `laplace`: φ = exp(−√(r² + epsilon)); 0 if absent.
+    nu
+        Of `matern`: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+    smoothness
+        Of `wendland`: 2, 4 or 6 times differentiable; 4 if absent.
+
+    Examples
+    --------
+    >>> gramian.Kernel("gauss", length_scale=np.float32(2))
+    Kernel(family='gauss', length_scale=2.0)
     """
 
+    family: KernelFamily
+    length_scale: float | None
+    variance: float | None
+    epsilon: float | None
+    nu: float | None
+    smoothness: int | None
+
+    def __init__(
+        self,
+        family: Family,
+        *,
+        length_scale: Number | None = None,
+        variance: Number | None = None,
+        epsilon: Number | None = None,
+        nu: Number | None = None,
+        smoothness: Whole | Unset | None = None,
+    ) -> None:
+        """Takes the parameters, of which the family allows some; see the attributes."""
+        numbers = {"length_scale": length_scale, "variance": variance, "epsilon": epsilon, "nu": nu}
+        given: dict[str, Any] = normalise(
+            {"family": family, **numbers, "smoothness": smoothness}, KERNEL, path="kernel."
+        )
+        given["family"] = KernelFamily(given["family"])
+        for name in KERNEL:
+            object.__setattr__(self, name, given.get(name))
+
+    def __repr__(self) -> str:
+        return described("Kernel", vars(self))
+
+
+class KernelFields(TypedDict, total=False):
+    """A kernel as a dictionary: `{"family": "gauss", "length_scale": 2.0}`. `Kernel` documents the parameters."""
+
     family: Required[Family]
-    length_scale: float
-    variance: float
-    epsilon: float
-    nu: float
-    smoothness: Literal[2, 4, 6]
+    length_scale: Number | None
+    variance: Number | None
+    epsilon: Number | None
+    nu: Number | None
+    smoothness: Whole | None
 
 
-KernelLike: TypeAlias = Kernel | KernelUsed | KernelFields
-"""A kernel: of one's own, one that `diagnostics.kernel` reports, or a dictionary."""
+KernelLike: TypeAlias = Family | Kernel | KernelUsed | KernelFields | models.Kernel | KernelDescription
+"""A kernel: a family, a dictionary, one of one's own, or what `diagnostics.kernel` or `Client.kernels()` reports."""
 
 
 class Fit(TypedDict, total=False):
-    """How a function is fitted to values at the n points of a cloud. Everything is optional, None is as absent.
+    """How a function is fitted to values at the n points of a cloud, as keywords: `cloud.normals(**fit)`.
 
-    Keys:
-        kernel: Chosen from the cloud if absent, and repeated in `diagnostics.kernel`.
-        alpha: Added to the diagonal of the Gram matrix, unit of the values squared: 0 interpolates, the variance of the
-            noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by the
-            noise of the points.
-        noise_variances: `[n]`, the variance of the noise at each point, instead of `alpha`.
-        solver: How the linear system is solved; `"auto"` if absent.
-        duplicates: What to do with points that coincide when alpha is 0: `"refuse"` them (if absent) or `"merge"` them.
+    `fit` of an answer is one, with all that was used. Everything is optional, None is as absent.
+
+    Keys
+    ----
+    kernel
+        Chosen from the cloud if absent, and repeated in `diagnostics.kernel`.
+    alpha
+        Added to the diagonal of the Gram matrix, unit of the values squared: 0 interpolates, the variance of the
+        noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by the
+        noise of the points.
+    noise_variances
+        `[n]`, the variance of the noise at each point, instead of `alpha`.
+    solver
+        How the linear system is solved; `"auto"` if absent.
+    duplicates
+        What to do with points that coincide when alpha is 0: `"refuse"` them (if absent) or `"merge"` them.
     """
 
     kernel: KernelLike | None
-    alpha: float | None
+    alpha: Number | None
     noise_variances: npt.ArrayLike | None
     solver: Solver | None
     duplicates: Duplicates | None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@suggest_names
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Geometry:
     """The surface of an operator, where it differs from the fit of the values. What is absent is as for the values.
 
-    Attributes:
-        cloud: The cloud whose level surface carries the operator, `[k, d]`; its points are the default queries.
-        kernel: The kernel of its signature function.
-        alpha: Added to the diagonal of its Gram matrix.
-        noise_variances: `[k]`, instead of `alpha`.
-        solver: How its linear system is solved.
-        surface: Which function's level surface is meant.
+    Attributes
+    ----------
+    cloud
+        The cloud whose level surface carries the operator, `[k, d]`, or its id; its points are the default queries.
+    kernel
+        The kernel of its signature function.
+    alpha
+        Added to the diagonal of its Gram matrix; the signature function has no unit.
+    noise_variances
+        `[k]`, instead of `alpha`.
+    solver
+        How its linear system is solved.
+    surface
+        Which function's level surface is meant.
     """
 
-    cloud: Cloud | None = None
+    cloud: RegisteredCloud | str | None = None
     kernel: KernelLike | None = None
-    alpha: float | None = None
+    alpha: Number | None = None
     noise_variances: npt.ArrayLike | None = None
     solver: Solver | None = None
     surface: Surface | None = None
 
-    def fields(self) -> dict[str, object]:
-        """Returns the field `geometry` of a request."""
-        fit = Fit(kernel=self.kernel, alpha=self.alpha, noise_variances=self.noise_variances, solver=self.solver)
-        cloud = None if self.cloud is None else {"id": self.cloud.id}
-        return given(cloud=cloud, surface=self.surface, **fit_fields(fit))
+    def __repr__(self) -> str:
+        return described("Geometry", vars(self))
 
 
-def fit_fields(fit: Fit) -> dict[str, object]:
-    """Returns the fields of a request that say how to fit."""
-    fields: dict[str, object] = {name: _plain(value) for name, value in fit.items()}
-    kernel, noise_variances = fit.get("kernel"), fit.get("noise_variances")
-    if isinstance(kernel, Kernel | KernelUsed):
-        fields["kernel"] = kernel.to_dict()
-    elif kernel is not None:
-        fields["kernel"] = {name: _plain(value) for name, value in kernel.items()}
-    if noise_variances is not None:
-        fields["noise_variances"] = as_list("noise_variances", noise_variances)
-    return fields
+class GeometryFields(TypedDict, total=False):
+    """A geometry as a dictionary: `{"kernel": "gauss", "alpha": 1e-8}`. `Geometry` documents the keys."""
+
+    cloud: RegisteredCloud | str | None
+    kernel: KernelLike | None
+    alpha: Number | None
+    noise_variances: npt.ArrayLike | None
+    solver: Solver | None
+    surface: Surface | None
 
 
-def _plain(value: object) -> object:
-    """Returns a number of NumPy as one of Python."""
-    return value.item() if isinstance(value, np.generic) else value
+GeometryLike: TypeAlias = "Geometry | GeometryFields | Diagnostics | RegisteredCloud"
+"""A surface: of one's own, that of another cloud, one that `diagnostics.geometry` reports, or a dictionary."""
 
 
-def given(**fields: object) -> dict[str, object]:
-    """Returns the fields that are not None: the service takes no null."""
-    return {name: value for name, value in fields.items() if value is not None}
+class OperatorFit(Fit, total=False):
+    """How a function and a surface are fitted, as keywords: `cloud.laplace_beltrami(values, **fit)`.
 
-
-def as_list(name: str, values: npt.ArrayLike) -> Array:
-    """Returns numbers of the shape `[n]`."""
-    return _as_array(name, values, "[n]")
-
-
-def as_rows(name: str, points: npt.ArrayLike) -> Array:
-    """Returns points of the shape `[n, d]`, one row of coordinates each."""
-    return _as_array(name, points, "[n, d]")
-
-
-def _as_array(name: str, numbers: npt.ArrayLike, shape: Literal["[n]", "[n, d]"]) -> Array:
-    """Returns an array as it is sent, without a copy if it is one already.
-
-    Shape and finiteness are checked here, since one way of writing a request could not say NaN at all, and the service
-    would report a wrong shape row by row. All else is for the service to refuse.
+    Keys
+    ----
+    geometry
+        The surface, where it differs from the fit of the values.
     """
-    array = np.asarray(numbers, dtype="<f8", order="C")
-    if array.ndim != shape.count(",") + 1:
-        raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}")
-    if not np.isfinite(array).all():
-        first = np.argwhere(~np.isfinite(array))[0].tolist()
-        raise ValueError(f"{name}{first} is not finite")
-    return array
+
+    geometry: GeometryLike | None
+
+
+def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
+    """Returns the fit that an answer says was used, with what only the request says."""
+    fit = Fit(kernel=diagnostics.kernel, solver=diagnostics.solver)
+    if isinstance(diagnostics.alpha, Unset):
+        fit["noise_variances"] = _own_copy(request.get("noise_variances"))
+    else:
+        fit["alpha"] = diagnostics.alpha
+    if "duplicates" in request:
+        fit["duplicates"] = DuplicatePolicy(request["duplicates"])
+    return fit
+
+
+def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> OperatorFit:
+    """Returns the same with the surface's fit."""
+    fit, surface = fit_used(diagnostics, request), diagnostics.geometry
+    if isinstance(surface, Unset):
+        return cast(OperatorFit, fit)
+    asked = request.get("geometry", {})
+    noise_variances = asked.get("noise_variances", request.get("noise_variances"))
+    geometry = Geometry(
+        cloud=None if surface.cloud_id == diagnostics.cloud_id else surface.cloud_id,
+        kernel=surface.kernel,
+        alpha=None if isinstance(surface.alpha, Unset) else surface.alpha,
+        noise_variances=_own_copy(noise_variances) if isinstance(surface.alpha, Unset) else None,
+        solver=surface.solver,
+        surface=SurfaceChoice(asked["surface"]) if "surface" in asked else None,
+    )
+    return OperatorFit(**fit, geometry=geometry)
+
+
+def _own_copy(numbers: npt.ArrayLike | None) -> npt.NDArray[np.float64] | None:
+    """Returns numbers that stay as they were sent, whatever the caller does to theirs."""
+    if numbers is None:
+        return None
+    copy = np.array(numbers, dtype=np.float64)
+    copy.flags.writeable = False
+    return copy

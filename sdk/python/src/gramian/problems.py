@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TypeVar
 
 import httpx
@@ -17,9 +16,11 @@ T = TypeVar("T")
 class Problem(Exception):
     """A request was refused, or could not be answered.
 
-    Carries the problem document (RFC 9457) that the service answered with. `str()` of it has what happened, where, and
-    the remedy where there is one.
+    Carries the problem document (RFC 9457) that the service answered with; where a proxy or another service answered,
+    one with the type `about:blank`. `str()` of it has what happened, where, and the remedy where there is one.
 
+    Examples
+    --------
     >>> cloud = gramian.Client().cloud([[1, 0], [0, 1], [-1, 0], [0, -1]])
     >>> try:
     ...     cloud.curvatures(alpha=-1)
@@ -117,6 +118,9 @@ _KINDS: dict[str, type[Problem]] = {
     "unknown-cloud": UnknownCloud,
     "not-positive-definite": NotPositiveDefinite,
 }
+MAX_QUOTED = 200
+"""How many bytes of a page are repeated."""
+
 TRY_LATER = (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE)
 """The statuses after which the same request may succeed."""
 
@@ -131,18 +135,44 @@ def problem_of(response: httpx.Response, retry_after: float | None = None) -> Pr
     return kind(document, retry_after)
 
 
+def unreadable(response: httpx.Response, error: Exception) -> Problem:
+    """Returns the exception for a success that cannot be read: another service answered, or a part is lost."""
+    media_type = response.headers.get("Content-Type", "no Content-Type")
+    detail = (
+        f"{response.url.copy_with(query=None)} answered {response.status_code}, but not as gramian does ({media_type}, "
+        f"{type(error).__name__}: {error}); is base_url right?"
+    )
+    return Problem(_written(response, "Not an answer of gramian", detail))
+
+
+UNREADABLE = (AttributeError, LookupError, RecursionError, TypeError, ValueError)
+"""What reading a document raises that is another one than it should be."""
+
+
 def _document(response: httpx.Response) -> models.Problem:
     """Reads the document, or writes one for what others answer, such as a proxy with a page in HTML."""
     try:
-        return models.Problem.from_dict(response.json())
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError):
-        return models.Problem(
-            type_="about:blank",
-            title=response.reason_phrase,
-            status=response.status_code,
-            detail=response.text[:200] or response.reason_phrase,
-            instance=response.headers.get("X-Request-Id", ""),
-        )
+        document = models.Problem.from_dict(response.json())
+        for text in (document.type_, document.title, document.detail, document.instance):
+            text.encode()
+        document.status + 0
+    except UNREADABLE:
+        text = response.content[:MAX_QUOTED].decode(errors="replace")
+        if response.has_redirect_location:
+            text = f"redirected to {response.headers['Location']}; give the service's own address as base_url"
+        return _written(response, response.reason_phrase, text or response.reason_phrase)
+    return document
+
+
+def _written(response: httpx.Response, title: str, detail: str) -> models.Problem:
+    """Writes a document where the service has not."""
+    return models.Problem(
+        type_="about:blank",
+        title=title,
+        status=response.status_code,
+        detail=detail,
+        instance=response.headers.get("X-Request-Id", ""),
+    )
 
 
 def _given(member: T | Unset) -> T | None:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import NoReturn, TypeVar
 
-import numpy.typing as npt
-
-from .fit import as_rows, given
+from .normalise import REQUEST, normalise
 from .problems import UnknownCloud
 from .rest import models
 from .tensors import JSON, Array, Members
 from .transport import Connection
+
+T = TypeVar("T")
 
 
 class RegisteredCloud:
@@ -31,6 +32,9 @@ class RegisteredCloud:
 
     def __repr__(self) -> str:
         return f"Cloud(id='{self.id[:8]}…', n_points={self.n_points}, dimension={self.dimension})"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Cloud cannot be pickled, since it has connections; its points and its answers can")
 
     @property
     def id(self) -> str:
@@ -64,19 +68,20 @@ class RegisteredCloud:
         except UnknownCloud:
             return
 
-    def _compute(self, path: str, request: Mapping[str, object], other: RegisteredCloud | None = None) -> Members:
-        """Asks for something about this cloud and perhaps another one.
+    def _compute(self, read: Callable[[Members], T], path: str, **fields: object) -> T:
+        """Asks for something about this cloud, and perhaps the surface of another one.
 
         Where the service has forgotten a cloud, both are posted again if their points are at hand, and the request is
         repeated once: the ids in it are still right.
         """
-        request = {"cloud": {"id": self.id}, **request}
+        sizes = {"n": self.n_points, "d": self.dimension}
+        request = {"cloud": {"id": self.id}, **normalise(fields, REQUEST, sizes)}
         try:
-            return self._connection.compute(path, request)
+            return self._connection.compute(path, request, read)
         except UnknownCloud:
-            if not self._post_again(self, other):
+            if not self._post_again(self, _cloud_of(fields.get("geometry"))):
                 raise
-        return self._connection.compute(path, request)
+        return self._connection.compute(path, request, read)
 
     def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
         """Posts those clouds whose points are at hand, and says whether there was one."""
@@ -85,14 +90,13 @@ class RegisteredCloud:
         return bool(posted)
 
 
+def _cloud_of(geometry: object) -> RegisteredCloud | None:
+    """Returns the cloud of a geometry, however it was given; None if it has none, or but its id."""
+    inner = geometry.get("cloud") if isinstance(geometry, Mapping) else getattr(geometry, "cloud", None)
+    return next((cloud for cloud in (geometry, inner) if isinstance(cloud, RegisteredCloud)), None)
+
+
 def register(connection: Connection, points: Array, normals: Array | None) -> models.Cloud:
     """Posts points, and says what the service knows of them."""
-    request = given(points=points, normals=normals)
-    return models.Cloud.from_dict(connection.post("/v1/clouds", request, accept=JSON).json())
-
-
-def own_copy(name: str, rows: npt.ArrayLike) -> Array:
-    """Returns a read-only copy of points: the caller may change theirs, and these must stay as their id says."""
-    array = as_rows(name, rows).copy()  # always: arrays of other libraries hand out their own buffer
-    array.flags.writeable = False
-    return array
+    fields = {"points": points} if normals is None else {"points": points, "normals": normals}
+    return connection.read(models.Cloud.from_dict, connection.post("/v1/clouds", fields, accept=JSON))

@@ -1,4 +1,4 @@
-"""Requests and answers as bytes: safetensors, or JSON where that package is absent.
+"""Requests and answers as bytes: safetensors, or JSON where that package is absent or a request has no arrays.
 
 In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`), and all
 other fields are JSON text in the metadata entry `request`; an answer has the entry `response`, and NaN where JSON has
@@ -42,17 +42,18 @@ def available_format() -> Format:
 def encode(request: Mapping[str, object], format: Format) -> tuple[bytes, str]:  # noqa: A002
     """Returns the body of a request, a JSON document with arrays in it, and its media type.
 
-    Raises:
-        ValueError: If a number outside of the arrays is not finite.
-        ModuleNotFoundError: If safetensors is asked for and not installed.
+    Raises
+    ------
+    ModuleNotFoundError
+        If safetensors is asked for and not installed.
     """
-    if format == "json":
-        return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
-    if save_safetensors is None:
+    if format == "safetensors" and save_safetensors is None:
         raise ModuleNotFoundError(
             "safetensors is not installed: pip install 'gramian[safetensors]'", name="safetensors"
         )
     tensors, fields = _split(request)
+    if format == "json" or save_safetensors is None or not tensors:  # safetensors 0.4.3 cannot write a file without
+        return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
     return save_safetensors(tensors, metadata={"request": json.dumps(fields, allow_nan=False)}), SAFETENSORS
 
 
@@ -83,6 +84,8 @@ class Members:
 
     tensors: Mapping[str, Array]
     fields: Mapping[str, Any]
+    request: Mapping[str, Any]
+    """What was asked."""
 
     @property
     def diagnostics(self) -> Diagnostics:
@@ -111,15 +114,15 @@ class Members:
         return self.array(name, *entry) if name in self.tensors or name in self.fields else None
 
 
-def decode(response: httpx.Response) -> Members:
-    """Reads an answer in the format that it announces; tensors are views of its bytes, nothing is copied."""
+def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
+    """Reads the answer to a request in the format that it announces; tensors are views of its bytes."""
     if not response.headers.get("Content-Type", "").startswith(SAFETENSORS):
-        return Members({}, response.json())
+        return Members({}, response.json(), request)
     body = response.content
     start = 8 + int.from_bytes(body[:8], "little")
     header = json.loads(body[8:start])
     fields = json.loads(header.pop("__metadata__")["response"])
-    return Members({name: _view(body, start, tensor) for name, tensor in header.items()}, fields)
+    return Members({name: _view(body, start, tensor) for name, tensor in header.items()}, fields, request)
 
 
 def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> Array:

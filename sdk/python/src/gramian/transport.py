@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from typing import Any
+from threading import TIMEOUT_MAX
+from typing import Any, TypeVar
 
 import httpx
 
-from .problems import TRY_LATER, problem_of
+from .problems import TRY_LATER, UNREADABLE, problem_of, unreadable
 from .tensors import JSON, SAFETENSORS, Format, Members, decode, encode
+
+T = TypeVar("T")
 
 BACKOFF_SECONDS = 0.1
 """The first wait where the service does not say how long; doubled from one attempt to the next."""
@@ -46,8 +50,9 @@ class RetryingClient(httpx.Client):
         """Takes the bounds, the function that waits, and the options of `httpx.Client`."""
         super().__init__(**options)
         self._retries = retries
-        self._max_wait = max_wait
+        self._max_wait = min(max_wait, TIMEOUT_MAX)  # nobody can sleep longer
         self._sleep = sleep
+        self._process = os.getpid()
 
     def __del__(self) -> None:
         # Five lines of a notebook close nothing. Without this, sockets would warn when they are collected.
@@ -56,6 +61,8 @@ class RetryingClient(httpx.Client):
 
     def send(self, request: httpx.Request, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.send)
         """Sends a request, again if need be."""
+        if os.getpid() != self._process:  # both would read from one socket, and get each other's answers
+            raise RuntimeError("a Client cannot be used after a fork: every process makes its own")
         request.read()  # a body that is read from a file can be sent once only
         waited = 0.0
         for attempt in range(self._retries):
@@ -107,14 +114,17 @@ class Connection:
     def send(self, method: str, path: str, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.request)
         """Sends a request.
 
-        Raises:
-            Problem: If the answer is a refusal, or the redirection of a proxy.
-            httpx.TransportError: If there is none.
+        Raises
+        ------
+        Problem
+            If the answer is a refusal, or the redirection of a proxy.
+        httpx.TransportError
+            If there is none.
         """
         try:
             response = self.http.request(method, path, **options)
         except httpx.TransportError as error:
-            error.add_note(f"There is no answer from {self.http.base_url}, see Client(base_url=…) or GRAMIAN_URL.")
+            error.add_note(_advice(error, self.http.base_url))
             raise
         if not response.is_success:
             raise problem_of(response, retry_after(response))
@@ -126,6 +136,38 @@ class Connection:
         accepted = accept or (JSON if self.format == "json" else SAFETENSORS)
         return self.send("POST", path, content=body, headers={"Content-Type": media_type, "Accept": accepted})
 
-    def compute(self, path: str, request: Mapping[str, object]) -> Members:
-        """Posts a request and reads its answer."""
-        return decode(self.post(path, request))
+    def read(self, parse: Callable[[Any], T], response: httpx.Response) -> T:
+        """Reads an answer in JSON.
+
+        Raises
+        ------
+        Problem
+            If it is none of this service.
+        """
+        return understood(response, lambda: parse(response.json()))
+
+    def compute(self, path: str, request: Mapping[str, object], read: Callable[[Members], T]) -> T:
+        """Posts a request and reads its answer.
+
+        Raises
+        ------
+        Problem
+            If the request is refused, or the answer none of this service.
+        """
+        response = self.post(path, request)
+        return understood(response, lambda: read(decode(response, request)))
+
+
+def understood(response: httpx.Response, read: Callable[[], T]) -> T:
+    """Returns what `read` makes of an answer; what it cannot read is a problem, such as the page of another service."""
+    try:
+        return read()
+    except UNREADABLE as error:
+        raise unreadable(response, error) from error
+
+
+def _advice(error: httpx.TransportError, url: httpx.URL) -> str:
+    """Says what to look at where there is no answer."""
+    if isinstance(error, httpx.ReadTimeout):
+        return f"{url} has not answered in time, see Client(timeout=…)."
+    return f"There is no answer from {url}, see Client(base_url=…) or GRAMIAN_URL."

@@ -1,18 +1,35 @@
 """Contains some shared types for properties"""
 
 from collections.abc import Mapping, MutableMapping
+from enum import Enum
 from http import HTTPStatus
-from typing import IO, BinaryIO, Generic, Literal, TypeVar
+from typing import IO, Any, BinaryIO, Generic, Literal, TypeVar
 
-from attrs import define
+from attrs import define, fields
 
 
 class Unset:
     def __bool__(self) -> Literal[False]:
         return False
 
+    def __repr__(self) -> str:
+        return "UNSET"
+
 
 UNSET: Unset = Unset()
+
+
+def without_unset(model: Any) -> str:
+    """Shows a model without the members that it does not have"""
+    members = {field.name: getattr(model, field.name) for field in fields(type(model))}
+    members.update(members.pop("additional_properties", {}))
+    shown = {
+        name: value.value if isinstance(value, Enum) else value
+        for name, value in members.items()
+        if not isinstance(value, Unset)
+    }
+    return f"{type(model).__name__}({', '.join(f'{name}={value!r}' for name, value in shown.items())})"
+
 
 # The types that `httpx.Client(files=)` can accept, copied from that library.
 FileContent = IO[bytes] | bytes | str
@@ -51,4 +68,4 @@ class Response(Generic[T]):
     parsed: T | None
 
 
-__all__ = ["UNSET", "File", "FileTypes", "RequestFiles", "Response", "Unset"]
+__all__ = ["UNSET", "File", "FileTypes", "RequestFiles", "Response", "Unset", "without_unset"]

@@ -5,7 +5,7 @@ from typing import Any, Self, TypeVar, cast
 
 from attrs import define as _attrs_define
 
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 T = TypeVar("T", bound="CloudRef")
 
@@ -25,6 +25,8 @@ class CloudRef:
     id: str | Unset = UNSET
     points: list[list[float]] | Unset = UNSET
     normals: list[list[float]] | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         id = self.id

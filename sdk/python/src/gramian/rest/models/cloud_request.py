@@ -5,7 +5,7 @@ from typing import Any, Self, TypeVar, cast
 
 from attrs import define as _attrs_define
 
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 T = TypeVar("T", bound="CloudRequest")
 
@@ -22,6 +22,8 @@ class CloudRequest:
 
     points: list[list[float]]
     normals: list[list[float]] | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         points = []

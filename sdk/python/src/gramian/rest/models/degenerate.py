@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.degenerate_reason import DegenerateReason
+from ..types import without_unset
 
 T = TypeVar("T", bound="Degenerate")
 
@@ -27,6 +28,8 @@ class Degenerate:
     reason: DegenerateReason
     gradient_norm: float
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         query = self.query

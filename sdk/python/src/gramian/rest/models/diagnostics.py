@@ -8,7 +8,7 @@ from attrs import field as _attrs_field
 
 from ..models.factorization_used import FactorizationUsed
 from ..models.solver_used import SolverUsed
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.kernel_used import KernelUsed
@@ -64,6 +64,8 @@ class Diagnostics:
     alpha: float | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         cloud_id = self.cloud_id

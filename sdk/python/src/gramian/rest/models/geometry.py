@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 
 from ..models.solver_choice import SolverChoice
 from ..models.surface_choice import SurfaceChoice
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
@@ -40,6 +40,8 @@ class Geometry:
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
     surface: SurfaceChoice | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         cloud: dict[str, Any] | Unset = UNSET

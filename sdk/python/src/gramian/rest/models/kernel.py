@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 
 from ..models.kernel_family import KernelFamily
 from ..models.smoothness import Smoothness
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 T = TypeVar("T", bound="Kernel")
 
@@ -34,6 +34,8 @@ class Kernel:
     epsilon: float | Unset = UNSET
     nu: float | Unset = UNSET
     smoothness: Smoothness | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         family = self.family.value

@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.kernel_family import KernelFamily
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.kernel_parameter import KernelParameter
@@ -37,6 +37,8 @@ class KernelDescription:
     differentiable_at_points: str
     max_dimension: int | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         family = self.family.value

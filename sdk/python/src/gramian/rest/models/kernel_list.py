@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..types import without_unset
+
 if TYPE_CHECKING:
     from ..models.kernel_description import KernelDescription
 
@@ -23,6 +25,8 @@ class KernelList:
 
     kernels: list[KernelDescription]
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         kernels = []

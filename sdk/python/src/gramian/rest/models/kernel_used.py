@@ -8,7 +8,7 @@ from attrs import field as _attrs_field
 
 from ..models.kernel_family import KernelFamily
 from ..models.smoothness import Smoothness
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 T = TypeVar("T", bound="KernelUsed")
 
@@ -33,6 +33,8 @@ class KernelUsed:
     nu: float | Unset = UNSET
     smoothness: Smoothness | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         family = self.family.value

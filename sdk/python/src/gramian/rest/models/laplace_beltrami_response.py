@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..types import without_unset
+
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
     from ..models.diagnostics import Diagnostics
@@ -30,6 +32,8 @@ class LaplaceBeltramiResponse:
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         values = []

@@ -9,7 +9,7 @@ from ..models.duplicate_policy import DuplicatePolicy
 from ..models.orientation_choice import OrientationChoice
 from ..models.solver_choice import SolverChoice
 from ..models.surface_choice import SurfaceChoice
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
@@ -48,6 +48,8 @@ class NormalsRequest:
     queries: list[list[float]] | Unset = UNSET
     surface: SurfaceChoice | Unset = UNSET
     orientation: OrientationChoice | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         cloud = self.cloud.to_dict()

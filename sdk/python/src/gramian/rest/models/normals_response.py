@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.surface_used import SurfaceUsed
+from ..types import without_unset
 
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
@@ -39,6 +40,8 @@ class NormalsResponse:
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         normals = []

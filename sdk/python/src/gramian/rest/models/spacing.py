@@ -6,6 +6,8 @@ from typing import Any, Self, TypeVar
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..types import without_unset
+
 T = TypeVar("T", bound="Spacing")
 
 
@@ -23,6 +25,8 @@ class Spacing:
     median: float
     max_: float
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         min_ = self.min_

@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
 from ..models.solver_choice import SolverChoice
-from ..types import UNSET, Unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
@@ -48,6 +48,8 @@ class SurfaceGradientMatrixRequest:
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         cloud = self.cloud.to_dict()

@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.warning_code import WarningCode
+from ..types import without_unset
 
 T = TypeVar("T", bound="Warning_")
 
@@ -23,6 +24,8 @@ class Warning_:
     code: WarningCode
     detail: str
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
         code = self.code.value

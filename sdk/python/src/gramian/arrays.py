@@ -1,0 +1,162 @@
+"""Arrays as they are sent: of one shape, in float64, finite, and with nothing changed in silence on the way there."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Iterator, Mapping, Sequence, Set, Sized
+from decimal import Decimal
+from numbers import Real
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from .tensors import Array
+
+Sizes: TypeAlias = Mapping[str, int]
+"""The lengths that are known when a request is made: n of the points, d of their coordinates."""
+
+AnyArray: TypeAlias = npt.NDArray[Any]
+
+ROWS = {"points": "points", "queries": "points", "normals": "normals"}
+"""What the rows of an array with two axes are."""
+
+KINDS = {"c": "complex numbers", "b": "truth values", "S": "bytes", "U": "text", "M": "dates", "m": "durations"}
+"""The kinds of NumPy that are not sent, in words."""
+
+REMEDIES = {
+    "c": "send {name}.real and {name}.imag, one after the other",
+    "b": "{name}.astype(float) makes 0 and 1 of them",
+    "V": "numpy.lib.recfunctions.structured_to_unstructured makes columns of its fields",
+}
+
+
+def as_array(name: str, value: object, axes: Sequence[str], sizes: Sizes) -> Array:
+    """Returns the numbers of an argument as they are sent, without a copy if they are so already.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for the messages.
+    value
+        Lists, tuples, buffers, arrays, and what NumPy makes arrays of, such as data frames.
+    axes
+        The names of the axes: `["n"]`, `["n", "d"]`.
+    sizes
+        The lengths of the axes, by name, as far as they are known.
+
+    Raises
+    ------
+    TypeError
+        If it holds something else than real numbers.
+    ValueError
+        If it has another shape, or a number that is masked, not finite or not exact in float64.
+    """
+    found = _read(name, value)
+    _check_shape(name, found, axes, sizes)
+    array = _in_float64(name, found)
+    _refuse_first(name, ~np.isfinite(array), array, "and only finite numbers can be sent")
+    return array
+
+
+def _read(name: str, value: object) -> AnyArray:
+    """Returns the array that NumPy sees, of real numbers, none of them masked."""
+    if isinstance(value, Mapping | Set | Iterator):
+        raise TypeError(f"{name} is to be an array, not a {type(value).__name__}; list(…) makes one of its entries")
+    array = _refuse_masked(name, value)
+    if array.dtype.kind == "O":
+        _refuse_objects(name, value, array)
+    if array.dtype.kind not in "fiu":
+        kind, dtype = KINDS.get(array.dtype.kind, "no plain numbers"), array.dtype
+        remedy = REMEDIES.get(dtype.kind, "only real numbers can be sent")
+        raise TypeError(f"{name} has {kind} ({dtype}); {remedy.format(name=name)}")
+    return array
+
+
+def _refuse_masked(name: str, value: object) -> AnyArray:
+    """Returns the array if nothing in it is masked: what lies under a mask is no number to compute with."""
+    rows = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
+    try:
+        array = np.ma.array(value) if rows else np.asanyarray(value)
+    except (OverflowError, RuntimeError, TypeError, ValueError) as error:
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"{name} cannot be read as an array: {_ragged(name, value) or error}") from error
+    if isinstance(array, np.ma.MaskedArray):
+        hint = f"and nothing can be sent for it; leave such rows out, or {name}.filled(…)"
+        _refuse_first(name, np.ma.getmaskarray(array), None, hint)
+    return np.asarray(array)
+
+
+def _ragged(name: str, value: object) -> str | None:
+    """Says which row has another length than the first, if one has."""
+    if not isinstance(value, list | tuple) or not all(isinstance(row, Sized) for row in value):
+        return None
+    lengths = [len(row) for row in value]
+    other = next((row for row, length in enumerate(lengths) if length != lengths[0]), None)
+    if other is None:
+        return None
+    return f"{name}[0] has the length {lengths[0]}, {name}[{other}] the length {lengths[other]}"
+
+
+def _refuse_objects(name: str, value: object, array: AnyArray) -> None:
+    if array.ndim == 0:
+        raise TypeError(f"{name} is to be an array of numbers, not of the type {type(value).__name__}")
+    for place, entry in np.ndenumerate(array):
+        if isinstance(entry, bool) or not isinstance(entry, Real | Decimal):
+            raise TypeError(
+                f"{name}{list(place)} is {reprlib.repr(entry)} ({type(entry).__name__}), and only numbers can be sent"
+            )
+    raise TypeError(f"{name} is an array of Python objects; np.asarray({name}, dtype=float) makes numbers of them")
+
+
+def _in_float64(name: str, array: AnyArray) -> Array:
+    """Widens floating-point numbers, rounds longer ones; integers that float64 does not have are refused."""
+    with np.errstate(over="ignore"):  # a long double out of range becomes infinite, and is refused as such
+        converted = np.asarray(array, dtype="<f8", order="C")
+    if array.dtype.kind in "iu" and array.dtype.itemsize > 4:
+        # Beyond the largest integer a cast back has no meaning: what rounded up to that is not exact for sure.
+        beyond = converted >= 2.0 ** (8 * array.dtype.itemsize - (array.dtype.kind == "i"))
+        back = np.where(beyond, 0, converted).astype(array.dtype)
+        _refuse_first(name, beyond | (back != array), array, "which float64 does not have: beyond 2**53 it has gaps")
+    return converted
+
+
+def _check_shape(name: str, array: AnyArray, axes: Sequence[str], sizes: Sizes) -> None:
+    """Refuses another number of axes, other lengths, and arrays without entries."""
+    wanted = [sizes.get(axis) for axis in axes]
+    fits = array.ndim == len(axes) and all(
+        want is None or want == length for want, length in zip(wanted, array.shape, strict=True)
+    )
+    if fits and array.size:
+        return
+    known = [str(axis if length is None else length) for axis, length in zip(axes, wanted, strict=True)]
+    shape = f"[{', '.join(axes)}]" + (f" = [{', '.join(known)}]" if known != list(axes) else "")
+    raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}{_advice(name, array, wanted)}")
+
+
+def _advice(name: str, array: AnyArray, wanted: Sequence[int | None]) -> str:
+    """Says what may have been meant."""
+    if array.size == 0:
+        return ": it is empty"
+    if len(wanted) == 1:
+        if array.ndim < 2:
+            one_for_all = "; one for all of them is alpha" if array.ndim == 0 and "noise" in name else ""
+            return f": one number for each point of the cloud{one_for_all}"
+        return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
+    rows = ROWS.get(name.rpartition(".")[2], "points")
+    if array.ndim == 1:
+        one = f"np.reshape({name}, (1, -1)) is one of {len(array)} coordinates"
+        line = f"np.reshape({name}, (-1, 1)) are {len(array)} on a line"
+        likely = {1: line, len(array): one}.get(wanted[1] or 0, f"{line}, {one}")
+        return f": rows are {rows}; {likely}"
+    length, d = wanted
+    transposed = array.ndim == 2 and d in (None, array.shape[0]) and length in (None, array.shape[1])
+    return f": rows are {rows}" + (f"; it looks transposed, send {name}.T" if transposed else "")
+
+
+def _refuse_first(name: str, bad: npt.NDArray[np.bool_], array: AnyArray | None, why: str) -> None:
+    """Refuses an array by the first of its bad entries."""
+    if bad.any():
+        place = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        what = "masked" if array is None else array[place]
+        raise ValueError(f"{name}{[int(i) for i in place] or ''} is {what}, {why}")

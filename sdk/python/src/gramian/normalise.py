@@ -1,0 +1,214 @@
+"""What callers may write, and what is sent for it: one function, and a rule for every field of every method.
+
+| a field | may be given as |
+|---|---|
+| nothing | None, or absent; the generated `UNSET` too |
+| a number | `int`, `float`, numbers and arrays without axes of NumPy and its like; fractions and decimals if exact |
+| an array | lists, tuples, buffers, NumPy arrays of any real type and layout, and what has `__array__`: data frames |
+| a word | a string, or a member of an enumeration |
+| words | a word, or several |
+| a kernel | a family, a mapping, `Kernel`, or as an answer or `Client.kernels()` says it: `diagnostics.kernel` |
+| a geometry | `Geometry`, a mapping, another `Cloud`, or as an answer says it: `diagnostics.geometry` |
+
+Numbers are sent as float64 and as they are: complex numbers, truth values, text, masked entries, NaN and infinity are
+refused by name and place, and so are integers that float64 does not have. What is a question of the mathematics, such
+as a negative length scale, is for the service to refuse.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+from .arrays import Sizes, as_array
+from .rest.models import (
+    Diagnostics,
+    DuplicatePolicy,
+    KernelDescription,
+    KernelFamily,
+    OrientationChoice,
+    PosteriorQuantity,
+    SolverChoice,
+    SolverUsed,
+    SurfaceChoice,
+)
+from .rest.models import Geometry as GeneratedGeometry
+from .rest.types import Unset
+from .scalars import as_number, as_whole, as_word, as_words, nearest, unwrapped
+
+Rule: TypeAlias = Callable[[str, object, Sizes], object]
+"""From a name, what was given under it, and the lengths that are known, to what is sent."""
+
+
+def normalise(
+    fields: Mapping[str, object], rules: Mapping[str, Rule], sizes: Sizes | None = None, path: str = ""
+) -> dict[str, object]:
+    """Returns fields as they are sent, without those that are absent.
+
+    Parameters
+    ----------
+    fields
+        What was given, by name.
+    rules
+        A rule for each field that there is: `REQUEST`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+    sizes
+        The lengths of the axes of arrays, by name, as far as they are known: n points, d coordinates.
+    path
+        What stands before the names in messages: `kernel.`
+
+    Raises
+    ------
+    TypeError
+        If a field is unknown, missing, or of a wrong type.
+    ValueError
+        If its value is none that can be sent.
+    """
+    for name in fields:
+        if name not in rules:
+            place, known = path.removesuffix(".") or "the request", ", ".join(map(repr, rules))
+            raise TypeError(f"{place} has no {name!r}, but {known}{nearest(name, rules)}")
+    _check_alpha(fields, path)
+    given = {name: value for name, value in fields.items() if not _is_absent(value)}
+    for name in fields:
+        if name in REQUIRED and name not in given:
+            raise TypeError(f"{path}{name} is missing")
+    return {name: rules[name](path + name, value, sizes or {}) for name, value in given.items()}
+
+
+def _is_absent(value: object) -> bool:
+    return value is None or isinstance(value, Unset)
+
+
+def _check_alpha(fields: Mapping[str, object], path: str) -> None:
+    """Refuses the absent alpha of diagnostics: sent as nothing it would be another one by default."""
+    if isinstance(fields.get("alpha"), Unset) and _is_absent(fields.get("noise_variances")):
+        raise ValueError(
+            f"{path}alpha is absent from these diagnostics, of a fit with noise_variances: send those, or **answer.fit"
+        )
+
+
+def array(*axes: str) -> Rule:
+    """The rule for arrays with these axes."""
+    return lambda name, value, sizes: as_array(name, value, axes, sizes)
+
+
+def number(name: str, value: object, sizes: Sizes) -> float:  # noqa: ARG001
+    """The rule for numbers."""
+    return as_number(name, value)
+
+
+def whole(name: str, value: object, sizes: Sizes) -> int:  # noqa: ARG001
+    """The rule for whole numbers."""
+    return as_whole(name, value)
+
+
+def word(*words: str) -> Rule:
+    """The rule for one of these words."""
+    known = list(dict.fromkeys(map(str, words)))
+    return lambda name, value, _: as_word(name, value, known)
+
+
+def words(*words: str) -> Rule:
+    """The rule for some of these words."""
+    known = list(map(str, words))
+    return lambda name, value, _: as_words(name, value, known)
+
+
+def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+    """The rule for kernels."""
+    value = unwrapped(name, value)
+    if isinstance(value, str | KernelDescription):
+        value = {"family": value if isinstance(value, str) else value.family}
+    later: Mapping[str, object] = {}
+    if not isinstance(value, Mapping):
+        if not hasattr(value, "family"):
+            kind = type(value).__name__
+            raise TypeError(f"{name} is to be a family such as 'gauss', a mapping, or a Kernel, not of the type {kind}")
+        later = getattr(value, "additional_properties", {})  # of a service that is newer than this client
+        value = {parameter: getattr(value, parameter, None) for parameter in KERNEL}
+    return {**normalise({"family": None, **value}, KERNEL, sizes, f"{name}."), **later}
+
+
+def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+    """The rule for the surface of an operator."""
+    if isinstance(value, Diagnostics):
+        value = {"cloud": value, "kernel": value.kernel, "alpha": value.alpha, "solver": value.solver}
+    elif isinstance(value, GeneratedGeometry):
+        # Its UNSET is what nobody has said, not what diagnostics lack.
+        value = {field: None if _is_absent(said := getattr(value, field)) else said for field in GEOMETRY}
+    elif hasattr(value, "surface"):
+        value = {field: getattr(value, field) for field in GEOMETRY}
+    elif not isinstance(value, Mapping):
+        value = {"cloud": value}
+    if not _is_absent(value.get("cloud")):
+        n, d = getattr(value["cloud"], "n_points", None), sizes.get("d")
+        sizes = {axis: length for axis, length in {"n": n, "d": d}.items() if length is not None}
+    return normalise(value, GEOMETRY, sizes, f"{name}.")
+
+
+def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa: ARG001
+    """The rule for another cloud: its id."""
+    found = value.get("id") if isinstance(value, Mapping) else value
+    for attribute in ["id", "cloud_id"]:  # of a Cloud; of what answers say
+        found = getattr(found, attribute, found)
+    if not isinstance(found, str):
+        kind = type(value).__name__
+        raise TypeError(f"{name} is to be a Cloud, as Client.cloud(points) returns, not of the type {kind}")
+    if not re.fullmatch("[0-9a-f]{64}", found):
+        raise ValueError(f"{name} is {found!r}, and ids of clouds are 64 hexadecimal digits")
+    return {"id": str(found)}
+
+
+def duration(name: str, value: object, sizes: Sizes) -> float:
+    """The rule for seconds; they may be infinite."""
+    seconds = math.inf if isinstance(value, float) and value == math.inf else number(name, value, sizes)
+    if seconds < 0:
+        raise ValueError(f"{name} is {seconds}, and times are not negative")
+    return seconds
+
+
+REQUIRED = frozenset({"points", "values", "family"})
+"""The fields that cannot be absent."""
+
+KERNEL: Mapping[str, Rule] = {
+    "family": word(*KernelFamily),
+    "length_scale": number,
+    "variance": number,
+    "epsilon": number,
+    "nu": number,
+    "smoothness": whole,
+}
+
+FIT: Mapping[str, Rule] = {
+    "kernel": kernel,
+    "alpha": number,
+    "noise_variances": array("n"),
+    # What an answer says of its solver can be sent, and is refused by the service if that has no such choice.
+    "solver": word(*SolverChoice, *SolverUsed),
+}
+
+GEOMETRY: Mapping[str, Rule] = {**FIT, "cloud": cloud, "surface": word(*SurfaceChoice)}
+
+REQUEST: Mapping[str, Rule] = {
+    **FIT,
+    "duplicates": word(*DuplicatePolicy),
+    "points": array("n", "d"),
+    "normals": array("n", "d"),
+    "values": array("n"),
+    "queries": array("m", "d"),
+    "derivatives": whole,
+    "include": words(*PosteriorQuantity),
+    "surface": word(*SurfaceChoice),
+    "orientation": word(*OrientationChoice),
+    "geometry": geometry,
+}
+
+CLIENT: Mapping[str, Rule] = {
+    "timeout": duration,
+    "retries": whole,
+    "max_wait": duration,
+    "format": word("safetensors", "json"),
+    "page_size": whole,
+}

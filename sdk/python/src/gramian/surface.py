@@ -1,0 +1,143 @@
+"""What can be asked about the surface that the points of a cloud sample."""
+
+from __future__ import annotations
+
+import numpy.typing as npt
+
+from .answers import Curvatures, Normals
+from .fit import Duplicates, KernelLike, Number, Orientation, Solver, Surface
+from .keywords import suggest_names
+from .registration import RegisteredCloud
+
+
+@suggest_names
+class SurfaceOfCloud(RegisteredCloud):
+    """The part of `Cloud` that concerns the surface that its points sample."""
+
+    def normals(
+        self,
+        queries: npt.ArrayLike | None = None,
+        *,
+        surface: Surface | None = None,
+        orientation: Orientation | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> Normals:
+        """Computes unit normals ν = −∇u/|∇u| of the surface that the points sample; no mesh is needed.
+
+        Parameters
+        ----------
+        queries : array_like, `[m, d]`, optional
+            Where normals are wanted, a row of coordinates each; the points if absent.
+        surface : str, optional
+            `"signature"` or `"offset"` to forbid the other function; `"auto"` if absent.
+        orientation : str, optional
+            `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix, without unit; if absent, 1e-10 with a kernel given, else chosen by
+            the noise of the points, 1e-3 at least.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, instead of `alpha`.
+        solver : str, optional
+            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Normals
+            `normals` at the queries, NaN where there is none; `degenerate` says why.
+
+        Examples
+        --------
+        >>> angles = np.arange(8) * np.pi / 4
+        >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> answer = circle.normals([[0.8, 0.6], [0, 0]], kernel={"family": "gauss", "length_scale": 2})
+        >>> answer.normals.round(3)
+        array([[0.8, 0.6],
+               [nan, nan]])
+        >>> [(entry.query, entry.reason.value) for entry in answer.degenerate]
+        [(1, 'vanishing_gradient')]
+        """
+        return self._compute(
+            Normals.read,
+            "/v1/normals",
+            queries=queries,
+            surface=surface,
+            orientation=orientation,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )
+
+    def curvatures(
+        self,
+        queries: npt.ArrayLike | None = None,
+        *,
+        surface: Surface | None = None,
+        orientation: Orientation | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> Curvatures:
+        """Computes principal, mean and Gaussian curvatures of the surface that the points sample; no mesh is needed.
+
+        With outward normals a sphere of radius r has the curvatures +1/r.
+
+        Parameters
+        ----------
+        queries : array_like, `[m, d]`, optional
+            Where curvatures are wanted, a row of coordinates each; the points if absent.
+        surface : str, optional
+            `"signature"` or `"offset"` to forbid the other function; `"auto"` if absent.
+        orientation : str, optional
+            `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix, without unit; if absent, 1e-10 with a kernel given, else chosen by
+            the noise of the points, 1e-3 at least.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, instead of `alpha`.
+        solver : str, optional
+            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Curvatures
+            `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN where there
+            are none; `degenerate` says why.
+
+        Examples
+        --------
+        >>> angles = np.arange(64) * np.pi / 32
+        >>> circle = gramian.Client().cloud(5 * np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> circle.curvatures([[5, 0], [0, 5]]).principal_curvatures.round(2)
+        array([[0.2],
+               [0.2]])
+        """
+        return self._compute(
+            Curvatures.read,
+            "/v1/curvatures",
+            queries=queries,
+            surface=surface,
+            orientation=orientation,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )

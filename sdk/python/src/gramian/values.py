@@ -1,0 +1,145 @@
+"""What can be asked about values at the points of a cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy.typing as npt
+
+from .answers import Interpolation, Posterior
+from .fit import Duplicates, KernelLike, Number, Quantity, Solver, Whole
+from .keywords import suggest_names
+from .registration import RegisteredCloud
+
+
+@suggest_names
+class ValuesOfCloud(RegisteredCloud):
+    """The part of `Cloud` that concerns values at its points; V is their unit."""
+
+    def interpolate(
+        self,
+        values: npt.ArrayLike,
+        queries: npt.ArrayLike | None = None,
+        *,
+        derivatives: Whole | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> Interpolation:
+        """Fits `u = Σ λ_j k(·, x_j)` to values, (K + αI)Λ = Y, and evaluates it.
+
+        At `alpha=0` it takes the values at the points exactly.
+
+        Parameters
+        ----------
+        values : array_like, `[n]`
+            At the points, in their order, unit V.
+        queries : array_like, `[m, d]`, optional
+            Where u is wanted, a row of coordinates each; the points if absent.
+        derivatives : 0, 1 or 2, optional
+            1 for gradients, 2 for Hessians as well; 0 if absent.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 if
+            absent.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, V², instead of `alpha`.
+        solver : str, optional
+            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Interpolation
+            `values` of u at the queries, and `gradients` and `hessians` where asked for.
+
+        Examples
+        --------
+        >>> angles = np.arange(8) * np.pi / 4
+        >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> answer = circle.interpolate(np.cos(angles), [[0.8, 0.6]], derivatives=1)
+        >>> answer.values.round(3), answer.gradients.shape
+        (array([0.8]), (1, 2))
+        >>> again = circle.interpolate(np.cos(angles), [[0.8, 0.6]], **answer.fit)  # with the kernel chosen
+        >>> np.array_equal(again.values, answer.values)
+        True
+        """
+        return self._compute(
+            Interpolation.read,
+            "/v1/interpolation",
+            values=values,
+            queries=queries,
+            derivatives=derivatives,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )
+
+    def posterior(
+        self,
+        values: npt.ArrayLike,
+        queries: npt.ArrayLike | None = None,
+        *,
+        include: Quantity | Iterable[Quantity] | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> Posterior:
+        """Computes the posterior of a Gaussian process with the kernel as covariance and noise of variance `alpha`.
+
+        Parameters
+        ----------
+        values : array_like, `[n]`
+            At the points, in their order, unit V.
+        queries : array_like, `[m, d]`, optional
+            Where the posterior is wanted, a row of coordinates each; the points if absent.
+        include : str or several, optional
+            What is wanted beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
+            `"log_marginal_likelihood"`; nothing if absent.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 if
+            absent.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, V², instead of `alpha`.
+        solver : str, optional
+            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        Posterior
+            `means` at the queries, and what `include` asks for.
+
+        Examples
+        --------
+        >>> line = gramian.Client().cloud([[0], [1], [2], [3]])
+        >>> kernel = gramian.Kernel("gauss", length_scale=1)
+        >>> answer = line.posterior([0, 1, 0, 1], [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
+        >>> answer.means.round(2) + 0.0, answer.variances.round(2)
+        (array([0.98, 0.  ]), array([0.01, 1.  ]))
+        """
+        return self._compute(
+            Posterior.read,
+            "/v1/posterior",
+            values=values,
+            queries=queries,
+            include=include,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )

@@ -1,0 +1,167 @@
+"""Answers: what they say can be sent back, and they show themselves readably."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import os
+import pickle
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from sent import CIRCLE, METHODS, OPERATORS, VALUES
+
+import gramian
+from gramian import Geometry, Kernel
+from gramian.answers import Answer
+from gramian.rest.types import Unset
+
+every_method = pytest.mark.parametrize("method", METHODS)
+every_operator = pytest.mark.parametrize("method", OPERATORS)
+
+NOISE = np.linspace(0.01, 0.02, 8)
+QUERIES = [[1.0, 0.0], [0.6, 0.8]]
+
+# With all that a fit may have; the service chooses what is absent.
+FITS: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "word": {"kernel": "gauss"},
+    "kernel": {"kernel": Kernel("matern", nu=3.5), "alpha": 1e-6},
+    "wendland": {"kernel": {"family": "wendland", "smoothness": 6, "length_scale": 3}, "alpha": np.float32(0.25)},
+    "interpolation": {"kernel": Kernel("inverse_multiquadric", length_scale=0.5), "alpha": 0, "solver": "dense"},
+    "merged": {"kernel": "gauss", "alpha": 0, "duplicates": "merge"},
+    "noise": {"kernel": "gauss", "noise_variances": NOISE},
+    "noise alone": {"noise_variances": NOISE},
+}
+GEOMETRIES: dict[str, dict[str, Any]] = {
+    "kernel": {"kernel": Kernel("gauss", length_scale=2)},
+    "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface": "signature"},
+    "noise": {"noise_variances": NOISE},
+}
+
+
+@pytest.fixture(scope="module")
+def cloud() -> Any:
+    return gramian.Client().cloud(CIRCLE)
+
+
+def ask(cloud: Any, method: str, **arguments: object) -> Any:
+    return getattr(cloud, method)(**{**METHODS[method], "queries": QUERIES, **arguments})
+
+
+def assert_same(answer: Answer, other: Answer) -> None:
+    for field in dataclasses.fields(answer):  # type: ignore[arg-type]
+        value, again = getattr(answer, field.name), getattr(other, field.name)
+        if isinstance(value, np.ndarray):
+            np.testing.assert_array_equal(value, again, err_msg=field.name)
+    assert repr(answer) == repr(other)
+    assert repr(answer.fit) == repr(other.fit)  # type: ignore[attr-defined]
+
+
+@every_method
+@pytest.mark.parametrize("fit", FITS.values(), ids=FITS.keys())
+def test_the_fit_of_an_answer_repeats_it(cloud: Any, method: str, fit: dict[str, Any]) -> None:
+    points = CIRCLE
+    if "duplicates" in fit:
+        points = np.vstack([CIRCLE[:-1], CIRCLE[:1]])
+        cloud = gramian.Client().cloud(points)
+    answer = ask(cloud, method, **fit)
+    assert_same(answer, ask(cloud, method, **answer.fit))
+    assert_same(answer, ask(cloud, method, **pickle.loads(pickle.dumps(answer)).fit))
+    assert_same(answer, ask(cloud, method, **copy.deepcopy(answer).fit))
+
+
+@every_operator
+@pytest.mark.parametrize("geometry", GEOMETRIES.values(), ids=GEOMETRIES.keys())
+@pytest.mark.parametrize("fit", [{}, FITS["noise"], FITS["kernel"]], ids=["nothing", "noise", "kernel"])
+def test_so_it_does_with_a_geometry(cloud: Any, method: str, fit: dict[str, Any], geometry: dict[str, Any]) -> None:
+    answer = ask(cloud, method, **fit, geometry=geometry)
+    assert_same(answer, ask(cloud, method, **fit, geometry=Geometry(**geometry)))
+    assert_same(answer, ask(cloud, method, **answer.fit))
+
+
+@every_operator
+def test_so_it_does_with_a_geometry_of_another_cloud(cloud: Any, method: str) -> None:
+    other = gramian.Client().cloud(1.5 * CIRCLE[:7])
+    for geometry in [other, Geometry(cloud=other, kernel="gauss", noise_variances=NOISE[:7])]:
+        answer = ask(cloud, method, geometry=geometry)
+        assert answer.diagnostics.geometry.cloud_id == other.id
+        again = pickle.loads(pickle.dumps(answer.fit))
+        assert_same(answer, ask(cloud, method, **again))
+
+
+@every_operator
+@pytest.mark.parametrize("as_mapping", [False, True])
+def test_a_forgotten_cloud_of_a_geometry_is_posted_again(cloud: Any, method: str, as_mapping: bool) -> None:
+    other = gramian.Client().cloud(1.75 * CIRCLE)
+    httpx.delete(f"{os.environ['GRAMIAN_URL']}/v1/clouds/{other.id}").raise_for_status()
+    ask(cloud, method, geometry={"cloud": other} if as_mapping else other)
+
+
+@every_method
+def test_the_diagnostics_of_an_answer_can_be_sent_back(cloud: Any, method: str) -> None:
+    answer = ask(cloud, method, kernel="matern", alpha=1e-4)
+    said = answer.diagnostics
+    geometry = {"geometry": said.geometry} if method in OPERATORS else {}
+    again = ask(cloud, method, kernel=said.kernel, alpha=said.alpha, solver=said.solver, **geometry)
+    assert again.diagnostics.to_dict() == said.to_dict()
+
+
+@every_operator
+def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: str) -> None:
+    said = ask(cloud, method, noise_variances=NOISE).diagnostics
+    with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
+        ask(cloud, method, geometry=said.geometry)
+    for geometry in [Geometry(alpha=said.geometry.alpha), {"alpha": said.geometry.alpha}]:
+        with pytest.raises(ValueError, match=r"^geometry.alpha is absent from these diagnostics"):
+            ask(cloud, method, geometry=geometry)
+    with pytest.raises(ValueError, match=r"^alpha is absent from these diagnostics"):
+        ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
+
+
+def test_the_noise_of_a_fit_stays_what_was_sent(cloud: Any) -> None:
+    noise = NOISE.copy()
+    answer = cloud.posterior(VALUES, noise_variances=noise, include="variance")
+    noise[:] = 7
+    np.testing.assert_array_equal(answer.fit["noise_variances"], NOISE)
+
+
+def test_the_families_that_the_service_lists_can_be_sent(cloud: Any) -> None:
+    for described in gramian.Client().kernels():
+        for kernel in [described, described.family, described.family.value]:
+            answer = cloud.interpolate(VALUES, kernel=kernel)
+            assert answer.diagnostics.kernel.family is described.family
+
+
+@every_method
+@pytest.mark.parametrize("fit", [{}, {"noise_variances": NOISE}], ids=["alpha", "noise"])
+def test_an_answer_shows_arrays_by_shape_and_nothing_that_is_absent(
+    cloud: Any, method: str, fit: dict[str, Any]
+) -> None:
+    shown = repr(ask(cloud, method, **fit, queries=None))
+    assert "unset" not in shown.lower()
+    assert "None" not in shown
+    assert "<" not in shown
+    assert "=array[" in shown
+    assert len(shown) < 3000
+
+
+def test_representations_are_as_one_writes_them(cloud: Any) -> None:
+    answer = cloud.interpolate(VALUES, QUERIES, kernel="gauss", alpha=0.5)
+    assert repr(answer).startswith("Interpolation(values=array[2], diagnostics=Diagnostics(cloud_id=")
+    kernel = answer.diagnostics.kernel
+    assert repr(kernel) == f"KernelUsed(family='gauss', length_scale={kernel.length_scale}, variance=1.0)"
+    assert eval(repr(Kernel("gauss", length_scale=2)), {"Kernel": Kernel}) == Kernel("gauss", length_scale=2)
+    assert repr(Geometry(cloud=cloud, kernel=Kernel("wendland", smoothness=4), noise_variances=NOISE)) == (
+        f"Geometry(cloud=Cloud(id='{cloud.id[:8]}…', n_points=8, dimension=2), "
+        "kernel=Kernel(family='wendland', smoothness=4), noise_variances=array[8])"
+    )
+    assert repr(gramian.rest.models.Kernel(family=gramian.KernelFamily.GAUSS)) == "Kernel(family='gauss')"
+    for said in [*gramian.Client().kernels(), cloud.description, gramian.Client().version(), gramian.Client()]:
+        assert "unset" not in repr(said).lower()
+    with pytest.raises(gramian.Problem) as caught:
+        cloud.normals(alpha=-1)
+    assert "unset" not in repr(caught.value).lower()
+    assert repr(Unset()) == "UNSET"  # where somebody asks for it

@@ -1,0 +1,658 @@
+"""What callers may write: for every field of every method, all forms that are accepted, and what is refused by name."""
+
+from __future__ import annotations
+
+import array
+import enum
+import inspect
+from collections import ChainMap
+from decimal import Decimal
+from fractions import Fraction
+from types import MappingProxyType
+from typing import Any, SupportsFloat
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from sent import CIRCLE, METHODS, OPERATORS, VALUES, client, cloud, posted, sent
+
+import gramian
+from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
+from gramian.rest import models
+from gramian.rest.types import UNSET
+
+every_method = pytest.mark.parametrize("method", METHODS)
+every_operator = pytest.mark.parametrize("method", OPERATORS)
+
+
+class Foreign:
+    """An array of another library."""
+
+    def __init__(self, numbers: object) -> None:
+        self.numbers = np.asarray(numbers)
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray[Any, Any]:
+        return self.numbers
+
+
+class Broken:
+    """An array that another library does not give away."""
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        raise RuntimeError("detach it first")
+
+
+# Numbers
+
+HALVES = [
+    0.5,
+    np.float16(0.5),
+    np.float32(0.5),
+    np.float64(0.5),
+    np.longdouble(0.5),
+    np.array(0.5),
+    np.array(0.5, dtype=np.float32),
+    np.ma.array(0.5),
+    Fraction(1, 2),
+    Decimal("0.5"),
+    Foreign(0.5),
+]
+TWOS = [
+    2,
+    2.0,
+    np.int64(2),
+    np.uint8(2),
+    np.float32(2),
+    np.array(2),
+    np.array(2.0),
+    Fraction(2),
+    Decimal(2),
+    Foreign(2),
+]
+
+
+@every_method
+@pytest.mark.parametrize("half", HALVES, ids=repr)
+def test_numbers_of_all_kinds_are_numbers(method: str, half: object) -> None:
+    body = sent(method, alpha=half, kernel={"family": "matern", "length_scale": half, "variance": half, "nu": half})
+    assert body["alpha"] == 0.5
+    assert body["kernel"] == {"family": "matern", "length_scale": 0.5, "variance": 0.5, "nu": 0.5}
+    kernel = Kernel("laplace", epsilon=half)  # type: ignore[arg-type]
+    assert sent(method, kernel=kernel)["kernel"] == {"family": "laplace", "epsilon": 0.5}
+
+
+@every_operator
+@pytest.mark.parametrize("half", HALVES, ids=repr)
+def test_so_they_are_in_a_geometry(method: str, half: SupportsFloat) -> None:
+    kernel = Kernel("gauss", length_scale=half)
+    body = sent(method, geometry=Geometry(alpha=half, kernel=kernel))
+    assert body["geometry"] == {"alpha": 0.5, "kernel": {"family": "gauss", "length_scale": 0.5}}
+    assert body == sent(method, geometry={"alpha": half, "kernel": kernel})
+
+
+@every_method
+@pytest.mark.parametrize("two", TWOS, ids=repr)
+def test_whole_numbers_of_all_kinds_are_whole_numbers(method: str, two: object) -> None:
+    smoothness = sent(method, kernel={"family": "wendland", "smoothness": two})["kernel"]["smoothness"]
+    assert (smoothness, type(smoothness)) == (2, int)
+    derivatives = sent("interpolate", derivatives=two)["derivatives"]
+    assert (derivatives, type(derivatives)) == (2, int)
+
+
+def test_numbers_widen_exactly() -> None:
+    third = np.float32(1 / 3)
+    assert sent("normals", alpha=third)["alpha"] == float(third)
+    assert sent("interpolate", values=np.full(8, third))["values"] == [float(third)] * 8
+    assert sent("interpolate", values=np.full(8, np.float16(0.1)))["values"] == [float(np.float16(0.1))] * 8
+    assert sent("normals", alpha=np.longdouble("0.1"))["alpha"] == 0.1  # rounded as a literal is
+    assert sent("normals", alpha=10**20)["alpha"] == 1e20
+
+
+@every_method
+@pytest.mark.parametrize(
+    ("alpha", "kind", "message"),
+    [
+        (float("nan"), ValueError, "alpha is nan"),
+        (np.float32("inf"), ValueError, "alpha is inf"),
+        (Decimal("-Infinity"), ValueError, "alpha is -Infinity"),
+        (Decimal("sNaN"), ValueError, "alpha is no finite number"),
+        (10**400, ValueError, "alpha is no finite number"),
+        (np.ma.masked, ValueError, "alpha is masked"),
+        (np.ma.array(1.0, mask=True), ValueError, "alpha is masked"),
+        (2**53 + 1, ValueError, "alpha is 9007199254740993, which float64 has not exactly"),
+        (np.int64(2**53 + 1), ValueError, "alpha is 9007199254740993, which float64 has not exactly"),
+        (Fraction(1, 3), ValueError, r"alpha is Fraction\(1, 3\), which float64 has not exactly; float\(…\) rounds it"),
+        (Decimal("0.1"), ValueError, r"alpha is Decimal\('0.1'\), which float64 has not exactly"),
+        (True, TypeError, "alpha is to be a number, not True"),
+        (np.bool_(True), TypeError, "alpha is to be a number, not (np.)?True_?"),
+        (1j, TypeError, "alpha is to be a number, not 1j"),
+        (np.complex128(1), TypeError, "alpha is to be a number, not (np.complex128)?\\("),
+        ("0.5", TypeError, "alpha is to be a number, not '0.5'"),
+        ([0.5], TypeError, "alpha is to be a number, not of the type list"),
+        (np.array([0.5]), TypeError, r"alpha is to be a number, not an array of the shape \[1\]"),
+        ({}, TypeError, "alpha is to be a number, not of the type dict"),
+    ],
+    ids=repr,
+)
+def test_other_things_than_numbers_are_refused_by_name(
+    method: str, alpha: object, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=rf"^{message}"):
+        getattr(cloud(), method)(**METHODS[method], alpha=alpha)
+    for parameter in ["length_scale", "variance", "epsilon", "nu"]:
+        nested = message.replace("alpha", f"kernel.{parameter}")
+        with pytest.raises(kind, match=rf"^{nested}"):
+            getattr(cloud(), method)(**METHODS[method], kernel={"family": "gauss", parameter: alpha})
+        with pytest.raises(kind, match=rf"^{nested}"):
+            Kernel("gauss", **{parameter: alpha})  # type: ignore[arg-type]
+    if method in OPERATORS:
+        nested = message.replace("alpha", "geometry.alpha")
+        with pytest.raises(kind, match=rf"^{nested}"):
+            getattr(cloud(), method)(**METHODS[method], geometry=Geometry(alpha=alpha))  # type: ignore[arg-type]
+        nested = message.replace("alpha", "geometry.kernel.nu")
+        with pytest.raises(kind, match=rf"^{nested}"):
+            getattr(cloud(), method)(**METHODS[method], geometry={"kernel": {"family": "matern", "nu": alpha}})
+
+
+def test_a_fraction_is_no_whole_number() -> None:
+    with pytest.raises(ValueError, match=r"^derivatives is to be a whole number, not 1.5$"):
+        sent("interpolate", derivatives=1.5)
+    with pytest.raises(ValueError, match=r"^kernel.smoothness is to be a whole number, not 2.5$"):
+        Kernel("wendland", smoothness=2.5)  # type: ignore[arg-type]
+
+
+# Arrays
+
+LAYOUTS: dict[str, Any] = {
+    "list": [0.0, 1, 2, 3, 4, 5, 6, 7],
+    "tuple": (0, 1, 2, 3, 4, 5, 6, 7),
+    "range": range(8),
+    "list of numbers of NumPy": [np.float32(i) for i in range(8)],
+    "list of arrays without axes": [np.array(i) for i in range(8)],
+    **{dtype: np.arange(8).astype(dtype) for dtype in ["f2", "f4", "f8", "g", ">f8", ">i4", "i1", "u1", "i8", "u8"]},
+    "strided": np.arange(0, 8, 0.5)[::2],
+    "reversed": np.arange(8.0)[::-1][::-1],
+    "read-only": np.frombuffer(np.arange(8.0).tobytes()),
+    "nothing masked": np.ma.array(VALUES, mask=False),
+    "buffer": array.array("d", range(8)),
+    "memoryview": memoryview(array.array("f", range(8))),
+    "another library": Foreign(np.arange(8)),
+}
+
+
+@pytest.mark.parametrize("values", LAYOUTS.values(), ids=LAYOUTS.keys())
+@every_method
+def test_arrays_of_all_kinds_are_arrays(method: str, values: npt.ArrayLike) -> None:
+    assert sent(method, noise_variances=values)["noise_variances"] == VALUES.tolist()
+    if "values" in METHODS[method]:
+        assert sent(method, values=values)["values"] == VALUES.tolist()
+    if method in OPERATORS:
+        body = sent(method, geometry=Geometry(noise_variances=values))
+        assert body["geometry"] == {"noise_variances": VALUES.tolist()}
+
+
+ROWS: dict[str, Any] = {
+    "lists": CIRCLE.tolist(),
+    "tuples": tuple(map(tuple, CIRCLE)),
+    "list of arrays": list(CIRCLE),
+    "list of masked arrays": [np.ma.array(row) for row in CIRCLE],
+    "columns first": np.asfortranarray(CIRCLE),
+    "transposed": CIRCLE.T.copy().T,
+    "big-endian": CIRCLE.astype(">f8"),
+    "matrix": np.ma.array(CIRCLE),
+    "memoryview": CIRCLE.data,
+    "another library": Foreign(CIRCLE),
+}
+
+
+@pytest.mark.parametrize("rows", ROWS.values(), ids=ROWS.keys())
+def test_rows_of_all_kinds_are_points(rows: object) -> None:
+    assert posted(rows, rows) == {"points": CIRCLE.tolist(), "normals": CIRCLE.tolist()}
+    for method in METHODS:
+        assert sent(method, queries=rows)["queries"] == CIRCLE.tolist()
+
+
+def test_data_frames_are_arrays() -> None:
+    # What they are here: columns of one type are an array of it, those of several an array of objects.
+    table = np.column_stack([CIRCLE, VALUES]).astype(object)
+    table[:, 2] = list("abcdefgh")
+    assert posted(Foreign(CIRCLE)) == {"points": CIRCLE.tolist()}
+    with pytest.raises(
+        ValueError, match=r"^values must have the shape \[n\] = \[8\], not \[8, 1\]; np.ravel\(values\)"
+    ):
+        sent("interpolate", values=Foreign(VALUES[:, None]))
+    with pytest.raises(TypeError, match=r"^points\[0, 2\] is 'a' \(str\), and only numbers can be sent"):
+        posted(Foreign(table))
+    with pytest.raises(ValueError, match=r"^points\[5, 1\] is nan"):
+        posted(Foreign(with_entry(np.nan)))
+
+
+def with_entry(entry: object, dtype: npt.DTypeLike | None = None) -> npt.NDArray[Any]:
+    numbers: npt.NDArray[Any] = CIRCLE.astype(dtype or type(entry))
+    numbers[5, 1] = entry
+    return numbers
+
+
+BAD_ROWS: dict[str, tuple[Any, type[Exception], str]] = {
+    "nan": (with_entry(np.nan), ValueError, r"{}\[5, 1\] is nan, and only finite numbers can be sent$"),
+    "nan in a list": (with_entry(np.nan).tolist(), ValueError, r"{}\[5, 1\] is nan"),
+    "nan in float32": (with_entry(np.nan, "f4"), ValueError, r"{}\[5, 1\] is nan"),
+    "infinity": (with_entry(np.inf), ValueError, r"{}\[5, 1\] is inf"),
+    "-infinity": (with_entry(-np.inf), ValueError, r"{}\[5, 1\] is -inf"),
+    "too long": (with_entry(np.longdouble("1e400"), "g"), ValueError, r"{}\[5, 1\] is inf"),
+    "masked": (np.ma.masked_equal(with_entry(7.0), 7.0), ValueError, r"{}\[5, 1\] is masked"),
+    "masked row": (list(np.ma.masked_equal(with_entry(7.0), 7.0)), ValueError, r"{}\[5, 1\] is masked"),
+    "complex": (CIRCLE + 0j, TypeError, r"{0} has complex numbers \(complex128\); send {0}.real and {0}.imag"),
+    "complex list": ([[1, 2j]] * 8, TypeError, r"{0} has complex numbers"),
+    "truth": (CIRCLE > 0, TypeError, r"{0} has truth values \(bool\); {0}.astype\(float\) makes 0 and 1"),
+    "text": (CIRCLE.astype(str), TypeError, r"{} has text"),
+    "text list": ([["1", "2"]] * 8, TypeError, r"{} has text"),
+    "bytes": (CIRCLE.astype("S8"), TypeError, r"{} has bytes"),
+    "dates": (np.zeros((8, 2), dtype="M8[s]"), TypeError, r"{} has dates"),
+    "fields": (np.zeros(8, dtype="f8,f8"), TypeError, r"{} has no plain numbers .*structured_to_unstructured"),
+    "objects": (CIRCLE.astype(object), TypeError, r"{0} is an array of Python objects; np.asarray\({0}, dtype=float\)"),
+    "decimals": ([[Decimal(1), Decimal(2)]] * 8, TypeError, r"{0} is an array of Python objects; np.asarray\({0}, "),
+    "nothing": (with_entry(None, object), TypeError, r"{}\[5, 1\] is None \(NoneType\), and only numbers can be sent"),
+    "an object": (with_entry("a", object), TypeError, r"{}\[5, 1\] is 'a' \(str\)"),
+    "big": (with_entry(2**53 + 1, "i8"), ValueError, r"{}\[5, 1\] is 9007199254740993, which float64 does not have"),
+    "negative": (with_entry(-(2**53) - 1, "i8"), ValueError, r"{}\[5, 1\] is -9007199254740993"),
+    "biggest": (with_entry(2**63 - 1, "i8"), ValueError, r"{}\[5, 1\] is 9223372036854775807"),
+    "unsigned": (np.full((8, 2), 2**64 - 1, "u8"), ValueError, r"{}\[0, 0\] is 18446744073709551615"),
+    "ragged": (
+        [[1, 2], [3], [4, 5]],
+        ValueError,
+        r"{0} cannot be read.*: {0}\[0\] has the length 2, {0}\[1\] the length 1",
+    ),
+    "masked entry": ([*CIRCLE[:5], np.ma.array([1, 2], mask=[False, True])], ValueError, r"{}\[5, 1\] is masked"),
+    "masked alone": (np.ma.masked, ValueError, r"{} is masked, and nothing can be sent for it"),
+    "too large": ([[1.0, 10**400]] * 8, TypeError, r"{} is an array of Python objects; "),
+    "broken": (Broken(), ValueError, r"{} cannot be read as an array: detach it first$"),
+    "nested": ([[1, 2], 3], ValueError, r"{} cannot be read as an array: "),
+    "dictionary": ({"x": [1]}, TypeError, r"{} is to be an array, not a dict; list\(…\)"),
+    "iterator": (zip([1], [2], strict=True), TypeError, r"{} is to be an array, not a zip; list\(…\)"),
+    "set": ({1.0}, TypeError, r"{} is to be an array, not a set"),
+    "object": (object(), TypeError, r"{} is to be an array of numbers, not of the type object"),
+    "string": ("points.csv", TypeError, r"{} has text"),
+    "number": (1.0, ValueError, r"{} must have the shape"),
+    "empty": ([], ValueError, r"{} must have the shape .*, not \[0\]: it is empty"),
+    "no rows": (np.zeros((0, 2)), ValueError, r"{} must have the shape .*, not \[0, 2\]: it is empty"),
+    "one axis": (np.zeros(3), ValueError, r"{0} must have the shape .* not \[3\]: rows are [a-z]+; np.reshape\({0}, "),
+    "three axes": (np.zeros((8, 2, 1)), ValueError, r"{} must have the shape .* not \[8, 2, 1\]"),
+}
+
+
+@pytest.mark.parametrize(("rows", "kind", "message"), BAD_ROWS.values(), ids=BAD_ROWS.keys())
+def test_other_things_than_rows_of_numbers_are_refused_by_name(
+    rows: object, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match="^" + message.format("points")):
+        posted(rows)
+    if not hasattr(rows, "__next__"):
+        with pytest.raises(kind, match="^" + message.format("normals")):
+            posted(CIRCLE, rows)
+        for method in METHODS:
+            with pytest.raises(kind, match="^" + message.format("queries")):
+                sent(method, queries=rows)
+
+
+@pytest.mark.parametrize("exact", [2**53, -(2**53), 2**60, -(2**63), 3 * 2**55])
+def test_integers_that_float64_has_are_sent(exact: int) -> None:
+    assert posted(np.array([[exact]]))["points"] == [[float(exact)]]
+    if exact > 0:
+        assert posted(np.array([[2 * exact]], dtype="u8"))["points"] == [[2.0 * exact]]
+
+
+@every_method
+def test_values_are_refused_by_name_and_place(method: str) -> None:
+    bad = VALUES.copy()
+    bad[3] = np.nan
+    message = r"\[3\] is nan, and only finite numbers can be sent$"
+    if "values" in METHODS[method]:
+        with pytest.raises(ValueError, match=rf"^values{message}"):
+            sent(method, values=bad)
+        with pytest.raises(TypeError, match=r"^values is missing$"):
+            sent(method, values=None)
+    with pytest.raises(ValueError, match=rf"^noise_variances{message}"):
+        sent(method, noise_variances=bad)
+    if method in OPERATORS:
+        with pytest.raises(ValueError, match=rf"^geometry.noise_variances{message}"):
+            sent(method, geometry={"noise_variances": bad})
+
+
+# Shapes
+
+
+@every_method
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [
+        ((7,), r"must have the shape \[n\] = \[8\], not \[7\]: one number for each point of the cloud$"),
+        ((8, 1), r"must have the shape \[n\] = \[8\], not \[8, 1\]; np.ravel\(.*\) is flat$"),
+        ((1, 8), r"must have the shape \[n\] = \[8\], not \[1, 8\]; np.ravel\(.*\) is flat$"),
+        ((8, 2), r"must have the shape \[n\] = \[8\], not \[8, 2\]$"),
+        ((), r"must have the shape \[n\] = \[8\], not \[\]: one number for each point of the cloud"),
+        ((0,), r"must have the shape \[n\] = \[8\], not \[0\]: it is empty$"),
+    ],
+)
+def test_there_is_one_value_for_each_point(method: str, shape: tuple[int, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=rf"^noise_variances {message}"):
+        sent(method, noise_variances=np.ones(shape))
+    if "values" in METHODS[method]:
+        with pytest.raises(ValueError, match=rf"^values {message}"):
+            sent(method, values=np.ones(shape))
+
+
+@every_method
+def test_queries_have_the_dimension_of_the_cloud(method: str) -> None:
+    with pytest.raises(
+        ValueError, match=r"^queries must have the shape \[m, d\] = \[m, 2\], not \[1, 3\]: rows are points$"
+    ):
+        sent(method, queries=[[1, 2, 3]])
+    with pytest.raises(ValueError, match=r"not \[2, 5\]: rows are points; it looks transposed, send queries.T$"):
+        sent(method, queries=np.ones((2, 5)))
+    with pytest.raises(
+        ValueError, match=r"not \[2\]: rows are points; np.reshape\(queries, \(1, -1\)\) is one of 2 coord"
+    ):
+        sent(method, queries=[1, 0])
+
+
+@every_method
+def test_one_noise_for_all_points_is_alpha(method: str) -> None:
+    with pytest.raises(ValueError, match=r"one number for each point of the cloud; one for all of them is alpha$"):
+        sent(method, noise_variances=0.1)
+
+
+def test_a_cloud_on_a_line_says_how_to_write_its_queries() -> None:
+    line = cloud()
+    line.description.dimension = 1
+    with pytest.raises(ValueError, match=r"\[3\]: rows are points; np.reshape\(queries, \(-1, 1\)\) are 3 on a line$"):
+        line.normals([0, 1, 2])
+
+
+def test_normals_have_the_shape_of_the_points() -> None:
+    message = (
+        r"^normals must have the shape \[n, d\] = \[8, 2\], not \[2, 8\]: rows are normals; it looks transposed, send"
+    )
+    with pytest.raises(ValueError, match=message):
+        posted(CIRCLE, CIRCLE.T)
+    with pytest.raises(ValueError, match=r"^normals must have the shape \[n, d\] = \[8, 2\], not \[7, 2\]: rows are"):
+        posted(CIRCLE, CIRCLE[1:])
+
+
+# Words
+
+SOLVERS = ["dense", np.str_("dense"), np.array("dense"), SolverChoice.DENSE, SolverUsed.DENSE]
+QUANTITIES = [
+    "variance",
+    gramian.PosteriorQuantity.VARIANCE,
+    np.array("variance"),
+    ["variance"],
+    ("variance",),
+    {"variance"},
+    {"variance": 1}.keys(),
+    iter(["variance"]),
+    np.array(["variance"]),
+    [gramian.PosteriorQuantity.VARIANCE],
+]
+
+
+class Spelling(enum.Enum):
+    """Somebody else's enumeration."""
+
+    MERGE = "merge"
+
+
+@every_method
+def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
+    for solver in SOLVERS:
+        assert sent(method, solver=solver)["solver"] == "dense"
+    for merge in ["merge", gramian.DuplicatePolicy.MERGE, Spelling.MERGE]:
+        assert sent(method, duplicates=merge)["duplicates"] == "merge"
+    if method in ["normals", "curvatures"]:
+        for surface in ["offset", gramian.SurfaceChoice.OFFSET, gramian.SurfaceUsed.OFFSET]:
+            assert sent(method, surface=surface)["surface"] == "offset"
+        for orientation in ["gradient", gramian.OrientationChoice.GRADIENT]:
+            assert sent(method, orientation=orientation)["orientation"] == "gradient"
+
+
+@pytest.mark.parametrize("include", QUANTITIES, ids=repr)
+def test_one_word_may_stand_for_a_list(include: object) -> None:
+    assert sent("posterior", include=include)["include"] == ["variance"]
+
+
+def test_several_words_keep_their_order() -> None:
+    assert sent("posterior", include=("gradients", "variance"))["include"] == ["gradients", "variance"]
+
+
+@every_method
+@pytest.mark.parametrize(
+    ("solver", "kind", "message"),
+    [
+        ("desne", ValueError, "solver is 'desne', which is none of 'auto', 'dense', .*; did you mean 'dense'\\?$"),
+        ("Dense", ValueError, "solver is 'Dense', .*; did you mean 'dense'\\?$"),
+        ("xyz", ValueError, "solver is 'xyz', which is none of 'auto', [^?]*$"),
+        (1, TypeError, "solver is to be one of 'auto', .*, not of the type int$"),
+        (b"dense", TypeError, "solver is to be one of 'auto', .*, not b'dense'$"),
+        (["dense"], TypeError, "solver is to be one of 'auto', .*, not of the type list$"),
+    ],
+    ids=repr,
+)
+def test_other_words_are_refused_with_the_nearest(
+    method: str, solver: object, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=rf"^{message}"):
+        sent(method, solver=solver)
+    if method in OPERATORS:
+        with pytest.raises(kind, match=rf"^geometry.{message}"):
+            sent(method, geometry={"solver": solver})
+
+
+def test_misspelt_words_of_other_fields_name_the_nearest() -> None:
+    with pytest.raises(ValueError, match=r"^include is 'variances', .*; did you mean 'variance'\?$"):
+        sent("posterior", include="variances")
+    with pytest.raises(ValueError, match=r"^include\[1\] is 'covarianc', .*; did you mean 'covariance'\?$"):
+        sent("posterior", include=["variance", "covarianc"])
+    with pytest.raises(TypeError, match=r"^include\[0\] is to be one of .*, not of the type int$"):
+        sent("posterior", include=[1])
+    with pytest.raises(TypeError, match=r"^include is to be one of .*, not of the type dict$"):
+        sent("posterior", include={"variance": True})
+    with pytest.raises(ValueError, match=r"^orientation is 'outwards', .*; did you mean 'outward'\?$"):
+        sent("normals", orientation="outwards")
+
+
+# Kernels
+
+GAUSS = {"family": "gauss", "length_scale": 2.0}
+KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "word": ("gauss", {"family": "gauss"}),
+    "word with underscore": ("inverse_multiquadric", {"family": "inverse_multiquadric"}),
+    "member": (KernelFamily.WENDLAND, {"family": "wendland"}),
+    "word of NumPy": (np.array("gauss"), {"family": "gauss"}),
+    "dictionary": (GAUSS, GAUSS),
+    "dictionary with None": ({**GAUSS, "variance": None, "nu": UNSET}, GAUSS),
+    "mapping": (MappingProxyType(GAUSS), GAUSS),
+    "other mapping": (ChainMap({"length_scale": np.int64(2)}, {"family": KernelFamily.GAUSS}), GAUSS),
+    "kernel": (Kernel(family="gauss", length_scale=2), GAUSS),
+    "kernel with a member": (Kernel(KernelFamily.GAUSS, length_scale=2), GAUSS),
+    "smooth kernel": (Kernel("wendland", smoothness=np.int8(6)), {"family": "wendland", "smoothness": 6}),
+    "generated": (models.Kernel(family=KernelFamily.GAUSS, length_scale=2.0), GAUSS),
+    "generated with words": (models.Kernel(family="gauss", length_scale=np.float32(2)), GAUSS),  # type: ignore[arg-type]
+    "generated smooth": (
+        models.Kernel(family=KernelFamily.WENDLAND, smoothness=gramian.Smoothness.C6),
+        {"family": "wendland", "smoothness": 6},
+    ),
+    "used": (models.KernelUsed.from_dict({**GAUSS, "variance": 3.0}), {**GAUSS, "variance": 3.0}),
+    "used by a later service": (
+        models.KernelUsed.from_dict({**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]}),
+        {**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]},
+    ),
+    "described": (
+        models.KernelDescription.from_dict(
+            {
+                "family": "matern",
+                "formula": "",
+                "smoothness": "2ν",
+                "parameters": [],
+                "differentiable_at_points": "",
+            }
+        ),
+        {"family": "matern"},
+    ),
+}
+
+
+@pytest.mark.parametrize(("kernel", "expected"), KERNELS.values(), ids=KERNELS.keys())
+@every_method
+def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected: object) -> None:
+    assert sent(method, kernel=kernel)["kernel"] == expected
+    if method in OPERATORS:
+        assert sent(method, geometry={"kernel": kernel})["geometry"] == {"kernel": expected}
+
+
+@pytest.mark.parametrize(
+    ("kernel", "kind", "message"),
+    [
+        ("gaus", ValueError, r"kernel.family is 'gaus', which is none of .*; did you mean 'gauss'\?$"),
+        ("Gauss", ValueError, r"kernel.family is 'Gauss', .*; did you mean 'gauss'\?$"),
+        ({"length_scale": 2}, TypeError, "kernel.family is missing$"),
+        ({}, TypeError, "kernel.family is missing$"),
+        ({1: 2}, TypeError, "kernel has no 1, but 'family', "),
+        (
+            {"family": "gauss", "lenght_scale": 2},
+            TypeError,
+            r"kernel has no 'lenght_scale', but 'family', 'length_scale', .*; did you mean 'length_scale'\?$",
+        ),
+        (
+            object(),
+            TypeError,
+            "kernel is to be a family such as 'gauss', a mapping, or a Kernel, not of the type object$",
+        ),
+        (2.0, TypeError, "kernel is to be a family such as 'gauss', .*, not of the type float$"),
+        (["gauss"], TypeError, "kernel is to be a family such as 'gauss', .*, not of the type list$"),
+    ],
+    ids=repr,
+)
+@every_method
+def test_other_things_than_kernels_are_refused(
+    method: str, kernel: object, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=rf"^{message}"):
+        sent(method, kernel=kernel)
+    if method in OPERATORS:
+        with pytest.raises(kind, match=rf"^geometry.{message}"):
+            sent(method, geometry=Geometry(kernel=kernel))  # type: ignore[arg-type]
+
+
+def test_a_kernel_is_checked_where_it_is_written() -> None:
+    with pytest.raises(ValueError, match=r"did you mean 'gauss'\?$"):
+        Kernel("gaus")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"^Kernel\(\) has no parameter 'lengthscale'; did you mean 'length_scale'\?$"):
+        Kernel("gauss", lengthscale=2)  # type: ignore[call-arg]
+    assert Kernel("gauss", length_scale=2) == Kernel(KernelFamily.GAUSS, length_scale=np.float32(2))
+    assert hash(Kernel("gauss")) == hash(Kernel("gauss", variance=None))
+    assert isinstance(Kernel("gauss").family, KernelFamily)
+
+
+# Geometries
+
+
+@every_operator
+def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
+    other = cloud()
+    other.description.cloud_id = "cd" * 32
+    other.description.n_points = 5
+    reference = models.CloudRef(id=other.id)
+    for geometry in [
+        Geometry(cloud=other),
+        Geometry(cloud=other.id),
+        {"cloud": other},
+        {"cloud": other.description},
+        {"cloud": {"id": other.id}},
+        models.Geometry(cloud=reference),
+        other,
+        other.id,
+    ]:
+        assert sent(method, geometry=geometry)["geometry"] == {"cloud": {"id": other.id}}
+    noise = sent(method, geometry=Geometry(cloud=other, noise_variances=range(5)))["geometry"]["noise_variances"]
+    assert noise == [0, 1, 2, 3, 4]
+    with pytest.raises(ValueError, match=r"^geometry.noise_variances must have the shape \[n\] = \[5\], not \[8\]"):
+        sent(method, geometry=Geometry(cloud=other, noise_variances=VALUES))
+    assert sent(method, geometry=Geometry(cloud=other.id, noise_variances=[1]))["geometry"]["noise_variances"] == [1]
+    with pytest.raises(TypeError, match=r"^geometry.cloud is to be a Cloud, as .* returns, not of the type ndarray$"):
+        sent(method, geometry={"cloud": CIRCLE})
+    with pytest.raises(ValueError, match=r"^geometry.cloud is 'gauss', and ids of clouds are 64 hexadecimal digits$"):
+        sent(method, geometry="gauss")
+    with pytest.raises(TypeError, match=r"^geometry has no 'kernal', but 'kernel', .*; did you mean 'kernel'\?$"):
+        sent(method, geometry={"kernal": "gauss"})
+    with pytest.raises(TypeError, match=r"^Geometry\(\) has no parameter 'kernal'; did you mean 'kernel'\?$"):
+        Geometry(kernal="gauss")  # type: ignore[call-arg]
+
+
+# Absence
+
+
+@every_method
+@pytest.mark.parametrize("absent", [None, UNSET], ids=repr)
+def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
+    names = ["queries", "kernel", "noise_variances", "solver", "duplicates"]
+    names += {"interpolate": ["derivatives"], "posterior": ["include"], "normals": ["surface", "orientation"]}.get(
+        method, []
+    )
+    names += ["geometry"] if method in OPERATORS else []
+    assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
+    if method in OPERATORS:
+        nothing = {"cloud": absent, "kernel": absent, "noise_variances": absent, "solver": absent, "surface": absent}
+        assert sent(method, geometry=nothing)["geometry"] == {}
+
+
+@every_method
+def test_an_alpha_that_diagnostics_lack_is_not_replaced_by_another(method: str) -> None:
+    with pytest.raises(ValueError, match=r"^alpha is absent from these diagnostics, of a fit with noise_variances"):
+        sent(method, kernel="gauss", alpha=UNSET)
+    assert "alpha" not in sent(method, alpha=UNSET, noise_variances=VALUES)
+
+
+# Keywords
+
+
+@every_method
+@pytest.mark.parametrize(
+    ("misspelt", "meant"), [("kernal", "kernel"), ("Alpha", "alpha"), ("noise_variance", "noise_variances")]
+)
+def test_a_misspelt_keyword_names_the_nearest(method: str, misspelt: str, meant: str) -> None:
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter '{misspelt}'; did you mean '{meant}'\?$"):
+        sent(method, **{misspelt: 1})
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'xyz'$"):
+        sent(method, xyz=1)
+
+
+@every_method
+def test_a_parameter_of_the_kernel_is_said_to_be_one(method: str) -> None:
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'length_scale'; it is one of a Kernel$"):
+        sent(method, kernel="gauss", length_scale=2)
+    with pytest.raises(TypeError, match=r"^kernel has no 'gauss', but 'family', 'length_scale', "):
+        sent(method, kernel={"gauss": 2})
+
+
+def test_so_it_does_for_the_client() -> None:
+    with pytest.raises(TypeError, match=r"^Client\(\) has no parameter 'url'; did you mean 'base_url'\?$"):
+        gramian.Client(url="http://localhost")  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"^cloud\(\) has no parameter 'normal'; did you mean 'normals'\?$"):
+        client().cloud(CIRCLE, normal=CIRCLE)
+
+
+@every_method
+def test_every_parameter_of_a_fit_is_in_signature_and_docstring(method: str) -> None:
+    function = getattr(gramian.Cloud, method)
+    parameters = inspect.signature(function).parameters
+    documented = inspect.getdoc(function)
+    assert documented is not None
+    section = documented.partition("Parameters\n----------\n")[2].partition("\n\nExamples\n--------\n")[0]
+    for name in ["kernel", "alpha", "noise_variances", "solver", "duplicates"]:
+        assert parameters[name].kind is inspect.Parameter.KEYWORD_ONLY
+        assert parameters[name].default is None
+    assert not any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
+    section, _, returned = section.partition("\n\nReturns\n-------\n")
+    assert returned.startswith(inspect.signature(function).return_annotation + "\n")
+    names = [line.partition(" : ")[0] for line in section.splitlines() if not line.startswith(" ")]
+    assert names == [name for name in parameters if name != "self"]
