@@ -20,6 +20,7 @@ from pathlib import Path
 from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 SIZES = [500, 750, 1100, 1650, 2450, 3650, 5400, 8000, 12000]
 KERNEL = {"family": "matern", "length_scale": 0.3}
 N_WARM = 50
@@ -44,7 +45,7 @@ MEMORY = [
 
 def main():
     parser = argparse.ArgumentParser(description="Measures how time and memory grow with the number of points.")
-    parser.add_argument("--binary", type=Path, default=ROOT / "target/release/gramian")
+    parser.add_argument("--binary", type=Path, default=TARGET / "release/gramian")
     parser.add_argument("--sizes", type=lambda text: [int(n) for n in text.split(",")], default=SIZES)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--svg", type=Path, default=ROOT / "docs/growth.svg")

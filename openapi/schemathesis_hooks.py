@@ -1,5 +1,5 @@
 """Makes well-formed requests meaningful, in what no schema can say: rows of equal length, one entry per point, one of two
-alternatives.
+alternatives; and gives the links that refer to a cloud in the body the body that they describe.
 
 Without it nearly all random clouds are ragged and refused, and nothing behind the first check is ever reached. Only
 well-formed data of the fuzzing and stateful phases is touched, and it stays well-formed; the other phases and all malformed
@@ -11,6 +11,16 @@ import schemathesis
 PHASES = {"fuzzing", "stateful"}
 PARAMETER_OF = {"laplace": "epsilon", "matern": "nu", "wendland": "smoothness"}
 TRIANGLE = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+
+
+@schemathesis.hook
+def before_load_schema(context, raw_schema):
+    """The document says it in words, see src/http/openapi/links.rs."""
+    links = raw_schema["components"]["links"].values()
+    bare = [link for link in links if "parameters" not in link]
+    assert bare, "no link refers to a cloud in the body"
+    for link in bare:
+        link["requestBody"] = {"cloud": {"id": "$response.body#/cloud_id"}}
 
 
 @schemathesis.hook

@@ -22,10 +22,13 @@ var points = [][]float64{
 func TestScenario(t *testing.T) {
 	client := connect()
 	register(t, client)
+	t.Run("the cloud is listed", func(t *testing.T) { theCloudIsListed(t, client) })
+	t.Run("normals point outward", func(t *testing.T) { normalsPointOutward(t, client) })
 	t.Run("curvatures are null at the centre", func(t *testing.T) { curvaturesAreNullAtTheCentre(t, client) })
 	t.Run("the matrix turns cosines into their negatives", func(t *testing.T) { theMatrixNegatesCosines(t, client) })
 	t.Run("the posterior has a variance", func(t *testing.T) { thePosteriorHasAVariance(t, client) })
 	t.Run("a refusal names the field", func(t *testing.T) { aRefusalNamesTheField(t, client) })
+	t.Run("a cloud is deleted once", func(t *testing.T) { aCloudIsDeletedOnce(t, client) })
 }
 
 func connect() *gramian.APIClient {
@@ -40,6 +43,33 @@ func register(t *testing.T, client *gramian.APIClient) {
 	must(t, err)
 	if cloud.CloudId != cloudID {
 		t.Fatalf("the id should be %s, but is %s", cloudID, cloud.CloudId)
+	}
+}
+
+func theCloudIsListed(t *testing.T, client *gramian.APIClient) {
+	page, _, err := client.CloudsAPI.ListClouds(context.Background()).Limit(1000).Execute()
+	must(t, err)
+	for _, listed := range page.Clouds {
+		if listed.CloudId == cloudID {
+			return
+		}
+	}
+	t.Errorf("the cloud should be in the list: %v", page.Clouds)
+}
+
+func normalsPointOutward(t *testing.T, client *gramian.APIClient) {
+	request := gramian.NewNormalsRequest(cloud())
+	request.SetKernel(gauss(2))
+	request.SetAlpha(0)
+	answer, _, err := client.GeometryAPI.ComputeNormals(context.Background()).NormalsRequest(*request).Execute()
+	must(t, err)
+	if len(answer.Normals) != len(points) {
+		t.Fatalf("%d normals for %d points", len(answer.Normals), len(points))
+	}
+	for i, normal := range answer.Normals {
+		if normal == nil || dot(*normal, points[i]) < 0.999 {
+			t.Errorf("normal %d should be %v, but is %v", i, points[i], normal)
+		}
 	}
 }
 
@@ -97,17 +127,34 @@ func aRefusalNamesTheField(t *testing.T, client *gramian.APIClient) {
 	request := gramian.NewCurvaturesRequest(cloud())
 	request.SetKernel(gauss(-1))
 	_, _, err := client.GeometryAPI.ComputeCurvatures(context.Background()).CurvaturesRequest(*request).Execute()
+	problem := problemOf(t, err)
+	if problem.Type != "/problems/invalid-request" || problem.Errors[0].Pointer != "/kernel/length_scale" {
+		t.Errorf("the problem should name the length: %+v", problem)
+	}
+}
+
+func aCloudIsDeletedOnce(t *testing.T, client *gramian.APIClient) {
+	_, err := client.CloudsAPI.CheckCloud(context.Background(), cloudID).Execute()
+	must(t, err)
+	_, err = client.CloudsAPI.DeleteCloud(context.Background(), cloudID).Execute()
+	must(t, err)
+	_, err = client.CloudsAPI.DeleteCloud(context.Background(), cloudID).Execute()
+	if problem := problemOf(t, err); problem.Type != "/problems/unknown-cloud" {
+		t.Errorf("a cloud should be deleted once: %+v", problem)
+	}
+}
+
+func problemOf(t *testing.T, err error) gramian.Problem {
+	t.Helper()
 	var refusal *gramian.GenericOpenAPIError
 	if !errors.As(err, &refusal) {
-		t.Fatalf("a negative length should be refused: %v", err)
+		t.Fatalf("this should be refused: %v", err)
 	}
 	problem, ok := refusal.Model().(gramian.Problem)
 	if !ok {
 		t.Fatalf("not a problem: %v", refusal)
 	}
-	if problem.Type != "/problems/invalid-request" || problem.Errors[0].Pointer != "/kernel/length_scale" {
-		t.Errorf("the problem should name the length: %+v", problem)
-	}
+	return problem
 }
 
 func cloud() gramian.CloudRef {

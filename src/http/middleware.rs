@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
@@ -104,8 +104,12 @@ pub fn recover(_panic: Box<dyn Any + Send + 'static>) -> Response {
     Problem::internal().into_response()
 }
 
-/// Refuses requests that accept no JSON, where there is nothing else.
+/// Refuses requests that accept no JSON, where there is nothing else. Success of HEAD and DELETE has no body, so there is nothing
+/// to accept: generated clients name the media type of problems alone, which are sent whatever is accepted.
 pub async fn negotiate(request: Request, next: Next) -> Response {
+    if matches!(*request.method(), Method::HEAD | Method::DELETE) {
+        return next.run(request).await;
+    }
     match Wanted::of(request.headers(), &[Format::Json]) {
         Ok(_) => next.run(request).await,
         Err(problem) => problem.into_response(),

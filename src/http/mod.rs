@@ -44,7 +44,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::app::App;
 use routes::{
-    clouds, interpolation, kernels, laplace_beltrami, posterior, process, surface, surface_gradient,
+    clouds, interpolation, kernels, laplace_beltrami, pages, posterior, process, surface, surface_gradient,
 };
 
 /// The service as one router.
@@ -107,7 +107,9 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(process::check_live))
         .routes(routes!(process::check_ready))
         .routes(routes!(process::get_version))
-        .routes(routes!(process::get_problem_page));
+        .routes(routes!(pages::get_start_page))
+        .routes(routes!(pages::list_problem_pages))
+        .routes(routes!(pages::get_problem_page));
     let (v1, mut document) = v1.split_for_parts();
     let (probes, of_probes) = probes.split_for_parts();
     document.merge(of_probes);

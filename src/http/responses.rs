@@ -45,8 +45,8 @@ problem_set! {
 }
 
 problem_set! {
-    /// Operations that only look a cloud up.
-    LookUpProblems: Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal
+    /// Operations that only look a cloud up, and answer without a body.
+    LookUpProblems: Unauthorized, UnknownCloud, NotFound, Internal
 }
 
 problem_set! {
@@ -60,7 +60,7 @@ problem_set! {
 }
 
 problem_set! {
-    /// Probes that cannot be refused.
+    /// Probes and pages that cannot be refused.
     ProbeProblems: Internal
 }
 
@@ -70,7 +70,7 @@ problem_set! {
 }
 
 problem_set! {
-    /// Pages of problems.
+    /// Pages of one problem.
     PageProblems: NotFound, Internal
 }
 

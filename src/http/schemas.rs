@@ -26,6 +26,25 @@ impl ToSchema for CloudIdSchema {
     }
 }
 
+/// The schema of the cursor of a page; requests are read as text, so that a refusal is a problem like any other.
+pub struct CursorSchema;
+
+impl PartialSchema for CursorSchema {
+    fn schema() -> RefOr<Schema> {
+        let text = "Where a page of clouds ends, for the next one. What it is made of may change.";
+        let schema = ObjectBuilder::new()
+            .schema_type(SchemaType::Type(Type::String))
+            .pattern(Some("^[0-9a-f]{1,32}-[0-9a-f]{64}$"));
+        schema.description(Some(text)).into()
+    }
+}
+
+impl ToSchema for CursorSchema {
+    fn name() -> Cow<'static, str> {
+        "Cursor".into()
+    }
+}
+
 /// The schema of `smoothness`; requests are read as numbers, so that a refusal can say which there are.
 pub struct Smoothness;
 

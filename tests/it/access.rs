@@ -58,7 +58,8 @@ async fn without_a_valid_key_nothing_below_v1_is_answered() {
 #[tokio::test]
 async fn probes_and_documents_need_no_key() {
     let server = Server::with_flags(&["--api-keys", "alpha-key"]).await;
-    let documents = ["/openapi.json", "/openapi-3.0.json", "/docs/", "/problems/unauthorized"];
+    let documents =
+        ["/openapi.json", "/openapi-3.0.json", "/docs/", "/problems/unauthorized", "/problems", "/"];
     for path in ["/health/live", "/health/ready", "/version"].into_iter().chain(documents) {
         assert_eq!(server.get(path).await.status, 200, "{path}");
     }

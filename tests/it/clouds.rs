@@ -162,6 +162,37 @@ async fn the_list_comes_in_pages_oldest_first() {
 }
 
 #[tokio::test]
+async fn what_is_no_cursor_is_refused_as_the_pattern_of_the_document_says() {
+    let server = Server::start().await;
+    for document in [gramian::http::openapi_json(), gramian::http::openapi_3_0_json()] {
+        let document: Value = serde_json::from_str(&document).unwrap();
+        assert_eq!(document["components"]["schemas"]["Cursor"]["pattern"], "^[0-9a-f]{1,32}-[0-9a-f]{64}$");
+        let parameters = document["paths"]["/v1/clouds"]["get"]["parameters"].as_array().unwrap();
+        let cursor = parameters.iter().find(|parameter| parameter["name"] == "cursor").unwrap();
+        assert_eq!(cursor["schema"]["$ref"], "#/components/schemas/Cursor");
+    }
+    let id = "0".repeat(64);
+    for time in ["0", "18f3a", &"f".repeat(32), &"0".repeat(32)] {
+        server.get(&format!("/v1/clouds?cursor={time}-{id}")).await.expect_ok();
+    }
+    let short = &id[1..];
+    for cursor in [
+        format!("-{id}"),
+        format!("+1-{id}"),
+        format!("1F-{id}"),
+        format!("{}1-{id}", "0".repeat(32)),
+        format!("1-{short}"),
+        format!("1-{short}g"),
+        format!("1{id}"),
+        String::new(),
+    ] {
+        let answer = server.get(&format!("/v1/clouds?cursor={cursor}")).await;
+        let problem = answer.expect_problem(422, "invalid-request");
+        assert_eq!(problem["errors"][0]["pointer"], "/cursor", "{cursor}");
+    }
+}
+
+#[tokio::test]
 async fn a_cursor_survives_the_deletion_of_the_cloud_it_stopped_at() {
     let server = Server::start().await;
     for k in 0..3 {

@@ -22,6 +22,16 @@ use serde_json::{Map, Value};
 const REMEDY: &str = "Clients depend on these. Either do not change them, or serve the changed operation under a new version \
                       of its path beside the old one (docs/api.md, Versions).";
 
+/// What the rules take for breaking and breaks nobody, until the released document is renewed: where, and why.
+const HARMLESS: [(&str, &str); 3] = [
+    (
+        "/paths/~1v1~1clouds/get/parameters/1/schema/pattern",
+        "What does not match was refused before it was said; a cursor comes from the service.",
+    ),
+    ("/paths/~1v1~1clouds~1{cloud_id}/delete/responses/406", "A refusal less."),
+    ("/paths/~1v1~1clouds~1{cloud_id}/head/responses/406", "A refusal less."),
+];
+
 /// A breaking change: where it is in the released document, and what it is.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Change {
@@ -71,7 +81,12 @@ fn what_was_released_is_still_served() {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let released: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-        let changes = breaking_changes(&released, &current);
+        let mut changes = breaking_changes(&released, &current);
+        for (pointer, _) in HARMLESS {
+            let n_changes = changes.len();
+            changes.retain(|change| change.pointer != pointer);
+            assert!(changes.len() < n_changes, "{pointer} is no change any more");
+        }
         let list: Vec<_> =
             changes.iter().map(|change| format!("{}: {}", change.pointer, change.what)).collect();
         assert!(list.is_empty(), "breaking since {}:\n- {}\n{REMEDY}", path.display(), list.join("\n- "));

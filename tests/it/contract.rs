@@ -20,7 +20,7 @@ pub use answer::{Received, decompressed};
 use document::{Contract, Operation, Response, Served};
 
 /// Paths beside the interface, and all below them: pages for people, and the documents themselves.
-const BESIDE: [&str; 4] = ["/", "/docs", "/openapi.json", "/openapi-3.0.json"];
+const BESIDE: [&str; 3] = ["/docs", "/openapi.json", "/openapi-3.0.json"];
 
 /// Headers that HTTP, its compression and CORS bring along with any answer. All others belong to the interface.
 const OF_HTTP: [&str; 7] =
@@ -82,9 +82,9 @@ impl Contract {
 }
 
 fn is_beside(path: &str) -> bool {
-    BESIDE.iter().any(|known| {
-        path == *known || *known != "/" && path.strip_prefix(known).is_some_and(|rest| rest.starts_with('/'))
-    })
+    BESIDE
+        .iter()
+        .any(|known| path.strip_prefix(known).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')))
 }
 
 fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<String> {

@@ -31,6 +31,32 @@ async fn every_type_of_problem_has_a_page() {
 }
 
 #[tokio::test]
+async fn the_root_leads_to_all_that_is_served_for_people() {
+    let server = Server::start().await;
+    let page = server.get("/").await;
+    assert_eq!(page.status, 200, "{}", page.text);
+    assert!(page.header("content-type").starts_with("text/html"));
+    let sources = sources(&page);
+    for linked in ["docs/", "openapi.json", "openapi-3.0.json", "problems"] {
+        assert!(sources.iter().any(|source| source == linked), "{sources:?}");
+    }
+    for source in sources {
+        assert_eq!(server.get(&format!("/{source}")).await.status, 200, "{source}");
+    }
+}
+
+#[tokio::test]
+async fn problems_are_listed_with_links_to_their_pages() {
+    let server = Server::start().await;
+    let sources = sources(&server.get("/problems").await);
+    let expected: Vec<String> = Slug::ALL.iter().map(|slug| format!("problems/{}", slug.as_str())).collect();
+    assert_eq!(sources, expected);
+    for source in sources {
+        assert_eq!(server.get(&format!("/{source}")).await.status, 200, "{source}");
+    }
+}
+
+#[tokio::test]
 async fn the_process_describes_itself() {
     let server = Server::with_flags(&["--threads", "2"]).await;
     assert_eq!(server.get("/health/live").await.expect_ok(), json!({"status": "ok"}));

@@ -1,9 +1,12 @@
 //! What HTTP itself asks for: paths, methods, media types, request ids.
 
-use serde_json::json;
+use std::collections::{BTreeSet, HashMap};
+
+use reqwest::Method;
+use serde_json::{Value, json};
 
 use crate::routes::ROUTES;
-use crate::support::Server;
+use crate::support::{Server, fibonacci_sphere};
 
 #[tokio::test]
 async fn unknown_paths_are_problems_too() {
@@ -24,7 +27,7 @@ async fn unknown_paths_are_problems_too() {
 async fn a_wrong_method_is_answered_with_the_right_ones() {
     let server = Server::start().await;
     let id = "0".repeat(64);
-    let allowed = async |method: reqwest::Method, path: &str| {
+    let allowed = async |method: Method, path: &str| {
         let answer = server.send(server.client.request(method, server.url(path))).await;
         answer.expect_problem(405, "method-not-allowed");
         let mut methods: Vec<_> = answer.header("allow").split(',').map(|m| m.trim().to_owned()).collect();
@@ -32,17 +35,17 @@ async fn a_wrong_method_is_answered_with_the_right_ones() {
         methods.join(" ")
     };
     for route in &ROUTES {
-        for method in [reqwest::Method::GET, reqwest::Method::PUT, reqwest::Method::DELETE] {
+        for method in [Method::GET, Method::PUT, Method::DELETE] {
             assert_eq!(allowed(method, route.path).await, "POST", "{}", route.path);
         }
         server.post(route.path, &route.request()).await.expect_ok();
     }
-    assert_eq!(allowed(reqwest::Method::PUT, "/v1/clouds").await, "GET HEAD POST");
-    assert_eq!(allowed(reqwest::Method::POST, &format!("/v1/clouds/{id}")).await, "DELETE GET HEAD");
+    assert_eq!(allowed(Method::PUT, "/v1/clouds").await, "GET HEAD POST");
+    assert_eq!(allowed(Method::POST, &format!("/v1/clouds/{id}")).await, "DELETE GET HEAD");
     for path in
         ["/v1/kernels", "/health/live", "/health/ready", "/version", "/openapi.json", "/problems/internal"]
     {
-        assert_eq!(allowed(reqwest::Method::POST, path).await, "GET HEAD", "{path}");
+        assert_eq!(allowed(Method::POST, path).await, "GET HEAD", "{path}");
     }
 }
 
@@ -64,6 +67,76 @@ async fn answers_come_as_what_there_is_or_not_at_all() {
         for accept in ["application/json", "*/*", "text/html, */*;q=0.1", "Application/*"] {
             assert!([200, 201].contains(&send(accept).await.status), "{path} {accept}");
         }
+    }
+}
+
+/// The media types of an answer, as generated clients accept them.
+fn media_types(response: &Value) -> Vec<&str> {
+    response["content"]
+        .as_object()
+        .into_iter()
+        .flat_map(|content| content.keys())
+        .map(String::as_str)
+        .collect()
+}
+
+#[tokio::test]
+async fn what_generated_clients_accept_is_acceptable() {
+    let server = Server::start().await;
+    let id = register_a_cloud(&server).await;
+    let bodies: HashMap<&str, Value> = ROUTES.iter().map(|route| (route.path, route.request())).collect();
+    for (name, document) in
+        [("3.1", gramian::http::openapi_json()), ("3.0", gramian::http::openapi_3_0_json())]
+    {
+        let document: Value = serde_json::from_str(&document).unwrap();
+        for (path, item) in document["paths"].as_object().unwrap() {
+            for (method, operation) in item.as_object().unwrap() {
+                let responses = operation["responses"].as_object().unwrap();
+                let accepted: BTreeSet<&str> = responses.values().flat_map(media_types).collect();
+                let accept = accepted.into_iter().collect::<Vec<_>>().join(", ");
+                let method: Method = method.to_uppercase().parse().unwrap();
+                let url = server.url(&path.replace("{cloud_id}", &id).replace("{slug}", "internal"));
+                let mut request = server.client.request(method.clone(), url);
+                if !accept.is_empty() {
+                    request = request.header("accept", &accept);
+                }
+                if method == Method::POST {
+                    let cloud = json!({"points": [[1, 2]]});
+                    request = request.json(bodies.get(path.as_str()).unwrap_or(&cloud));
+                }
+                let answer = server.send(request).await;
+                assert!(answer.status < 300, "{name}: {method} {path} with {accept}: {}", answer.text);
+                // The next operation finds it again.
+                register_a_cloud(&server).await;
+            }
+        }
+    }
+}
+
+async fn register_a_cloud(server: &Server) -> String {
+    let cloud = server.post("/v1/clouds", &json!({"points": fibonacci_sphere(4)})).await;
+    cloud.json()["cloud_id"].as_str().unwrap().to_owned()
+}
+
+#[tokio::test]
+async fn a_problem_is_acceptable_whatever_the_client_accepts() {
+    let server = Server::start().await;
+    let unknown = server.url(&format!("/v1/clouds/{}", "0".repeat(64)));
+    for accept in
+        ["application/problem+json", "application/json, application/problem+json", "application/json"]
+    {
+        for method in [Method::HEAD, Method::DELETE] {
+            let request = server.client.request(method.clone(), &unknown).header("accept", accept);
+            assert_eq!(server.send(request).await.status, 404, "{method} {accept}");
+        }
+    }
+    // Where success would have a body, the client is told that it cannot have it.
+    let both = "application/json, application/problem+json";
+    for (accept, status, slug) in
+        [("application/problem+json", 406, "not-acceptable"), (both, 404, "unknown-cloud")]
+    {
+        let request = server.client.get(&unknown).header("accept", accept);
+        server.send(request).await.expect_problem(status, slug);
     }
 }
 

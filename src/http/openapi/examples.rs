@@ -20,7 +20,7 @@ macro_rules! example_file {
 
 /// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
 /// sends the ones and compares the others.
-pub const EXAMPLES: [(&str, &str); 16] = [
+pub const EXAMPLES: [(&str, &str); 18] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
     example_file!("list_clouds"),
@@ -36,6 +36,8 @@ pub const EXAMPLES: [(&str, &str); 16] = [
     example_file!("check_live"),
     example_file!("check_ready"),
     example_file!("get_version"),
+    example_file!("get_start_page"),
+    example_file!("list_problem_pages"),
     example_file!("get_problem_page"),
 ];
 

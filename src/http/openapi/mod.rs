@@ -36,7 +36,7 @@ use super::problem::ProblemDocument;
         (name = "values", description = "Functions through values: interpolation, regression, Gaussian processes."),
         (name = "geometry", description = "Normals and curvatures of the surface that a cloud samples."),
         (name = "operators", description = "Surface gradient and Laplace–Beltrami, applied and as matrices."),
-        (name = "process", description = "Health, version and problem pages; no key needed."),
+        (name = "process", description = "Health, version and pages for people; no key needed."),
     ),
     components(schemas(ProblemDocument<'static>)),
     modifiers(&BearerKeys)

@@ -12,7 +12,7 @@ const WHAT_IS_DIFFERENT: &str = " This document is for tools that stop at OpenAP
 ///
 /// What 3.0 cannot say is said its way: nullable types, exclusive bounds, descriptions beside references, licences.
 /// Bodies come as `application/json` only, problem documents among them, since generators know no other; operations
-/// that answer nothing but pages for people are left out, and so are links, whose bodies some generators refuse.
+/// that answer nothing but pages for people are left out, and so are links, of which generators make nothing.
 pub fn derive(document: &Value) -> Value {
     let mut document = document.clone();
     document["openapi"] = json!("3.0.3");

@@ -20,7 +20,7 @@ use crate::http::negotiation::Format;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::sampling::find_scales;
-use crate::http::schemas::CloudIdSchema;
+use crate::http::schemas::{CloudIdSchema, CursorSchema};
 use crate::numerics::defaults::{NearestRange, Scales};
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
@@ -111,7 +111,7 @@ pub struct CloudList {
     clouds: Vec<Cloud>,
     /// The cursor of the next page; absent on the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[schema(nullable = false, value_type = Option<CursorSchema>)]
     next: Option<String>,
 }
 
@@ -264,7 +264,7 @@ pub async fn delete_cloud(
     tag = "clouds",
     params(
         ("limit" = Option<usize>, Query, description = "Clouds in a page, 50 if absent", minimum = 1, maximum = 1000, example = 10),
-        ("cursor" = Option<String>, Query, description = "`next` of the page before")
+        ("cursor" = Option<CursorSchema>, Query, description = "`next` of the page before")
     ),
     responses((status = 200, description = "A page of clouds", body = CloudList), ListProblems),
     security((), ("bearer" = []))
@@ -310,9 +310,13 @@ impl Cursor {
         Self { nanoseconds: since_epoch.as_nanos(), id: stored.id }
     }
 
+    /// As the pattern of the document: from_str_radix alone takes a sign, capitals and any number of zeros too.
     fn parse(text: &str) -> Option<Self> {
         let (nanoseconds, id) = text.split_once('-')?;
-        Some(Self { nanoseconds: u128::from_str_radix(nanoseconds, 16).ok()?, id: CloudId::parse(id)? })
+        let is_plain =
+            nanoseconds.len() <= 32 && nanoseconds.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f'));
+        let nanoseconds = u128::from_str_radix(nanoseconds, 16).ok().filter(|_| is_plain)?;
+        Some(Self { nanoseconds, id: CloudId::parse(id)? })
     }
 }
 

@@ -5,6 +5,7 @@ pub mod interpolation;
 pub mod kernels;
 pub mod laplace_beltrami;
 pub mod operators;
+pub mod pages;
 pub mod posterior;
 pub mod process;
 pub mod surface;

@@ -1,18 +1,16 @@
-//! What the process says of itself: health, version, problem pages. None of it needs a key.
+//! What the process says of itself: health and version. None of it needs a key.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use axum::Json;
-use axum::extract::{Path, State};
-use axum::response::Html;
+use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::app::App;
 use crate::http::problem::Problem;
-use crate::http::responses::{PageProblems, ProbeProblems, ReadyProblems};
-use crate::http::slug::Slug;
+use crate::http::responses::{ProbeProblems, ReadyProblems};
 
 /// The state of the process.
 #[derive(Serialize, ToSchema)]
@@ -90,26 +88,4 @@ pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
         instruction_set: crate::numerics::instruction_set::InstructionSet::best().name(),
         threads: app.config.n_threads(),
     })
-}
-
-/// Explain a problem
-///
-/// The page behind the `type` of a problem document: what it means and what to do.
-#[utoipa::path(
-    get,
-    path = "/problems/{slug}",
-    operation_id = "get_problem_page",
-    tag = "process",
-    params(("slug" = String, Path, description = "The last segment of a problem's type", example = "duplicate-points")),
-    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems),
-    security(())
-)]
-pub async fn get_problem_page(Path(slug): Path<String>) -> Result<Html<String>, Problem> {
-    let slug = Slug::parse(&slug).ok_or_else(|| Problem::new(Slug::NotFound, "no such problem type"))?;
-    let (title, explanation) = (slug.title(), slug.explanation());
-    let (status, name) = (slug.status(), slug.as_str());
-    Ok(Html(format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title></head>\n\
-         <body><h1>{title}</h1>\n<p><code>{name}</code>, HTTP status {status}</p>\n<p>{explanation}</p></body></html>\n"
-    )))
 }

@@ -21,7 +21,7 @@ class CloudList:
 
     Attributes:
         clouds (list[Cloud]): The clouds of this page.
-        next_ (str | Unset): The cursor of the next page; absent on the last one.
+        next_ (str | Unset): Where a page of clouds ends, for the next one. What it is made of may change.
     """
 
     clouds: list[Cloud]

@@ -36,9 +36,6 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
     if response.status_code == 404:
         return
 
-    if response.status_code == 406:
-        return
-
     if response.status_code == 500:
         return
 

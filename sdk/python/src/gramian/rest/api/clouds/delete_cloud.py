@@ -39,11 +39,6 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
 
         return response_404
 
-    if response.status_code == 406:
-        response_406 = Problem.from_dict(response.json())
-
-        return response_406
-
     if response.status_code == 500:
         response_500 = Problem.from_dict(response.json())
 

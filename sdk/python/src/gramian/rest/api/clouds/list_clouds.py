@@ -96,7 +96,8 @@ def sync_detailed(
 
     Args:
         limit (int | Unset):
-        cursor (str | Unset):
+        cursor (str | Unset): Where a page of clouds ends, for the next one. What it is made of
+            may change.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -130,7 +131,8 @@ def sync(
 
     Args:
         limit (int | Unset):
-        cursor (str | Unset):
+        cursor (str | Unset): Where a page of clouds ends, for the next one. What it is made of
+            may change.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -159,7 +161,8 @@ async def asyncio_detailed(
 
     Args:
         limit (int | Unset):
-        cursor (str | Unset):
+        cursor (str | Unset): Where a page of clouds ends, for the next one. What it is made of
+            may change.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -191,7 +194,8 @@ async def asyncio(
 
     Args:
         limit (int | Unset):
-        cursor (str | Unset):
+        cursor (str | Unset): Where a page of clouds ends, for the next one. What it is made of
+            may change.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -1,0 +1,87 @@
+//! Pages for people: where to begin, and what problems mean. None of them needs a key.
+//!
+//! Links are relative, so that they hold behind a proxy that serves all of it below a path of its own.
+
+use std::fmt::Write;
+
+use axum::extract::Path;
+use axum::response::Html;
+
+use crate::http::problem::Problem;
+use crate::http::responses::{PageProblems, ProbeProblems};
+use crate::http::slug::Slug;
+
+/// Begin here
+///
+/// A page that leads to the documentation, the documents for generators and the problems.
+#[utoipa::path(
+    get,
+    path = "/",
+    operation_id = "get_start_page",
+    tag = "process",
+    responses((status = 200, description = "The page", body = String, content_type = "text/html"), ProbeProblems),
+    security(())
+)]
+pub async fn get_start_page() -> Html<String> {
+    let links = [
+        ("docs/", "The interface, to read and to try"),
+        ("openapi.json", "The OpenAPI document, version 3.1"),
+        ("openapi-3.0.json", "The document for generators that stop at OpenAPI 3.0"),
+        ("problems", "What refusals mean"),
+        ("version", "What is running"),
+        ("health/ready", "Whether it takes requests"),
+    ];
+    let mut body =
+        String::from("<p>Geometric kernel interpolation and regression on point clouds.</p>\n<ul>\n");
+    for (path, text) in links {
+        // Writing to a String cannot fail.
+        let _ = writeln!(body, "<li><a href=\"{path}\">{text}</a></li>");
+    }
+    page("gramian", &(body + "</ul>"))
+}
+
+/// List the problems
+///
+/// A page with every type of problem that there is, and a link to the page of each.
+#[utoipa::path(
+    get,
+    path = "/problems",
+    operation_id = "list_problem_pages",
+    tag = "process",
+    responses((status = 200, description = "The list", body = String, content_type = "text/html"), ProbeProblems),
+    security(())
+)]
+pub async fn list_problem_pages() -> Html<String> {
+    let mut body = String::from("<dl>\n");
+    for slug in Slug::ALL {
+        let (name, status, title) = (slug.as_str(), slug.status().as_u16(), slug.title());
+        let _ = writeln!(body, "<dt><a href=\"problems/{name}\">{name}</a> ({status})</dt><dd>{title}</dd>");
+    }
+    page("Problems", &(body + "</dl>"))
+}
+
+/// Explain a problem
+///
+/// The page behind the `type` of a problem document: what it means and what to do.
+#[utoipa::path(
+    get,
+    path = "/problems/{slug}",
+    operation_id = "get_problem_page",
+    tag = "process",
+    params(("slug" = String, Path, description = "The last segment of a problem's type", example = "duplicate-points")),
+    responses((status = 200, description = "The explanation", body = String, content_type = "text/html"), PageProblems),
+    security(())
+)]
+pub async fn get_problem_page(Path(slug): Path<String>) -> Result<Html<String>, Problem> {
+    let slug = Slug::parse(&slug).ok_or_else(|| Problem::new(Slug::NotFound, "no such problem type"))?;
+    let (name, status, explanation) = (slug.as_str(), slug.status(), slug.explanation());
+    let body = format!("<p><code>{name}</code>, HTTP status {status}</p>\n<p>{explanation}</p>");
+    Ok(page(slug.title(), &body))
+}
+
+fn page(title: &str, body: &str) -> Html<String> {
+    Html(format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title></head>\n\
+         <body><h1>{title}</h1>\n{body}</body></html>\n"
+    ))
+}
