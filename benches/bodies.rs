@@ -16,9 +16,10 @@ use gramian::app::App;
 use gramian::config::Config;
 use gramian::http::answer::{Answer, Member, Parts};
 use gramian::http::array::Array;
-use gramian::http::body::{Points, parse_json};
 use gramian::http::encode::Encoded;
 use gramian::http::negotiation::{Coding, Format, Wanted};
+use gramian::http::parse::parse_json;
+use gramian::http::points::Points;
 use gramian::http::problem::Problem;
 
 const N_POINTS: usize = 1_000_000;

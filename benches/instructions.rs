@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use gramian::http::array::Array;
-use gramian::http::body::{Points, parse_json};
+use gramian::http::parse::parse_json;
+use gramian::http::points::Points;
 use gramian::numerics::cloud::Cloud;
 use gramian::numerics::instruction_set::InstructionSet;
 use gramian::numerics::interpolant::Interpolant;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::body::Points;
+use super::points::Points;
 use super::problem::{Place, Problem};
 use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use super::slug::Slug;

@@ -214,7 +214,8 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::body::{Points, present};
+    use crate::http::fields::present;
+    use crate::http::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]

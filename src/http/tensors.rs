@@ -9,8 +9,9 @@ use serde_json::{Error, Value};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-use super::body::{malformed_json, object, refusal};
+use super::fields::object;
 use super::npy::Npy;
+use super::parse::{malformed_json, refusal};
 use super::problem::Problem;
 use super::slug::Slug;
 
@@ -264,7 +265,8 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::body::{Points, present};
+    use crate::http::fields::present;
+    use crate::http::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -12,9 +12,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::body::{Points, present, read_body};
+use crate::http::body::read_body;
+use crate::http::fields::present;
 use crate::http::fit::{Planner, unknown_cloud};
 use crate::http::negotiation::Format;
+use crate::http::points::Points;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::schemas::CloudIdSchema;
