@@ -6,6 +6,7 @@ use http_body_util::BodyExt;
 use serde::de::DeserializeOwned;
 
 use super::compression::decompress;
+use super::limits::ParseContext;
 use super::negotiation::{Coding, Format, announced};
 use super::parse::parse_json;
 use super::problem::Problem;
@@ -29,16 +30,21 @@ pub struct RequestBody {
 }
 
 impl RequestBody {
+    /// A body that is there already, which may have so many bytes once it is decompressed.
+    pub fn new(format: Format, coding: Coding, bytes: Vec<u8>, limit: usize) -> Self {
+        Self { format, coding, bytes, limit }
+    }
+
     /// Decompresses and parses, on the pool.
     ///
     /// # Errors
-    /// 413 beyond the limit, 400 for what is not of its format, 422 with a pointer for what is, but not this request.
-    pub fn parse<T: DeserializeOwned>(self) -> Result<T, Problem> {
-        let bytes = decompress(self.bytes, self.coding, self.limit)?;
+    /// 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its format, 422 with a pointer for what is, but not this request.
+    pub fn parse<T: DeserializeOwned>(self, context: &ParseContext<'_>) -> Result<T, Problem> {
+        let bytes = decompress(self.bytes, self.coding, self.limit, context.observer)?;
         match self.format {
-            Format::Json => parse_json(&bytes),
-            Format::Safetensors => parse_safetensors(&bytes),
-            Format::Npy => parse_npy(&bytes),
+            Format::Json => parse_json(&bytes, context),
+            Format::Safetensors => parse_safetensors(&bytes, context),
+            Format::Npy => parse_npy(&bytes, context),
         }
     }
 }
@@ -55,7 +61,7 @@ pub async fn read_body(
 ) -> Result<RequestBody, Problem> {
     let (format, coding) = announced(headers, formats)?;
     let bytes = read_bytes(headers, body, limit).await?;
-    Ok(RequestBody { format, coding, bytes, limit })
+    Ok(RequestBody::new(format, coding, bytes, limit))
 }
 
 async fn read_bytes(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u8>, Problem> {

@@ -5,6 +5,8 @@ use std::marker::PhantomData;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, IntoDeserializer, MapAccess, Visitor};
 
+use super::points::Points;
+
 /// For optional fields: absent is `None`, null is refused by the type itself.
 ///
 /// # Errors
@@ -13,6 +15,36 @@ pub fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
     T::deserialize(deserializer).map(Some)
+}
+
+/// Lists that count as absent when they are empty.
+pub trait List {
+    fn is_empty(&self) -> bool;
+}
+
+impl List for Vec<f64> {
+    fn is_empty(&self) -> bool {
+        self.as_slice().is_empty()
+    }
+}
+
+impl List for Points {
+    fn is_empty(&self) -> bool {
+        self.n_rows == 0
+    }
+}
+
+/// [`present`] for lists that nothing but their absence can mean when they are empty: generated clients send `[]` for what their
+/// user left out.
+///
+/// # Errors
+/// Those of the type.
+pub fn present_unless_empty<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
+where
+    T: Deserialize<'de> + List,
+    D: Deserializer<'de>,
+{
+    T::deserialize(deserializer).map(|list| Some(list).filter(|list| !list.is_empty()))
 }
 
 /// For fields that are objects: serde would also take an array of their members in order, which is no part of the contract.

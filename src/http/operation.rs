@@ -15,6 +15,7 @@ use super::compute::{JobObserver, StageTimes};
 use super::encode::Encoded;
 use super::fit::{FitPlan, Planner};
 use super::fitted::{Fits, Fitted};
+use super::limits::ParseContext;
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use crate::app::App;
@@ -70,7 +71,10 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
 
     let began = Instant::now();
     let shared = app.clone();
-    let prepare = move |_: &JobObserver| body.parse::<O>()?.plan(&Planner { app: &shared, owner });
+    let prepare = move |observer: &JobObserver| {
+        let request: O = body.parse(&ParseContext::new(&shared.config, observer))?;
+        request.plan(&Planner { app: &shared, owner })
+    };
     let plan = app.compute.run(0.0, prepare).await?.0?;
     let mut report = Report { parse: began.elapsed(), ..Report::default() };
 

@@ -1,77 +1,71 @@
-//! JSON into requests, and refusals with pointers.
+//! Bytes into requests: limits, pointers and cancellation the same for every format.
 
-use serde::de::{Deserialize, DeserializeOwned, Deserializer, IgnoredAny};
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::error::Category;
 
 use super::fields::object;
+use super::guarded::{Guard, Stop, shortened};
+use super::limits::ParseContext;
 use super::plain_json;
-use super::problem::Problem;
+use super::problem::{Place, Problem};
 use super::slug::Slug;
-
-/// Characters of a refused value or name that are repeated to the client.
-const MAX_SHOWN_CHARACTERS: usize = 200;
+use crate::numerics::error::NumericsError;
 
 /// Parses JSON into a request.
 ///
 /// # Errors
-/// 400 `malformed-json` for what is not JSON, 422 `invalid-request` with a pointer for what is, but not this request.
-pub fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
-    if let Some(request) = plain_json::from_slice(bytes, |json| object(json)) {
+/// 413 for a list that is longer than any request may have, 400 `malformed-json` for what is not JSON, 422 `invalid-request`
+/// with a pointer for what is, but not this request.
+pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
+    let guard = Guard::new(context);
+    if let Some(request) = plain_json::from_slice(bytes, |json| object(guard.around(json))) {
         return Ok(request);
     }
+    if let Some(stop) = guard.stop() {
+        return Err(stopped(stop, &guard, context));
+    }
+    let guard = Guard::asking_for_any(context);
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let parsed = object(&mut deserializer).and_then(|request| deserializer.end().map(|()| request));
-    parsed.map_err(|error| match error.classify() {
-        Category::Syntax | Category::Eof | Category::Io => malformed_json(&error),
+    let parsed =
+        object(guard.around(&mut deserializer)).and_then(|request| deserializer.end().map(|()| request));
+    parsed.map_err(|error| refusal(&error, &guard, context, bytes))
+}
+
+/// The problem of a parse that failed, in a document whose JSON is this text.
+pub(super) fn refusal(
+    error: &serde_json::Error,
+    guard: &Guard<'_>,
+    context: &ParseContext<'_>,
+    text: &[u8],
+) -> Problem {
+    if let Some(stop) = guard.stop() {
+        return stopped(stop, guard, context);
+    }
+    match error.classify() {
+        Category::Syntax | Category::Eof | Category::Io => malformed_json(error),
         // The type error came first, but the rest may not even be JSON.
-        Category::Data => match serde_json::from_slice::<IgnoredAny>(bytes) {
+        Category::Data => match serde_json::from_slice::<IgnoredAny>(text) {
             Err(error) => malformed_json(&error),
-            Ok(IgnoredAny) => refusal::<T, _>(&mut serde_json::Deserializer::from_slice(bytes), &error),
+            Ok(IgnoredAny) => {
+                let message = error.to_string();
+                // The position in bytes says less than the pointer.
+                let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
+                Problem::invalid_request(guard.pointer(), shortened(message))
+            }
         },
-    })
+    }
+}
+
+fn stopped(stop: Stop, guard: &Guard<'_>, context: &ParseContext<'_>) -> Problem {
+    match stop {
+        Stop::Cancelled => Problem::from_numerics(NumericsError::Cancelled, Place::REQUEST),
+        Stop::TooLarge(excess) => context.too_large(excess, &guard.pointer()),
+    }
 }
 
 /// 400 for what is not JSON.
-pub fn malformed_json(error: &serde_json::Error) -> Problem {
+fn malformed_json(error: &serde_json::Error) -> Problem {
     Problem::new(Slug::MalformedJson, error.to_string())
-}
-
-/// 422 with a pointer: parses again, this time tracking the path, so that only refused requests pay for it.
-pub fn refusal<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D, error: &D::Error) -> Problem {
-    let mut track = serde_path_to_error::Track::new();
-    let tracked = serde_path_to_error::Deserializer::new(deserializer, &mut track);
-    let (pointer, message) = match object::<T, _>(tracked) {
-        Ok(_) => (String::new(), error.to_string()),
-        Err(error) => (pointer_of(&track.path()), error.to_string()),
-    };
-    // The position in bytes says less than the pointer.
-    let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
-    Problem::invalid_request(shortened(&pointer), shortened(message))
-}
-
-/// Clients may send megabytes where a name or number belongs.
-fn shortened(text: &str) -> String {
-    match text.char_indices().nth(MAX_SHOWN_CHARACTERS) {
-        None => text.to_owned(),
-        Some((end, _)) => format!("{}…", &text[..end]),
-    }
-}
-
-/// RFC 6901: segments behind slashes, `~` as `~0` and `/` as `~1`.
-fn pointer_of(path: &serde_path_to_error::Path) -> String {
-    use serde_path_to_error::Segment;
-    let mut pointer = String::new();
-    for segment in path {
-        let text = match segment {
-            Segment::Seq { index } => index.to_string(),
-            Segment::Map { key } => key.replace('~', "~0").replace('/', "~1"),
-            Segment::Enum { variant } => variant.clone(),
-            Segment::Unknown => continue,
-        };
-        pointer.push('/');
-        pointer.push_str(&text);
-    }
-    pointer
 }
 
 #[cfg(test)]
@@ -89,7 +83,7 @@ mod tests {
     }
 
     fn refusal(text: &str) -> (Slug, String) {
-        let problem = parse_json::<Request>(text.as_bytes()).unwrap_err();
+        let problem = parse_json::<Request>(text.as_bytes(), &ParseContext::UNLIMITED).unwrap_err();
         let document = serde_json::to_value(problem.document("")).unwrap();
         let pointer = document["errors"][0]["pointer"].as_str().unwrap_or("-").to_owned();
         (problem.slug(), pointer)
@@ -128,10 +122,12 @@ mod tests {
 
     #[test]
     fn points_are_flat_and_remember_the_first_ragged_row() {
-        let request: Request = parse_json(br#"{"points": [[1, 2], [3, 4]], "alpha": 1}"#).unwrap();
+        let request: Request =
+            parse_json(br#"{"points": [[1, 2], [3, 4]], "alpha": 1}"#, &ParseContext::UNLIMITED).unwrap();
         assert_eq!(request.points.coordinates, [1.0, 2.0, 3.0, 4.0]);
         assert_eq!((request.points.dimension, request.points.ragged, request.alpha), (2, None, Some(1.0)));
-        let request: Request = parse_json(br#"{"points": [[1, 2], [3], [4, 5], []]}"#).unwrap();
+        let request: Request =
+            parse_json(br#"{"points": [[1, 2], [3], [4, 5], []]}"#, &ParseContext::UNLIMITED).unwrap();
         assert_eq!((request.points.coordinates.len(), request.points.ragged), (2, Some((1, 1))));
     }
 }

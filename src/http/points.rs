@@ -7,6 +7,7 @@ use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 pub struct Points {
     pub coordinates: Vec<f64>,
     pub dimension: usize,
+    pub n_rows: usize,
     /// Index and length of the first ragged row, behind which nothing is kept.
     pub ragged: Option<(usize, usize)>,
 }
@@ -28,21 +29,20 @@ impl<'de> Visitor<'de> for PointsVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Points, A::Error> {
         let mut points = Points::default();
-        let mut n_rows = 0;
         loop {
             let start = points.coordinates.len();
             if rows.next_element_seed(Row(&mut points.coordinates))?.is_none() {
                 return Ok(points);
             }
             let length = points.coordinates.len() - start;
-            if n_rows == 0 {
+            if points.n_rows == 0 {
                 points.dimension = length;
             }
             if points.ragged.is_some() || length != points.dimension {
-                points.ragged = points.ragged.or(Some((n_rows, length)));
+                points.ragged = points.ragged.or(Some((points.n_rows, length)));
                 points.coordinates.truncate(start);
             }
-            n_rows += 1;
+            points.n_rows += 1;
         }
     }
 }

@@ -151,6 +151,15 @@ impl Problem {
         Self::new(Slug::Internal, "an internal error occurred; the request id identifies it in the logs")
     }
 
+    /// Adds to the detail, also where a field repeats it, what the client can do.
+    pub fn with_remedy(mut self, remedy: &str) -> Self {
+        let detail = format!("{}; {remedy}", self.detail);
+        let repeating = self.members.errors.iter_mut().filter(|error| error.detail == self.detail);
+        repeating.for_each(|error| error.detail.clone_from(&detail));
+        self.detail = detail;
+        self
+    }
+
     /// Adds a field with this problem's detail.
     pub fn at(mut self, pointer: impl Into<String>) -> Self {
         self.members.errors.push(FieldError { pointer: pointer.into(), detail: self.detail.clone() });

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::array::finite;
-use super::fields::{present, present_object, present_word, word};
+use super::fields::{present, present_object, present_unless_empty, present_word, word};
 use super::points::Points;
 use super::schemas::{CloudIdSchema, Smoothness};
 
@@ -20,9 +20,10 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub points: Option<Points>,
-    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward. An empty list
+    /// counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -164,9 +165,9 @@ pub struct Geometry {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub alpha: Option<f64>,
-    /// One entry per point of its cloud, instead of `alpha`.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, min_items = 1)]
+    /// One entry per point of its cloud, instead of `alpha`. An empty list counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false)]
     pub noise_variances: Option<Vec<f64>>,
     /// How its linear system is solved.
     #[serde(default, deserialize_with = "present_word")]
@@ -212,9 +213,9 @@ macro_rules! request {
             #[serde(default, deserialize_with = "crate::http::fields::present")]
             #[schema(nullable = false, minimum = 0.0)]
             pub alpha: Option<f64>,
-            /// The variance of the noise at each point, instead of `alpha`.
-            #[serde(default, deserialize_with = "crate::http::fields::present")]
-            #[schema(nullable = false, min_items = 1)]
+            /// The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+            #[serde(default, deserialize_with = "crate::http::fields::present_unless_empty")]
+            #[schema(nullable = false)]
             pub noise_variances: Option<Vec<f64>>,
             /// How the linear system is solved.
             #[serde(default, deserialize_with = "crate::http::fields::present_word")]

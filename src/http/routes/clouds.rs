@@ -13,8 +13,10 @@ use utoipa::ToSchema;
 
 use crate::app::App;
 use crate::http::body::read_body;
-use crate::http::fields::present;
+use crate::http::compute::JobObserver;
+use crate::http::fields::present_unless_empty;
 use crate::http::fit::{Planner, unknown_cloud};
+use crate::http::limits::ParseContext;
 use crate::http::negotiation::Format;
 use crate::http::points::Points;
 use crate::http::problem::Problem;
@@ -36,9 +38,9 @@ pub struct CloudRequest {
     /// The points, one row of coordinates each, all of the same length.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// Normals at the points, one row each, of any length but 0. Their side is outward.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    /// Normals at the points, one row each, of any length but 0. Their side is outward. An empty list counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -139,8 +141,8 @@ pub async fn create_cloud(
     let body = read_body(&parts.headers, body, &formats, app.config.max_body_bytes).await?;
     let _admission = app.compute.admit()?;
     let shared = app.clone();
-    let job = move |_: &_| {
-        let request: CloudRequest = body.parse()?;
+    let job = move |observer: &JobObserver| {
+        let request: CloudRequest = body.parse(&ParseContext::new(&shared.config, observer))?;
         let planner = Planner { app: &shared, owner };
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
         Ok::<_, Problem>((Cloud::from(stored.as_ref()), is_new))
