@@ -157,7 +157,7 @@ impl BufRead for Packed<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::observer::Unobserved;
+    use crate::numerics::observer::{Stage, Unobserved};
 
     fn compressed(coding: Coding, chunks: &[&[u8]]) -> Vec<u8> {
         let mut compressor = Compressor::new(coding).unwrap();
@@ -190,6 +190,26 @@ mod tests {
             for broken in [&body[..body.len() / 2], &body[..0], &body[1..], b"{}"] {
                 assert_eq!(slug(broken), Some(Slug::MalformedBody), "{coding:?} {broken:?}");
             }
+        }
+    }
+
+    /// Nobody waits from the start.
+    struct Left;
+
+    impl Observer for Left {
+        fn enter(&self, _stage: Stage) {}
+
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn what_nobody_waits_for_is_not_decompressed() {
+        for coding in [Coding::Gzip, Coding::Zstd] {
+            let body = compressed(coding, &[b"{}"]);
+            let refused = decompress(body, coding, 100, &Left).err().map(|problem| problem.slug());
+            assert_eq!(refused, Some(Slug::DeadlineExceeded));
         }
     }
 }

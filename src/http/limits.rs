@@ -139,3 +139,53 @@ pub(super) fn transposed(n_rows: usize, n_columns: usize) -> String {
     let rows = if n_rows == 1 { "row" } else { "rows" };
     format!("rows are points: {n_rows} {rows} of {n_columns} coordinates; transpose the array")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::Value;
+
+    use super::*;
+
+    /// Names of the members that are lists of numbers, and how deep the lists are, in a schema and all that it refers to.
+    fn lists<'a>(document: &'a Value, schema: &'a Value, found: &mut BTreeSet<(&'a str, usize)>) {
+        if let Some(reference) = schema["$ref"].as_str() {
+            let schema = document.pointer(&reference[1..]).unwrap();
+            return lists(document, schema, found);
+        }
+        for (name, member) in schema["properties"].as_object().into_iter().flatten() {
+            let (mut inner, mut depth) = (member, 0);
+            while inner["type"] == "array" {
+                (inner, depth) = (&inner["items"], depth + 1);
+            }
+            if inner["type"] == "number" && depth > 0 {
+                found.insert((name, depth));
+            }
+            lists(document, member, found);
+        }
+        for part in schema["oneOf"].as_array().into_iter().chain(schema["allOf"].as_array()).flatten() {
+            lists(document, part, found);
+        }
+    }
+
+    #[test]
+    fn every_list_of_numbers_of_a_request_has_a_limit() {
+        let document: Value = serde_json::from_str(&crate::http::openapi_json()).unwrap();
+        let mut found = BTreeSet::new();
+        for path in document["paths"].as_object().unwrap().values() {
+            lists(
+                &document,
+                &path["post"]["requestBody"]["content"]["application/json"]["schema"],
+                &mut found,
+            );
+        }
+        let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, ["noise_variances", "normals", "points", "queries", "values"]);
+        for (name, depth) in found {
+            let list = List::named(name);
+            let rows = if depth == 2 { List::Coordinates } else { List::Other };
+            assert!(list != List::Other && list.of_entries() == rows, "{name}");
+        }
+    }
+}

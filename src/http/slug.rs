@@ -181,15 +181,16 @@ impl Slug {
                 "body-too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The body is too large",
-                "The body has more bytes than GRAMIAN_MAX_BODY_BYTES. Register the cloud once and refer to it by id, or split \
-                 the queries.",
+                "The body has more bytes than GRAMIAN_MAX_BODY_BYTES, or the header of its tensors more than 64 KiB. Register \
+                 the cloud once and refer to it by id, split the queries, and send lists of numbers as tensors.",
             ),
             Self::ProblemTooLarge => (
                 "problem-too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The problem is too large",
                 "Points, dimension, queries or the size of the answer are over this server's limits. limit and required are \
-                 in the unit that the detail names.",
+                 in the unit that the detail names. Thin the cloud or register fewer points; split queries over several \
+                 requests, which share one factorization.",
             ),
             Self::Unauthorized => (
                 "unauthorized",

@@ -252,7 +252,7 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::fields::present;
+    use crate::http::fields::{present, present_object, present_unless_empty};
     use crate::http::points::Points;
 
     #[derive(Debug, Deserialize)]
@@ -352,6 +352,46 @@ mod tests {
         assert_eq!(
             refused(&safetensors(&[infinite], None)),
             (Slug::InvalidRequest, "/points/0/1".to_owned())
+        );
+    }
+
+    #[test]
+    fn lists_of_numbers_are_tensors_and_lists_of_words_are_not() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct WithWords {
+            #[serde(default, deserialize_with = "present_unless_empty")]
+            normals: Option<Points>,
+            #[serde(default, deserialize_with = "present_unless_empty")]
+            noise_variances: Option<Vec<f64>>,
+            #[serde(default, deserialize_with = "present")]
+            include: Option<Vec<String>>,
+            #[serde(default, deserialize_with = "present_object")]
+            geometry: Option<Box<WithWords>>,
+        }
+        let parse = |tensors: &[Given<'_>], text| {
+            parse_safetensors::<WithWords>(&safetensors(tensors, Some(text)), &ParseContext::UNLIMITED)
+        };
+        let text = r#"{"include": ["a", "b"], "normals": [], "geometry": {"noise_variances": []}}"#;
+        let request = parse(&[], text).unwrap();
+        assert_eq!(request.include.unwrap(), ["a", "b"]);
+        assert!(request.normals.is_none() && request.geometry.unwrap().noise_variances.is_none());
+        let noise = || ("geometry.noise_variances", Dtype::F64, &[1][..], bytes(&[1.0]));
+        for (tensors, text, pointer) in [
+            (vec![], r#"{"normals": [[1, 2]]}"#, "/normals"),
+            (vec![], r#"{"noise_variances": [1]}"#, "/noise_variances"),
+            (vec![noise()], r#"{"geometry": {"normals": [[0]]}}"#, "/geometry/normals"),
+        ] {
+            let problem = parse(&tensors, text).unwrap_err();
+            assert_eq!(describe(&problem), (Slug::InvalidRequest, pointer.to_owned()));
+            assert!(serde_json::to_string(&problem.document("")).unwrap().contains("belong in tensors"));
+        }
+        let both = parse(&[noise()], r#"{"geometry": {"noise_variances": []}}"#).unwrap_err();
+        assert_eq!(describe(&both), (Slug::InvalidRequest, "/geometry/noise_variances".to_owned()));
+        let crossed = [noise(), ("geometry", Dtype::F64, &[1][..], bytes(&[1.0]))];
+        assert_eq!(
+            describe(&parse(&crossed, "{}").unwrap_err()),
+            (Slug::InvalidRequest, "/geometry".to_owned())
         );
     }
 
