@@ -18,9 +18,11 @@ use gramian::app::App;
 use gramian::config::Config;
 use gramian::http::answer::{Answer, Member, Parts};
 use gramian::http::array::Array;
-use gramian::http::body::{Points, parse_json};
 use gramian::http::encode::Encoded;
+use gramian::http::limits::ParseContext;
 use gramian::http::negotiation::{Coding, Format, Wanted};
+use gramian::http::parse::parse_json;
+use gramian::http::points::Points;
 use gramian::http::problem::Problem;
 use gramian::store::Owner;
 
@@ -37,7 +39,7 @@ fn main() {
         "{N_POINTS} random points, {megabytes:.0} MB of JSON, MB per second of one core, best of {ROUNDS}"
     );
     let text = [br#"{"points":"#, json.as_slice(), b"}"].concat();
-    let ours = best(|| parse_json::<Request>(&text).unwrap().points.coordinates);
+    let ours = best(|| parse_json::<Request>(&text, &ParseContext::UNLIMITED).unwrap().points.coordinates);
     let theirs = best(|| serde_json::from_slice::<Vec<[f64; 3]>>(&json).unwrap());
     println!("{:44} {:8.0}", "read into the flat buffer", megabytes / ours);
     println!("{:44} {:8.0}", "the same by serde_json into [f64; 3]", megabytes / theirs);

@@ -8,7 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use gramian::http::array::Array;
-use gramian::http::body::{Points, parse_json};
+use gramian::http::limits::ParseContext;
+use gramian::http::parse::parse_json;
+use gramian::http::points::Points;
 use gramian::numerics::cloud::Cloud;
 use gramian::numerics::instruction_set::InstructionSet;
 use gramian::numerics::interpolant::Interpolant;
@@ -142,7 +144,7 @@ fn json_points() {
     let cloud = scattered(5000, 3);
     let rows: Vec<&[f64]> = cloud.points().collect();
     let text = serde_json::to_vec(&serde_json::json!({ "points": rows })).unwrap();
-    let request = measured(|| parse_json::<Request>(&text)).unwrap();
+    let request = measured(|| parse_json::<Request>(&text, &ParseContext::UNLIMITED)).unwrap();
     assert_eq!(request.points.coordinates, cloud.coordinates());
 }
 

@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::body::Points;
 use super::kernel::PlannedKernel;
+use super::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
+use super::points::Points;
 use super::problem::{Place, Problem};
 use super::shared::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use super::slug::Slug;
@@ -207,13 +208,11 @@ impl Planner<'_> {
         let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
         let (limit, required) = (self.app.config.max_queries, queries.n_points());
         if required > limit {
-            return Err(
-                Problem::too_large(Slug::ProblemTooLarge, "queries", limit, Some(required)).at("/queries")
-            );
+            return Err(too_many_queries(limit, required).at("/queries"));
         }
         let (expected, found) = (default.0.dimension(), queries.dimension());
         if expected != found {
-            return Err(Problem::dimension_mismatch("/queries", expected, found));
+            return Err(dimension_mismatch("/queries", expected, &queries));
         }
         Ok(Arc::new(queries))
     }
@@ -223,8 +222,8 @@ impl Planner<'_> {
     /// # Errors
     /// 422 `length-mismatch`.
     pub fn check_values(&self, values: &[f64], plan: &PlannedFit) -> Result<(), Problem> {
-        let (expected, found) = (plan.stored.cloud.n_points(), values.len());
-        if expected == found { Ok(()) } else { Err(Problem::length_mismatch("/values", expected, found)) }
+        let (cloud, found) = (&plan.stored.cloud, values.len());
+        if cloud.n_points() == found { Ok(()) } else { Err(length_mismatch("/values", cloud, found)) }
     }
 
     /// Admits an answer of so many numbers, and says how many they are.
@@ -237,7 +236,10 @@ impl Planner<'_> {
         if let Some(n_numbers) = n_numbers.filter(|_| required <= limit) {
             return Ok(n_numbers);
         }
-        Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)))
+        Err(Problem::too_large(Slug::ProblemTooLarge, "bytes of answer", limit, Some(required)).with_remedy(
+            "split the queries over several requests, or ask for fewer members: the factorization is kept for the next one \
+             (operators raise the limit by GRAMIAN_MAX_RESPONSE_BYTES)",
+        ))
     }
 
     /// Finds a registered cloud, or registers the points given.
@@ -273,14 +275,13 @@ impl Planner<'_> {
     ) -> Result<(Arc<StoredCloud>, bool), Problem> {
         let at = format!("{pointer}/points");
         let cloud = rectangular(points, &at, Slug::InvalidCloud)?;
-        let checks = [
-            ("points", self.app.config.max_points, cloud.n_points()),
-            ("coordinates a point", self.app.config.max_dimension, cloud.dimension()),
-        ];
-        for (what, limit, required) in checks {
-            if required > limit {
-                return Err(Problem::too_large(Slug::ProblemTooLarge, what, limit, Some(required)).at(at));
-            }
+        let (limit, required) = (self.app.config.max_points, cloud.n_points());
+        if required > limit {
+            return Err(too_many_points(limit, required).at(at));
+        }
+        let (limit, required) = (self.app.config.max_dimension, cloud.dimension());
+        if required > limit {
+            return Err(too_many_coordinates(limit, required, cloud.n_points()).at(at));
         }
         let normals = match normals {
             None => None,
@@ -355,9 +356,9 @@ impl Chosen {
             (None, None) => Ok(None),
             (Some(alpha), None) => Regularization::uniform(alpha).map(Some).map_err(refuse),
             (None, Some(variances)) => {
-                let (expected, found) = (stored.cloud.n_points(), variances.len());
-                if expected != found {
-                    return Err(Problem::length_mismatch(place.regularization, expected, found));
+                let found = variances.len();
+                if stored.cloud.n_points() != found {
+                    return Err(length_mismatch(place.regularization, &stored.cloud, found));
                 }
                 Regularization::per_point(variances).map(Some).map_err(refuse)
             }
@@ -387,14 +388,34 @@ fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Probl
     })
 }
 
+/// 422 for rows of another dimension than the cloud, with a hint if their columns would have it.
+fn dimension_mismatch(pointer: &str, expected: usize, found: &Cloud) -> Problem {
+    let problem = Problem::dimension_mismatch(pointer, expected, found.dimension());
+    if found.n_points() != expected {
+        return problem;
+    }
+    problem.with_remedy(&transposed(expected, found.dimension()))
+}
+
+/// 422 for entries that are not one per point of the cloud, with a hint if they are one per column.
+fn length_mismatch(pointer: &str, cloud: &Cloud, found: usize) -> Problem {
+    let (n_points, dimension) = (cloud.n_points(), cloud.dimension());
+    let problem = Problem::length_mismatch(pointer, n_points, found);
+    if found != dimension {
+        return problem;
+    }
+    problem.with_remedy(&format!("of the cloud, {}", transposed(n_points, dimension)))
+}
+
 /// One normal per point, of its dimension and not zero.
 fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud, Problem> {
     let normals = rectangular(normals, pointer, Slug::InvalidCloud)?;
-    if normals.n_points() != cloud.n_points() {
+    let is_transposed = normals.n_points() == cloud.dimension() && normals.dimension() == cloud.n_points();
+    if normals.n_points() != cloud.n_points() && !is_transposed {
         return Err(Problem::length_mismatch(pointer, cloud.n_points(), normals.n_points()));
     }
     if normals.dimension() != cloud.dimension() {
-        return Err(Problem::dimension_mismatch(pointer, cloud.dimension(), normals.dimension()));
+        return Err(dimension_mismatch(pointer, cloud.dimension(), &normals));
     }
     let zero = normals.points().position(|normal| normal.iter().all(|&x| x == 0.0));
     match zero {

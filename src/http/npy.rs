@@ -2,7 +2,10 @@
 //!
 //! A crate was tried and left: its parser recurses on the brackets of the client and multiplies shapes unchecked.
 
-use super::tensors::{Layout, Node, Tensor};
+use super::tensors::{Layout, MAX_HEADER_BYTES, Node, Tensor};
+
+/// Axes of an array at most, as in `NumPy` itself.
+const MAX_RANK: usize = 64;
 
 /// The header of an array of `NumPy`, and its numbers: magic, version, the length of the header, a Python dictionary with
 /// `descr`, `fortran_order` and `shape`, the numbers (NumPy Enhancement Proposal 1).
@@ -21,7 +24,8 @@ impl<'a> Npy<'a> {
             2 | 3 => rest.split_first_chunk().map(|(&n, rest)| (u32::from_le_bytes(n), rest))?,
             _ => return None,
         };
-        let (header, data) = rest.split_at_checked(usize::try_from(n_header).ok()?)?;
+        let n_header = usize::try_from(n_header).ok().filter(|&length| length <= MAX_HEADER_BYTES)?;
+        let (header, data) = rest.split_at_checked(n_header)?;
         let header = str::from_utf8(header).ok()?;
         let value = |name| Some(header.split_once(name)?.1.trim_start().strip_prefix(':')?.trim_start());
         let descr = value("'descr'")?;
@@ -36,7 +40,8 @@ impl<'a> Npy<'a> {
         };
         let shape = value("'shape'")?.strip_prefix('(')?.split_once(')')?.0;
         let lengths = shape.split(',').map(str::trim).filter(|length| !length.is_empty());
-        let shape = lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?;
+        let shape = lengths.take(MAX_RANK + 1).map(|length| length.parse().ok());
+        let shape = shape.collect::<Option<Vec<_>>>().filter(|shape| shape.len() <= MAX_RANK)?;
         Some(Self { descr, fortran_order, shape, data })
     }
 

@@ -15,6 +15,7 @@ use super::fit::{FitPlan, PlannedFit, Planner};
 use super::fitted::Fits;
 use super::fitting::Fitting;
 use super::intake::{Intake, read_body};
+use super::limits::ParseContext;
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use super::report::Report;
@@ -149,9 +150,10 @@ async fn prepare<O: Operation>(
 ) -> Result<Resolved<O::Work>, Problem> {
     let (shared, owner) = (app.clone(), admission.owner);
     let flops = intake.body.flops_to_parse();
-    let parse = move |_: &JobObserver| {
+    let parse = move |observer: &JobObserver| {
         let Intake { body, mut memory } = intake;
-        let plan = body.parse::<O>()?.plan(&Planner { app: &shared, owner })?;
+        let request: O = body.parse(&ParseContext::new(&shared.config, observer))?;
+        let plan = request.plan(&Planner { app: &shared, owner })?;
         memory.shrink_to(n_bytes_held(&plan));
         if lacking(&plan).is_some() {
             Ok(Prepared::Lacking(plan, memory))

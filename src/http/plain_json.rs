@@ -153,9 +153,14 @@ impl<'de> Deserializer<'de> for &mut PlainJson<'de> {
         visitor.visit_f64(self.number()?)
     }
 
+    /// Would recurse as deep as the text nests; every other visitor recurses as deep as its type.
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, _visitor: V) -> Result<V::Value, Unknown> {
+        Err(Unknown)
+    }
+
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf option unit unit_struct
-        newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
+        newtype_struct seq tuple tuple_struct map struct enum identifier
     }
 }
 
@@ -214,7 +219,8 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::body::{Points, present};
+    use crate::http::fields::present;
+    use crate::http::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -148,15 +148,18 @@ impl Problem {
         problem
     }
 
-    /// Says in the detail what to do about it.
-    pub fn with_remedy(mut self, remedy: &str) -> Self {
-        self.detail = format!("{}; {remedy}", self.detail);
-        self
-    }
-
     /// Says nothing internal: the log has the cause under the request id.
     pub fn internal() -> Self {
         Self::new(Slug::Internal, "an internal error occurred; the request id identifies it in the logs")
+    }
+
+    /// Adds to the detail, also where a field repeats it, what the client can do.
+    pub fn with_remedy(mut self, remedy: &str) -> Self {
+        let detail = format!("{}; {remedy}", self.detail);
+        let repeating = self.members.errors.iter_mut().filter(|error| error.detail == self.detail);
+        repeating.for_each(|error| error.detail.clone_from(&detail));
+        self.detail = detail;
+        self
     }
 
     /// Adds a field with this problem's detail.

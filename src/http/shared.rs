@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::array::finite;
-use super::body::{Points, present, present_object, present_word, word};
+use super::fields::{present, present_object, present_unless_empty, present_word, word};
+use super::points::Points;
 use super::schemas::{CloudIdSchema, Smoothness};
 
 /// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
@@ -19,9 +20,10 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub points: Option<Points>,
-    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward. An empty list
+    /// counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -163,9 +165,9 @@ pub struct Geometry {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub alpha: Option<f64>,
-    /// One entry per point of its cloud, instead of `alpha`.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, min_items = 1)]
+    /// One entry per point of its cloud, instead of `alpha`. An empty list counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false)]
     pub noise_variances: Option<Vec<f64>>,
     /// How its linear system is solved.
     #[serde(default, deserialize_with = "present_word")]
@@ -199,28 +201,28 @@ macro_rules! request {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             /// The points where values are known, or that sample the surface.
-            #[serde(deserialize_with = "crate::http::body::object")]
+            #[serde(deserialize_with = "crate::http::fields::object")]
             pub cloud: $crate::http::shared::CloudRef,
             /// The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
-            #[serde(default, deserialize_with = "crate::http::body::present_object")]
+            #[serde(default, deserialize_with = "crate::http::fields::present_object")]
             #[schema(nullable = false)]
             pub kernel: Option<$crate::http::shared::Kernel>,
             /// Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
             /// of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
             /// the noise of the points, 1e-3 at least.
-            #[serde(default, deserialize_with = "crate::http::body::present")]
+            #[serde(default, deserialize_with = "crate::http::fields::present")]
             #[schema(nullable = false, minimum = 0.0)]
             pub alpha: Option<f64>,
-            /// The variance of the noise at each point, instead of `alpha`.
-            #[serde(default, deserialize_with = "crate::http::body::present")]
-            #[schema(nullable = false, min_items = 1)]
+            /// The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+            #[serde(default, deserialize_with = "crate::http::fields::present_unless_empty")]
+            #[schema(nullable = false)]
             pub noise_variances: Option<Vec<f64>>,
             /// How the linear system is solved.
-            #[serde(default, deserialize_with = "crate::http::body::present_word")]
+            #[serde(default, deserialize_with = "crate::http::fields::present_word")]
             #[schema(nullable = false)]
             pub solver: Option<$crate::http::shared::SolverChoice>,
             /// What to do with points that coincide when alpha is 0.
-            #[serde(default, deserialize_with = "crate::http::body::present_word")]
+            #[serde(default, deserialize_with = "crate::http::fields::present_word")]
             #[schema(nullable = false)]
             pub duplicates: Option<$crate::http::shared::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*

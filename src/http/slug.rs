@@ -191,15 +191,16 @@ impl Slug {
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The body is too large",
                 "The body has more bytes than GRAMIAN_MAX_BODY_BYTES, or than the part of GRAMIAN_MEMORY_BYTES that one request \
-                 may have. Register the cloud once and refer to it by id, or split \
-                 the queries.",
+                 may have, or the header of its tensors more than 64 KiB. Register the cloud once and refer to it by id, split \
+                 the queries, and send lists of numbers as tensors.",
             ),
             Self::ProblemTooLarge => (
                 "problem-too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The problem is too large",
                 "Points, dimension, queries, the size of the answer or the memory for it are over this server's limits. limit \
-                 and required are in the unit that the detail names.",
+                 and required are in the unit that the detail names. Thin the cloud or register fewer points; split queries \
+                 over several requests, which share one factorization.",
             ),
             Self::Unauthorized => (
                 "unauthorized",

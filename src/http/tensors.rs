@@ -1,67 +1,104 @@
 //! Requests as safetensors or npy: tensors stand where JSON has arrays, and the same types read both, so that every check
 //! and every pointer is the same.
 
-use serde::de::value::StrDeserializer;
-use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use serde::forward_to_deserialize_any;
-use serde_json::{Error, Value};
+use serde_json::Error;
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-use super::body::{malformed_json, object, refusal};
+use super::fields::object;
+use super::guarded::Guard;
+use super::limits::ParseContext;
+use super::merged::{Merged, Named};
 use super::npy::Npy;
+use super::parse::refusal;
 use super::problem::Problem;
 use super::slug::Slug;
 
 /// Names in the name of a tensor at most, as in `geometry.cloud.points`; whatever follows is part of the last one.
 const MAX_DEPTH: usize = 3;
 
+/// Bytes of a header: names, shapes and the fields that are no lists of numbers, which take a few hundred. A header becomes
+/// maps and texts of several times its size before anything in it is known, so it is bounded by itself; the numbers behind it
+/// are read where they lie.
+pub(super) const MAX_HEADER_BYTES: usize = 64 << 10;
+
+/// Tensors of a request at most. No request has as many names.
+const MAX_TENSORS: usize = 64;
+
 /// Parses tensors named as the arrays, `cloud.points` within objects, with the other fields as JSON text in the metadata
 /// entry `request`.
 ///
 /// # Errors
-/// 400 for what is not safetensors or not JSON, 422 with a pointer for what is, but not this request.
-pub fn parse_safetensors<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+/// 400 for what is not safetensors or not JSON, 413 for a header or a list beyond the limits, 422 with a pointer for what is,
+/// but not this request.
+pub fn parse_safetensors<T: DeserializeOwned>(
+    bytes: &[u8],
+    context: &ParseContext<'_>,
+) -> Result<T, Problem> {
     let malformed =
         |error| Problem::new(Slug::MalformedBody, format!("the body is not safetensors: {error}"));
+    check_header(bytes)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(malformed)?;
+    if tensors.len() > MAX_TENSORS {
+        let detail =
+            format!("the body has {} tensors; no request takes more than {MAX_TENSORS}", tensors.len());
+        return Err(Problem::invalid_request("", detail));
+    }
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(malformed)?;
     let text = metadata.metadata().as_ref().and_then(|entries| entries.get("request"));
-    let fields = text.map_or("{}", String::as_str);
-    let mut request = Node::Json(serde_json::from_str(fields).map_err(|error| malformed_json(&error))?);
-    for (name, tensor) in tensors.iter() {
-        let path: Vec<&str> = name.splitn(MAX_DEPTH, '.').collect();
-        request.insert(&path, Node::of(&tensor)).map_err(|Occupied| {
-            let detail = "this is given twice, as a tensor and as a field of the metadata entry request";
-            Problem::invalid_request(format!("/{}", path.join("/")), detail)
-        })?;
+    let tensors = tensors.tensors();
+    let named = tensors.iter().map(|(name, tensor)| {
+        let path = name.splitn(MAX_DEPTH, '.').collect();
+        Named { path, node: Node::of(tensor) }
+    });
+    parse_merged(text.map_or("{}", String::as_str), &named.collect::<Vec<_>>(), context)
+}
+
+/// The header says its length in the first eight bytes. What is longer than the body is no header.
+fn check_header(bytes: &[u8]) -> Result<(), Problem> {
+    let length = bytes.first_chunk().map(|&length| u64::from_le_bytes(length));
+    match length.and_then(|length| usize::try_from(length).ok()) {
+        Some(length) if length > MAX_HEADER_BYTES && length < bytes.len() => {
+            let what = "bytes of safetensors header";
+            Err(Problem::too_large(Slug::BodyTooLarge, what, MAX_HEADER_BYTES, Some(length))
+                .with_remedy("send lists of numbers as tensors, and in the metadata only what is needed"))
+        }
+        _ => Ok(()),
     }
-    request.parse()
 }
 
 /// Parses one array into the field `points`.
 ///
 /// # Errors
-/// 400 for what is not npy, 422 with a pointer for what is, but not this request.
-pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+/// 400 for what is not npy, 413 for too many points, 422 with a pointer for what is, but not this request.
+pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
     let array = Npy::parse(bytes).and_then(Npy::into_node);
-    let array =
+    let node =
         array.ok_or_else(|| Problem::new(Slug::MalformedBody, "the body is not npy, or ends early"))?;
-    Node::Object(vec![("points".to_owned(), array)]).parse()
+    parse_merged("{}", &[Named { path: vec!["points"], node }], context)
 }
 
-/// A request: JSON with tensors in it.
+fn parse_merged<T: DeserializeOwned>(
+    text: &str,
+    tensors: &[Named<'_>],
+    context: &ParseContext<'_>,
+) -> Result<T, Problem> {
+    let guard = Guard::asking_for_any(context);
+    let mut json = serde_json::Deserializer::from_str(text);
+    let parsed = object(guard.around(Merged::new(&mut json, tensors)));
+    let parsed = parsed.and_then(|request| json.end().map(|()| request));
+    parsed.map_err(|error| refusal(&error, &guard, context, text.as_bytes()))
+}
+
+/// A member of a request that is no JSON.
 pub(super) enum Node<'a> {
-    Json(Value),
-    Object(Vec<(String, Node<'a>)>),
     Tensor(Tensor<'a>),
     /// A tensor that no field takes, and why.
     Refused(String),
 }
-
-/// A tensor has no place where something else is.
-struct Occupied;
 
 impl<'a> Node<'a> {
     fn of(view: &TensorView<'a>) -> Self {
@@ -72,42 +109,13 @@ impl<'a> Node<'a> {
         };
         Tensor::node(view.data(), view.shape(), Layout { width, is_big_endian: false, is_transposed: false })
     }
-
-    fn insert(&mut self, path: &[&str], tensor: Self) -> Result<(), Occupied> {
-        if let Node::Json(Value::Object(members)) = self {
-            let members = std::mem::take(members);
-            *self = Node::Object(members.into_iter().map(|(name, json)| (name, Node::Json(json))).collect());
-        }
-        let (Node::Object(members), Some((name, rest))) = (self, path.split_first()) else {
-            return Err(Occupied);
-        };
-        let known = members.iter().position(|(known, _)| known == name);
-        let at = match known {
-            Some(at) => at,
-            None if rest.is_empty() => {
-                members.push(((*name).to_owned(), tensor));
-                return Ok(());
-            }
-            None => {
-                members.push(((*name).to_owned(), Node::Object(Vec::new())));
-                members.len() - 1
-            }
-        };
-        members[at].1.insert(rest, tensor)
-    }
-
-    fn parse<T: DeserializeOwned>(&self) -> Result<T, Problem> {
-        object(self).map_err(|error| refusal::<T, _>(self, &error))
-    }
 }
 
-impl<'de> Deserializer<'de> for &'de Node<'_> {
+impl<'de> Deserializer<'de> for &Node<'_> {
     type Error = Error;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         match self {
-            Node::Json(value) => value.deserialize_any(visitor),
-            Node::Object(members) => visitor.visit_map(Members { rest: members.iter(), value: None }),
             Node::Tensor(tensor) => visitor.visit_seq(Rows { tensor, next: 0 }),
             Node::Refused(reason) => Err(Error::custom(reason)),
         }
@@ -116,26 +124,6 @@ impl<'de> Deserializer<'de> for &'de Node<'_> {
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
         newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
-    }
-}
-
-struct Members<'de, 'a> {
-    rest: std::slice::Iter<'de, (String, Node<'a>)>,
-    value: Option<&'de Node<'a>>,
-}
-
-impl<'de> MapAccess<'de> for Members<'de, '_> {
-    type Error = Error;
-
-    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Error> {
-        let Some((name, value)) = self.rest.next() else { return Ok(None) };
-        self.value = Some(value);
-        seed.deserialize(StrDeserializer::new(name)).map(Some)
-    }
-
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Error> {
-        let value = self.value.take().ok_or_else(|| Error::custom("a value without its name"))?;
-        seed.deserialize(value)
     }
 }
 
@@ -264,7 +252,8 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::http::body::{Points, present};
+    use crate::http::fields::{present, present_object, present_unless_empty};
+    use crate::http::points::Points;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -301,7 +290,7 @@ mod tests {
     }
 
     fn refused(body: &[u8]) -> (Slug, String) {
-        describe(&parse_safetensors::<Request>(body).unwrap_err())
+        describe(&parse_safetensors::<Request>(body, &ParseContext::UNLIMITED).unwrap_err())
     }
 
     fn describe(problem: &Problem) -> (Slug, String) {
@@ -319,14 +308,19 @@ mod tests {
         let noise = ("geometry.noise", Dtype::F64, &[1][..], bytes(&[0.5]));
         let tensors = [points(), ("values", Dtype::F32, &[2], values), noise];
         let body = safetensors(&tensors, Some(r#"{"alpha": 0.25, "geometry": {"alpha": 2}}"#));
-        let request: Request = parse_safetensors(&body).unwrap();
+        let request: Request = parse_safetensors(&body, &ParseContext::UNLIMITED).unwrap();
         assert_eq!(request.points.coordinates, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!((request.points.dimension, request.alpha), (3, Some(0.25)));
         assert_eq!(request.values.unwrap(), [f64::from(0.1f32), f64::from(0.2f32)]);
         let geometry = request.geometry.unwrap();
         assert_eq!((geometry.noise, geometry.alpha), (vec![0.5], Some(2.0)));
         // Without the metadata entry there are only tensors.
-        assert_eq!(parse_safetensors::<Request>(&safetensors(&[points()], None)).unwrap().alpha, None);
+        assert_eq!(
+            parse_safetensors::<Request>(&safetensors(&[points()], None), &ParseContext::UNLIMITED)
+                .unwrap()
+                .alpha,
+            None
+        );
     }
 
     #[test]
@@ -337,7 +331,7 @@ mod tests {
             (("frobnicate", Dtype::F64, &[1][..], number()), None, "/frobnicate"),
             (("geometry.noise.x", Dtype::F64, &[1], number()), None, "/geometry/noise"),
             (("values", Dtype::F64, &[1], number()), Some(r#"{"values": [1]}"#), "/values"),
-            (("geometry.noise", Dtype::F64, &[1], number()), Some(r#"{"geometry": 3}"#), "/geometry/noise"),
+            (("geometry.noise", Dtype::F64, &[1], number()), Some(r#"{"geometry": 3}"#), "/geometry"),
             (("values", Dtype::F64, &[1, 1], number()), None, "/values/0"),
             (("values", Dtype::F64, &[], number()), None, "/values"),
             (("values", Dtype::F64, &[1, 1, 1], number()), None, "/values"),
@@ -362,6 +356,46 @@ mod tests {
     }
 
     #[test]
+    fn lists_of_numbers_are_tensors_and_lists_of_words_are_not() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct WithWords {
+            #[serde(default, deserialize_with = "present_unless_empty")]
+            normals: Option<Points>,
+            #[serde(default, deserialize_with = "present_unless_empty")]
+            noise_variances: Option<Vec<f64>>,
+            #[serde(default, deserialize_with = "present")]
+            include: Option<Vec<String>>,
+            #[serde(default, deserialize_with = "present_object")]
+            geometry: Option<Box<WithWords>>,
+        }
+        let parse = |tensors: &[Given<'_>], text| {
+            parse_safetensors::<WithWords>(&safetensors(tensors, Some(text)), &ParseContext::UNLIMITED)
+        };
+        let text = r#"{"include": ["a", "b"], "normals": [], "geometry": {"noise_variances": []}}"#;
+        let request = parse(&[], text).unwrap();
+        assert_eq!(request.include.unwrap(), ["a", "b"]);
+        assert!(request.normals.is_none() && request.geometry.unwrap().noise_variances.is_none());
+        let noise = || ("geometry.noise_variances", Dtype::F64, &[1][..], bytes(&[1.0]));
+        for (tensors, text, pointer) in [
+            (vec![], r#"{"normals": [[1, 2]]}"#, "/normals"),
+            (vec![], r#"{"noise_variances": [1]}"#, "/noise_variances"),
+            (vec![noise()], r#"{"geometry": {"normals": [[0]]}}"#, "/geometry/normals"),
+        ] {
+            let problem = parse(&tensors, text).unwrap_err();
+            assert_eq!(describe(&problem), (Slug::InvalidRequest, pointer.to_owned()));
+            assert!(serde_json::to_string(&problem.document("")).unwrap().contains("belong in tensors"));
+        }
+        let both = parse(&[noise()], r#"{"geometry": {"noise_variances": []}}"#).unwrap_err();
+        assert_eq!(describe(&both), (Slug::InvalidRequest, "/geometry/noise_variances".to_owned()));
+        let crossed = [noise(), ("geometry", Dtype::F64, &[1][..], bytes(&[1.0]))];
+        assert_eq!(
+            describe(&parse(&crossed, "{}").unwrap_err()),
+            (Slug::InvalidRequest, "/geometry".to_owned())
+        );
+    }
+
+    #[test]
     fn what_is_no_safetensors_is_malformed() {
         let good = safetensors(&[points()], Some("{}"));
         for broken in [&good[..good.len() - 1], &good[..4], &[], b"{\"points\": [[1, 2]]}", &[0xff; 100]] {
@@ -369,7 +403,7 @@ mod tests {
         }
         assert_eq!(refused(&safetensors(&[points()], Some("{"))).0, Slug::MalformedJson);
         assert_eq!(refused(&safetensors(&[points()], Some("3"))).0, Slug::InvalidRequest);
-        let deep = "geometry.".repeat(100_000);
+        let deep = "geometry.".repeat(5000);
         let nested = safetensors(&[points(), (&deep, Dtype::F64, &[0], vec![])], None);
         assert_eq!(refused(&nested), (Slug::InvalidRequest, "/geometry/geometry".to_owned()));
     }
@@ -398,7 +432,7 @@ mod tests {
             npy("<f4", "False", "(2,3,)", &single),
             npy(">f4", "True", "( 2, 3 )", &big_single),
         ] {
-            let request: Request = parse_npy(&body).unwrap();
+            let request: Request = parse_npy(&body, &ParseContext::UNLIMITED).unwrap();
             assert_eq!((request.points.coordinates.as_slice(), request.points.dimension), (&rows[..], 3));
         }
     }
@@ -406,9 +440,10 @@ mod tests {
     #[test]
     fn npy_that_is_none_is_malformed_and_other_arrays_are_refused() {
         let data = bytes(&[1.0, 2.0]);
-        let refused = |body: &[u8]| describe(&parse_npy::<Request>(body).unwrap_err());
+        let refused =
+            |body: &[u8]| describe(&parse_npy::<Request>(body, &ParseContext::UNLIMITED).unwrap_err());
         let good = npy("<f8", "False", "(1, 2)", &data);
-        assert!(parse_npy::<Request>(&good).is_ok());
+        assert!(parse_npy::<Request>(&good, &ParseContext::UNLIMITED).is_ok());
         for broken in [&good[..good.len() - 1], &good[..20], &good[..9], &good[1..], &[]] {
             assert_eq!(refused(broken).0, Slug::MalformedBody);
         }

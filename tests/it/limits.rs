@@ -82,6 +82,13 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
     let refuses = async |path: &str, body: Value, pointer: &str, limit: u64, required: u64| {
         let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
         assert_eq!(problem["errors"][0]["pointer"], pointer);
+        let remedy = match pointer.rsplit('/').next() {
+            Some("queries") => "split them over several requests",
+            Some("points") if limit == 20 => "GRAMIAN_MAX_POINTS",
+            Some("points") => "transpose",
+            _ => "one per point",
+        };
+        assert!(problem["detail"].as_str().unwrap().contains(remedy), "{problem}");
         assert_eq!((&problem["limit"], &problem["required"]), (&json!(limit), &json!(required)), "{path}");
     };
     for route in &ROUTES {
@@ -94,6 +101,10 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
         if route.has_geometry {
             let surface = json!({"cloud": {"points": fibonacci_sphere(21)}});
             refuses(route.path, route.with("/geometry", &surface), "/geometry/cloud/points", 20, 21).await;
+        }
+        for name in ["values", "noise_variances"].into_iter().skip(usize::from(!route.has_values)) {
+            let entries = route.with(&format!("/{name}"), &json!(vec![1.0; 1000]));
+            refuses(route.path, entries, &format!("/{name}"), 20, 1000).await;
         }
         let mut good = route.request();
         good["queries"] = json!(fibonacci_sphere(5));
@@ -116,6 +127,7 @@ async fn answers_beyond_the_limit_are_refused_before_they_are_computed() {
         let mut body = route_of(path).with(&format!("/{member}"), &value);
         let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
         assert_eq!(problem["limit"], 5000);
+        assert!(problem["detail"].as_str().unwrap().contains("split the queries"), "{problem}");
         let found = problem["required"].as_u64().unwrap();
         assert!((required..=2 * required).contains(&found), "{path}: {found} against {required}");
         body["queries"] = json!([[0.5, 0.5, 2.0]]);

@@ -1,4 +1,4 @@
-//! How much memory a request takes.
+//! How much memory a request takes. `tests/parsing.rs` has what bodies take to the byte.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -133,4 +133,45 @@ async fn a_cold_factorization_takes_half_its_matrix_and_little_more() {
         let limit = 0.75 * matrix(large);
         assert!(at_large <= limit, "{path}: {at_large} bytes at the peak, {limit} allowed");
     }
+}
+
+#[tokio::test]
+async fn a_refused_body_takes_little_more_than_itself() {
+    const N_BYTES: usize = 24 << 20;
+    let repeated = |head: &str, text: &str, tail: &str| {
+        format!("{head}{}{tail}", text.repeat(N_BYTES / text.len())).into_bytes()
+    };
+    let in_metadata = |text: &str| {
+        let header = format!(r#"{{"__metadata__":{{"request":"{}"}}}}"#, text.repeat(N_BYTES / text.len()));
+        [&(header.len() as u64).to_le_bytes(), header.as_bytes()].concat()
+    };
+    let (json, safetensors) = ("application/json", "application/x-safetensors");
+    for (media_type, body, status) in [
+        (json, repeated(r#"{"cloud":{"points":[[0]]},"values":[0"#, ",1", "]}"), 413),
+        (json, repeated(r#"{"cloud":{"points":[[0]"#, ",[1]", r#"]},"values":[]}"#), 413),
+        (json, repeated(r#"{"cloud":{"points":[[0]"#, " ", r#","x"]},"values":[]}"#), 422),
+        (safetensors, in_metadata("[[[["), 413),
+        (safetensors, in_metadata("[1,1,1,1],"), 413),
+    ] {
+        let server = Process::start(&["--threads", "2"]);
+        let idle = server.peak_resident_bytes();
+        let request = reqwest::Client::new().post(server.url("/v1/interpolation"));
+        let answer = receive(request.header("content-type", media_type).body(body)).await;
+        assert_eq!(answer.status, status, "{}", answer.text());
+        let peak = server.peak_resident_bytes() - idle;
+        assert!(peak <= 3 * N_BYTES as u64, "{peak} bytes at the peak for {N_BYTES} of {media_type}");
+    }
+}
+
+#[tokio::test]
+async fn names_of_tensors_are_not_read_one_by_one() {
+    let tensor = |name: usize| format!(r#""x.{name}":{{"dtype":"F64","shape":[0],"data_offsets":[0,0]}}"#);
+    let header = format!("{{{}}}", (0..200_000).map(tensor).collect::<Vec<_>>().join(","));
+    let body = [&(header.len() as u64).to_le_bytes(), header.as_bytes()].concat();
+    let server = Process::start(&["--threads", "1", "--deadline-seconds", "60"]);
+    let request = reqwest::Client::new().post(server.url("/v1/interpolation"));
+    let request =
+        request.header("content-type", "application/x-safetensors").header("content-encoding", "zstd");
+    let answer = receive(request.body(zstd::encode_all(&body[..], 3).unwrap())).await;
+    assert_eq!(answer.status, 413, "{}", answer.text());
 }

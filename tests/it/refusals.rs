@@ -68,12 +68,73 @@ async fn entries_that_are_not_one_per_point_are_refused() {
                 let body = route.with("/values", &json!(vec![1.0; length]));
                 route.refuses(&server, &body, 422, "length-mismatch", "/values").await;
             }
+            // Empty lists of what is optional count as absent.
+            if length == 0 {
+                continue;
+            }
             let mut body = route.with("/noise_variances", &json!(vec![1e-3; length]));
             body.as_object_mut().unwrap().remove("alpha");
             route.refuses(&server, &body, 422, "length-mismatch", "/noise_variances").await;
             let normals = json!({"points": fibonacci_sphere(N_POINTS), "normals": fibonacci_sphere(length)});
-            let slug = if length == 0 { "invalid-cloud" } else { "length-mismatch" };
-            route.refuses(&server, &route.with("/cloud", &normals), 422, slug, "/cloud/normals").await;
+            let body = route.with("/cloud", &normals);
+            route.refuses(&server, &body, 422, "length-mismatch", "/cloud/normals").await;
+        }
+    }
+}
+
+#[tokio::test]
+async fn empty_normals_and_variances_count_as_absent() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(N_POINTS);
+    let registered = server.post("/v1/clouds", &json!({"points": points, "normals": []})).await;
+    assert_eq!(registered.status, 201, "{}", registered.text);
+    let id = registered.json()["cloud_id"].clone();
+    let known = server.post("/v1/clouds", &json!({"points": points})).await.expect_ok();
+    assert_eq!(known["cloud_id"], id);
+    for route in &ROUTES {
+        let plain = server.post(route.path, &route.request()).await.expect_ok();
+        let mut request = route.with("/cloud/normals", &json!([]));
+        request["noise_variances"] = json!([]);
+        if route.has_geometry {
+            request["geometry"] = json!({"noise_variances": [], "cloud": {"id": id, "normals": []}});
+        }
+        assert_eq!(server.post(route.path, &request).await.expect_ok(), plain, "{}", route.path);
+        // Rows without coordinates are no empty list.
+        let body = route.with("/cloud/normals", &json!([[], []]));
+        route.refuses(&server, &body, 422, "invalid-cloud", "/cloud/normals").await;
+    }
+}
+
+#[tokio::test]
+async fn who_sends_columns_is_told_that_rows_are_points() {
+    let server = Server::start().await;
+    let transposed: Vec<Vec<f64>> =
+        (0..3).map(|k| fibonacci_sphere(N_POINTS).iter().map(|point| point[k]).collect()).collect();
+    let detail = "rows are points: 3 rows of 20 coordinates; transpose the array";
+    for route in &ROUTES {
+        for (pointer, slug, status) in [
+            ("/cloud/points", "problem-too-large", 413),
+            ("/cloud/normals", "problem-too-large", 413),
+            ("/queries", "problem-too-large", 413),
+        ] {
+            let body = route.with(pointer, &json!(transposed));
+            let problem = route.refuses(&server, &body, status, slug, pointer).await;
+            assert!(problem["detail"].as_str().unwrap().ends_with(detail), "{problem}");
+        }
+        let few: Vec<&[f64]> = transposed.iter().map(|row| &row[..7]).collect();
+        let body = route.with("/queries", &json!(few));
+        let problem = route.refuses(&server, &body, 422, "dimension-mismatch", "/queries").await;
+        let expected = "rows are points: 3 rows of 7 coordinates; transpose the array";
+        assert!(problem["detail"].as_str().unwrap().ends_with(expected), "{problem}");
+        let cloud = json!({"points": fibonacci_sphere(7), "normals": few});
+        let body = route.with("/cloud", &cloud);
+        let problem = route.refuses(&server, &body, 422, "dimension-mismatch", "/cloud/normals").await;
+        assert!(problem["detail"].as_str().unwrap().ends_with(expected), "{problem}");
+        if route.has_values {
+            let mut body = route.with("/cloud/points", &json!(few));
+            body["values"] = json!(vec![1.0; 7]);
+            let problem = route.refuses(&server, &body, 422, "length-mismatch", "/values").await;
+            assert!(problem["detail"].as_str().unwrap().ends_with(expected), "{problem}");
         }
     }
 }

@@ -27,7 +27,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
                 Format::Npy => "The points, `[n, d]`, as little- or big-endian float64 or float32.",
                 Format::Json | Format::Safetensors => {
                     "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other fields \
-                     as JSON text in the metadata entry `request`."
+                     as JSON text in the metadata entry `request`. At most 64 tensors and a header of 64 KiB."
                 }
             });
             body.content.insert(format.media_type().to_owned(), content);

@@ -12,11 +12,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::body::{Points, present};
-use crate::http::compute::Admission;
+use crate::http::compute::{Admission, JobObserver};
+use crate::http::fields::present_unless_empty;
 use crate::http::fit::{Planner, unknown_cloud};
 use crate::http::intake::{Intake, read_body};
+use crate::http::limits::ParseContext;
 use crate::http::negotiation::Format;
+use crate::http::points::Points;
 use crate::http::problem::Problem;
 use crate::http::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::sampling::find_scales;
@@ -38,9 +40,9 @@ pub struct CloudRequest {
     /// The points, one row of coordinates each, all of the same length.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// Normals at the points, one row each, of any length but 0. Their side is outward.
-    #[serde(default, deserialize_with = "present")]
-    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+    /// Normals at the points, one row each, of any length but 0. Their side is outward. An empty list counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
 }
 
@@ -142,8 +144,8 @@ pub async fn create_cloud(
     let Intake { body, memory } = read_body(&app, owner, &parts.headers, body, &formats).await?;
     let admission = app.compute.admit(owner)?;
     let (shared, flops) = (app.clone(), body.flops_to_parse());
-    let job = move |_: &_| {
-        let request: CloudRequest = body.parse()?;
+    let job = move |observer: &JobObserver| {
+        let request: CloudRequest = body.parse(&ParseContext::new(&shared.config, observer))?;
         let planner = Planner { app: &shared, owner };
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
         let mut memory = memory;

@@ -9,11 +9,12 @@ use axum::response::Response;
 use crate::app::App;
 use crate::http::answer::answer;
 use crate::http::array::Array;
-use crate::http::body::{Points, present, present_word};
 use crate::http::compute::JobObserver;
+use crate::http::fields::{present, present_word};
 use crate::http::fit::Planner;
 use crate::http::fitted::Fits;
 use crate::http::operation::{Cost, Operation, Plan, serve};
+use crate::http::points::Points;
 use crate::http::problem::Problem;
 use crate::http::responses::ComputeProblems;
 use crate::http::shared::{

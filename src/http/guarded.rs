@@ -1,0 +1,394 @@
+//! A deserializer around another one, which keeps an eye on what passes through it.
+//!
+//! LIMITS. A list of numbers that has more entries than any request may have is counted to its end but not kept, and then
+//! refused with the number that it has. Types that derive `Deserialize` cannot be told limits, so the deserializer has
+//! them: it knows each list by its name. Alternatives were a state of the thread, which nothing would show in the types, and
+//! limits that are checked behind the parser, which took the memory first.
+//!
+//! CANCELLATION. Every few thousand entries it asks whether somebody still waits.
+//!
+//! PLACES. An error collects the names and positions that it passes on its way out, which cost nothing where there is none.
+//! (`serde_path_to_error` has the same at the price of a second parse, and cannot do the rest.)
+//!
+//! TEXT is cut before it is shown to the type: no name or word is as long, but messages repeat what they refuse.
+
+use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
+
+use serde::de::value::StrDeserializer;
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::forward_to_deserialize_any;
+
+use super::limits::{Excess, List, ParseContext};
+
+/// Entries between two looks at whether somebody waits: some 100 µs.
+const ENTRIES_PER_CHECK: u32 = 8192;
+
+/// Characters of a text that types see and clients are repeated. Nothing legal is as long.
+const MAX_SHOWN_CHARACTERS: usize = 200;
+
+/// Why parsing was stopped, whatever else there is to say about the request.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Stop {
+    Cancelled,
+    TooLarge(Excess),
+}
+
+/// What one parse has met.
+pub(super) struct Guard<'c> {
+    context: &'c ParseContext<'c>,
+    n_until_check: Cell<u32>,
+    stop: Cell<Option<Stop>>,
+    /// Entries of the row that was just read, if too many.
+    too_wide: Cell<Option<usize>>,
+    /// Where the error came from, the innermost segment first.
+    path: RefCell<Vec<String>>,
+    asks_for_any: bool,
+}
+
+impl<'c> Guard<'c> {
+    pub(super) fn new(context: &'c ParseContext<'c>) -> Self {
+        Self {
+            context,
+            n_until_check: Cell::new(0),
+            stop: Cell::new(None),
+            too_wide: Cell::new(None),
+            path: RefCell::default(),
+            asks_for_any: false,
+        }
+    }
+
+    /// For deserializers that word their own refusals when they are asked for a type: they would repeat a text of any length.
+    /// They are asked for anything instead.
+    pub(super) fn asking_for_any(context: &'c ParseContext<'c>) -> Self {
+        Self { asks_for_any: true, ..Self::new(context) }
+    }
+
+    /// The deserializer of a request, guarded.
+    pub(super) fn around<D>(&self, inner: D) -> Guarded<'_, D> {
+        Guarded { inner, guard: self, list: List::Other }
+    }
+
+    /// Whether the parse was stopped, beside being wrong.
+    pub(super) fn stop(&self) -> Option<Stop> {
+        self.stop.get()
+    }
+
+    /// Where the error came from: segments behind slashes, `~` as `~0` and `/` as `~1` (RFC 6901).
+    pub(super) fn pointer(&self) -> String {
+        let path = self.path.borrow();
+        let segments = path.iter().rev().map(|segment| segment.replace('~', "~0").replace('/', "~1"));
+        segments.flat_map(|segment| ["/".to_owned(), segment]).collect()
+    }
+
+    #[inline]
+    fn tick<E: Error>(&self) -> Result<(), E> {
+        match self.n_until_check.get() {
+            0 => self.check(),
+            n => {
+                self.n_until_check.set(n - 1);
+                Ok(())
+            }
+        }
+    }
+
+    #[cold]
+    fn check<E: Error>(&self) -> Result<(), E> {
+        self.n_until_check.set(ENTRIES_PER_CHECK);
+        if self.context.observer.is_cancelled() { Err(self.stopped(Stop::Cancelled)) } else { Ok(()) }
+    }
+
+    #[cold]
+    fn stopped<E: Error>(&self, stop: Stop) -> E {
+        self.stop.set(Some(stop));
+        E::custom("stopped")
+    }
+
+    #[cold]
+    fn passed<E>(&self, segment: impl ToString, error: E) -> E {
+        self.path.borrow_mut().push(segment.to_string());
+        error
+    }
+}
+
+/// A deserializer under guard.
+pub(super) struct Guarded<'g, D> {
+    inner: D,
+    guard: &'g Guard<'g>,
+    /// What it is, if it is a list.
+    list: List,
+}
+
+impl<'g, D> Guarded<'g, D> {
+    fn watch<V>(&self, visitor: V) -> Watched<'g, V> {
+        Watched { visitor, guard: self.guard, list: self.list }
+    }
+}
+
+impl<'de, D: Deserializer<'de>> Deserializer<'de> for Guarded<'_, D> {
+    type Error = D::Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, D::Error> {
+        let visitor = self.watch(visitor);
+        self.inner.deserialize_any(visitor)
+    }
+
+    #[inline]
+    fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, D::Error> {
+        if self.guard.asks_for_any {
+            return self.deserialize_any(visitor);
+        }
+        let visitor = self.watch(visitor);
+        self.inner.deserialize_f64(visitor)
+    }
+
+    /// What is passed over needs no guard, only a way through that does not recurse.
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, D::Error> {
+        self.inner.deserialize_ignored_any(visitor)
+    }
+
+    // Options and enumerations come by way of `fields`, as the types that they hold and as words.
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map struct enum identifier
+    }
+}
+
+/// The visitor of a type, which sees lists and objects under guard and texts cut.
+struct Watched<'g, V> {
+    visitor: V,
+    guard: &'g Guard<'g>,
+    list: List,
+}
+
+impl<'de, V: Visitor<'de>> Visitor<'de> for Watched<'_, V> {
+    type Value = V::Value;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.visitor.expecting(f)
+    }
+
+    fn visit_bool<E: Error>(self, x: bool) -> Result<V::Value, E> {
+        self.visitor.visit_bool(x)
+    }
+
+    fn visit_i64<E: Error>(self, x: i64) -> Result<V::Value, E> {
+        self.visitor.visit_i64(x)
+    }
+
+    fn visit_u64<E: Error>(self, x: u64) -> Result<V::Value, E> {
+        self.visitor.visit_u64(x)
+    }
+
+    #[inline]
+    fn visit_f64<E: Error>(self, x: f64) -> Result<V::Value, E> {
+        self.visitor.visit_f64(x)
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<V::Value, E> {
+        self.visitor.visit_unit()
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<V::Value, E> {
+        self.visitor.visit_str(&shortened(text))
+    }
+
+    #[inline]
+    fn visit_seq<A: SeqAccess<'de>>(self, entries: A) -> Result<V::Value, A::Error> {
+        let Self { guard, list, .. } = self;
+        let max_length = guard.context.max_entries(list);
+        self.visitor.visit_seq(Entries { inner: entries, guard, list, max_length, length: 0 })
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, members: A) -> Result<V::Value, A::Error> {
+        self.visitor.visit_map(Members { inner: members, guard: self.guard, name: Cow::Borrowed("") })
+    }
+}
+
+/// A value under guard.
+struct Seed<'g, S> {
+    seed: S,
+    guard: &'g Guard<'g>,
+    list: List,
+}
+
+impl<'de, S: DeserializeSeed<'de>> DeserializeSeed<'de> for Seed<'_, S> {
+    type Value = S::Value;
+
+    #[inline]
+    fn deserialize<D: Deserializer<'de>>(self, inner: D) -> Result<S::Value, D::Error> {
+        let Self { seed, guard, list } = self;
+        seed.deserialize(Guarded { inner, guard, list })
+    }
+}
+
+/// The entries of a list: as many as it may have, all of them counted.
+struct Entries<'g, A> {
+    inner: A,
+    guard: &'g Guard<'g>,
+    list: List,
+    max_length: usize,
+    length: usize,
+}
+
+impl<'de, A: SeqAccess<'de>> SeqAccess<'de> for Entries<'_, A> {
+    type Error = A::Error;
+
+    #[inline]
+    fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, A::Error> {
+        self.guard.tick()?;
+        // Tensors know their length beforehand.
+        let n_free = self.max_length - self.length;
+        if n_free == 0 || self.inner.size_hint().is_some_and(|n_rest| n_rest > n_free) {
+            return self.end(None);
+        }
+        let seed = Seed { seed, guard: self.guard, list: self.list.of_entries() };
+        let entry = self.inner.next_element_seed(seed);
+        let Some(entry) = entry.map_err(|error| self.guard.passed(self.length, error))? else {
+            return Ok(None);
+        };
+        self.length += 1;
+        if self.list.of_entries() == List::Coordinates
+            && let Some(width) = self.guard.too_wide.take()
+        {
+            return self.end(Some(width));
+        }
+        Ok(Some(entry))
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        self.inner.size_hint()
+    }
+}
+
+impl<'de, A: SeqAccess<'de>> Entries<'_, A> {
+    /// Counts what is left without keeping it. Behind a row of too many entries, that one is told.
+    #[cold]
+    fn end<T>(&mut self, width: Option<usize>) -> Result<Option<T>, A::Error> {
+        match self.inner.size_hint() {
+            Some(n_rest) => self.length += n_rest,
+            None => {
+                while self
+                    .inner
+                    .next_element_seed(Passed(self.guard))
+                    .map_err(|e| self.guard.passed(self.length, e))?
+                    .is_some()
+                {
+                    self.guard.tick()?;
+                    self.length += 1;
+                }
+            }
+        }
+        if self.length <= self.max_length && width.is_none() {
+            return Ok(None);
+        }
+        // A row ends here for the point that it is, and the list of points goes on to be counted.
+        if self.list == List::Coordinates {
+            self.guard.too_wide.set(Some(self.length));
+            return Ok(None);
+        }
+        Err(self.guard.stopped(Stop::TooLarge(Excess { list: self.list, length: self.length, width })))
+    }
+}
+
+/// A number, or a row of numbers, that is not kept.
+struct Passed<'g>(&'g Guard<'g>);
+
+impl<'de> DeserializeSeed<'de> for Passed<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Passed<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a number or a list of numbers")
+    }
+
+    fn visit_i64<E: Error>(self, _: i64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_u64<E: Error>(self, _: u64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_f64<E: Error>(self, _: f64) -> Result<(), E> {
+        Ok(())
+    }
+
+    /// What would be repeated to the client.
+    fn visit_str<E: Error>(self, text: &str) -> Result<(), E> {
+        Err(E::invalid_type(serde::de::Unexpected::Str(&shortened(text)), &self))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut row: A) -> Result<(), A::Error> {
+        let seed = || Seed { seed: std::marker::PhantomData::<f64>, guard: self.0, list: List::Other };
+        while row.next_element_seed(seed())?.is_some() {
+            self.0.tick()?;
+        }
+        Ok(())
+    }
+}
+
+/// The members of an object, each known by its name.
+struct Members<'g, 'de, A> {
+    inner: A,
+    guard: &'g Guard<'g>,
+    name: Cow<'de, str>,
+}
+
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for Members<'_, 'de, A> {
+    type Error = A::Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, A::Error> {
+        let Some(Name(name)) = self.inner.next_key()? else { return Ok(None) };
+        self.name = name;
+        let key = seed.deserialize(StrDeserializer::new(&self.name));
+        key.map(Some).map_err(|error| self.guard.passed(&self.name, error))
+    }
+
+    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, A::Error> {
+        let seed = Seed { seed, guard: self.guard, list: List::named(&self.name) };
+        self.inner.next_value_seed(seed).map_err(|error| self.guard.passed(&self.name, error))
+    }
+}
+
+/// The name of a member, cut.
+struct Name<'de>(Cow<'de, str>);
+
+impl<'de> Deserialize<'de> for Name<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameVisitor;
+
+        impl<'de> Visitor<'de> for NameVisitor {
+            type Value = Name<'de>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a name")
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<Name<'de>, E> {
+                Ok(Name(Cow::Owned(shortened(name).into_owned())))
+            }
+
+            fn visit_borrowed_str<E: Error>(self, name: &'de str) -> Result<Name<'de>, E> {
+                Ok(Name(shortened(name)))
+            }
+        }
+
+        deserializer.deserialize_str(NameVisitor)
+    }
+}
+
+/// Clients may send megabytes where a name or number belongs.
+pub(super) fn shortened(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(MAX_SHOWN_CHARACTERS) {
+        None => Cow::Borrowed(text),
+        Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
+    }
+}

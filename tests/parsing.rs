@@ -1,0 +1,421 @@
+//! Bodies as an attacker writes them: whatever they hold, they are read or refused in seconds, without a panic, and within three
+//! times their size in memory, beside what the limits let a request keep.
+//!
+//! A process of its own, for the allocator that counts. The tests wait for each other: its count is everybody's.
+
+use std::collections::HashMap;
+use std::io::Write;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use gramian::http::body::RequestBody;
+use gramian::http::fields::{
+    object, present, present_object, present_unless_empty, present_word, present_words,
+};
+use gramian::http::limits::ParseContext;
+use gramian::http::negotiation::{Coding, Format};
+use gramian::http::points::Points;
+use gramian::numerics::observer::Unobserved;
+use peak_alloc::PeakAlloc;
+use proptest::prelude::*;
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use serde::Deserialize;
+use serde_json::Value;
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+/// What any request takes, however small: tables of decoders, messages, a header of tensors.
+const BASE_BYTES: usize = 2 << 20;
+
+/// Three quarters of what is the default, so that the bodies here need not be so large.
+const LIMIT_BYTES: usize = 48 << 20;
+
+const CONTEXT: ParseContext<'static> =
+    ParseContext { max_points: 2000, max_queries: 3000, max_dimension: 16, observer: &Unobserved };
+
+/// A request with everything that requests have.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "it is parsed and dropped")]
+struct Request {
+    #[serde(deserialize_with = "object")]
+    cloud: Cloud,
+    #[serde(default, deserialize_with = "present_object")]
+    kernel: Option<Kernel>,
+    #[serde(default, deserialize_with = "present")]
+    values: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    noise_variances: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "present")]
+    queries: Option<Points>,
+    #[serde(default, deserialize_with = "present_words")]
+    include: Option<Vec<Family>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "it is parsed and dropped")]
+struct Cloud {
+    #[serde(default, deserialize_with = "present")]
+    id: Option<String>,
+    #[serde(default, deserialize_with = "present")]
+    points: Option<Points>,
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    normals: Option<Points>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "it is parsed and dropped")]
+struct Kernel {
+    #[serde(default, deserialize_with = "present_word")]
+    family: Option<Family>,
+    #[serde(default, deserialize_with = "present")]
+    length_scale: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Family {
+    Gauss,
+    Matern,
+}
+
+/// An array as npy has it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "it is parsed and dropped")]
+struct CloudRequest {
+    points: Points,
+}
+
+struct Outcome {
+    /// The document of the problem, if the body was refused.
+    problem: Option<Value>,
+    /// Bytes at the peak, the body itself included.
+    peak: usize,
+    took: Duration,
+}
+
+fn parse(format: Format, coding: Coding, body: &[u8]) -> Outcome {
+    let before = ALLOCATOR.current_usage();
+    ALLOCATOR.reset_peak_usage();
+    let began = Instant::now();
+    let request = RequestBody::new(format, coding, body.to_vec(), LIMIT_BYTES);
+    let problem = match format {
+        Format::Npy => request.parse::<CloudRequest>(&CONTEXT).err(),
+        Format::Json | Format::Safetensors => request.parse::<Request>(&CONTEXT).err(),
+    };
+    let took = began.elapsed();
+    let peak = ALLOCATOR.peak_usage() - before;
+    let problem = problem.map(|problem| serde_json::to_value(problem.document("")).unwrap());
+    Outcome { problem, peak, took }
+}
+
+fn kind(outcome: &Outcome) -> &str {
+    outcome.problem.as_ref().map_or("accepted", |problem| problem["type"].as_str().unwrap())
+}
+
+/// A body that must be answered so, within its time and memory.
+fn expect(what: &str, format: Format, body: &[u8], expected: &str) -> Outcome {
+    let outcome = parse(format, Coding::Identity, body);
+    assert_eq!(kind(&outcome), expected, "{what}: {:?}", outcome.problem);
+    let allowed = 3 * body.len() + BASE_BYTES;
+    assert!(outcome.peak <= allowed, "{what}: {} bytes at the peak for {} of body", outcome.peak, body.len());
+    assert!(outcome.took < Duration::from_secs(20), "{what}: {:?}", outcome.took);
+    outcome
+}
+
+const N_BYTES: usize = 8 << 20;
+
+fn repeated(head: &str, text: &str, tail: &str) -> Vec<u8> {
+    format!("{head}{}{tail}", text.repeat(N_BYTES / text.len())).into_bytes()
+}
+
+fn pointer(outcome: &Outcome) -> &str {
+    outcome.problem.as_ref().and_then(|problem| problem["errors"][0]["pointer"].as_str()).unwrap_or("-")
+}
+
+#[test]
+fn lists_beyond_the_limits_are_counted_but_not_kept() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    for (head, text, tail, at, limit, length) in [
+        (r#"{"values":[0"#, ",1", "]}", "/values", 2000, N_BYTES / 2 + 1),
+        (r#"{"noise_variances":[0"#, ",0.25", "]}", "/noise_variances", 2000, N_BYTES / 5 + 1),
+        (r#"{"cloud":{"points":[[0]"#, ",[1]", "]}}", "/cloud/points", 2000, N_BYTES / 4 + 1),
+        (r#"{"cloud":{"points":[[]"#, ",[]", "]}}", "/cloud/points", 2000, N_BYTES / 3 + 1),
+        (r#"{"cloud":{"normals":[[]"#, ",[1,2]", "]}}", "/cloud/normals", 2000, N_BYTES / 6 + 1),
+        (r#"{"cloud":{"points":[[0"#, ",1", "]]}}", "/cloud/points", 16, N_BYTES / 2 + 1),
+        (r#"{"queries":[[0,0]"#, ",[1,2]", "]}", "/queries", 3000, N_BYTES / 6 + 1),
+        // A text with an escape is left to the slower parser.
+        (r#"{"kernel":{"family":"g\u0061uss"},"values":[0"#, ",1", "]}", "/values", 2000, N_BYTES / 2 + 1),
+        (r#"{"kernel":{"family":"g\u0061uss"},"queries":[[0"#, ",1", "]]}", "/queries", 16, N_BYTES / 2 + 1),
+    ] {
+        let outcome = expect(head, Format::Json, &repeated(head, text, tail), "/problems/problem-too-large");
+        let problem = outcome.problem.as_ref().unwrap();
+        assert_eq!((pointer(&outcome), &problem["limit"]), (at, &limit.into()), "{problem}");
+        assert_eq!(problem["required"], length, "{problem}");
+        assert!(outcome.peak < N_BYTES + N_BYTES / 4 + BASE_BYTES, "{head}: {}", outcome.peak);
+    }
+}
+
+#[test]
+fn texts_nesting_and_names_of_megabytes_are_refused_in_bounds() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    for (head, text, tail, expected, at) in [
+        (r#"{"values":["#, "[", "", "malformed-json", "-"),
+        (r#"{"cloud":{"points":["#, "[", "", "malformed-json", "-"),
+        (r#"{"cloud":{"id":"#, r#"{"a":"#, "", "malformed-json", "-"),
+        (r#"{"values":[""#, "\u{7f}", r#""]}"#, "invalid-request", "/values/0"),
+        (r#"{"values":[""#, r"\u0007", r#""]}"#, "invalid-request", "/values/0"),
+        (r#"{"values":""#, "\u{7f}", r#""}"#, "invalid-request", "/values"),
+        (r#"{"cloud":""#, "\u{7f}", r#""}"#, "invalid-request", "/cloud"),
+        (r#"{"cloud":{"points":[["#, "1", "]]}}", "malformed-json", "-"),
+        (r#"{"cloud":{"points":[[0."#, "1", "]]}}", "accepted", "-"),
+        (r#"{"kernel":{"family":""#, "\u{7f}", r#""}}"#, "invalid-request", "/kernel/family"),
+        (r#"{"kernel":{"length_scale":""#, "\u{7f}", r#""}}"#, "invalid-request", "/kernel/length_scale"),
+        (r#"{"cloud":{"id":""#, "0", r#""}}"#, "accepted", "-"),
+        (r#"{"include":["gauss""#, r#","gauss""#, r#"],"cloud":{}}"#, "accepted", "-"),
+        (r#"{"include":["gauss""#, r#","matern""#, r#",1]}"#, "invalid-request", "/include/838861"),
+        (r#"{"cloud":{"points":[[0],[1,2]"#, " ", r#",[3,"x"]]}}"#, "invalid-request", "/cloud/points/2/1"),
+    ] {
+        let expected = if expected == "accepted" { expected.into() } else { format!("/problems/{expected}") };
+        let outcome = expect(head, Format::Json, &repeated(head, text, tail), &expected);
+        if at != "-" {
+            assert_eq!(pointer(&outcome), at);
+        }
+        let n_shown = outcome.problem.map_or(0, |problem| problem.to_string().len());
+        assert!(n_shown < 4000, "{head}: {n_shown} bytes of problem");
+    }
+    let named =
+        expect("a name", Format::Json, &repeated(r#"{""#, "\u{7f}", r#"":1}"#), "/problems/invalid-request");
+    assert!(pointer(&named).len() < 300);
+    let n = 1 << 20;
+    let nested = format!(r#"{{"cloud":{{"points":[[{}{}]]}}}}"#, "[".repeat(n), "]".repeat(n));
+    expect("closed", Format::Json, nested.as_bytes(), "/problems/malformed-json");
+}
+
+/// Safetensors with a header as it is.
+fn with_header(header: &str, data: &[u8]) -> Vec<u8> {
+    [&(header.len() as u64).to_le_bytes(), header.as_bytes(), data].concat()
+}
+
+#[test]
+fn headers_of_tensors_are_bounded() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let metadata =
+        |text: &str| format!(r#"{{"__metadata__":{{"request":{}}}}}"#, serde_json::to_string(text).unwrap());
+    let tensor = |name: usize| format!(r#""{name}":{{"dtype":"F64","shape":[0],"data_offsets":[0,0]}}"#);
+    let tensors = |n: usize| format!("{{{}}}", (0..n).map(tensor).collect::<Vec<_>>().join(","));
+    let refused = |what: &str, header: String, expected: &str| {
+        expect(what, Format::Safetensors, &with_header(&header, &[]), &format!("/problems/{expected}"))
+    };
+    for text in ["[[[[", "[1,1]", "{}", "\u{7f}"].map(|text| text.repeat(N_BYTES / text.len())) {
+        let outcome = refused("a long text", metadata(&text), "body-too-large");
+        let problem = outcome.problem.unwrap();
+        assert!(problem["limit"].as_u64() < problem["required"].as_u64(), "{problem}");
+        assert!(problem["detail"].as_str().unwrap().contains("tensors"), "{problem}");
+    }
+    refused("200,000 tensors", tensors(200_000), "body-too-large");
+    refused("1,000 tensors", tensors(1000), "invalid-request");
+    refused("nested", metadata(&"[".repeat(50_000)), "malformed-json");
+    let nested = format!(r#"{{"values": {}{}}}"#, "[".repeat(30_000), "]".repeat(30_000));
+    refused("nested and closed", metadata(&nested), "malformed-json");
+    let deep =
+        format!(r#"{{"{}":{{"dtype":"F64","shape":[0],"data_offsets":[0,0]}}}}"#, "cloud.".repeat(10_000));
+    refused("a path", deep, "invalid-request");
+    let shape =
+        format!(r#"{{"values":{{"dtype":"F64","shape":[0{}],"data_offsets":[0,0]}}}}"#, ",1".repeat(30_000));
+    assert_eq!(pointer(&refused("a shape", shape, "invalid-request")), "/values");
+}
+
+#[test]
+fn tensors_beyond_the_limits_are_refused_by_their_shape() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let n = N_BYTES / 4;
+    for (name, shape, at, limit, required) in [
+        ("values", format!("[{n}]"), "/values", 2000, n),
+        ("queries", format!("[{n},1]"), "/queries", 3000, n),
+        ("cloud.points", format!("[3,{}]", n / 3), "/cloud/points", 16, n / 3),
+        ("cloud.points", format!("[{},3]", n / 3), "/cloud/points", 2000, n / 3),
+    ] {
+        let n_bytes = if shape.contains(",3") || shape.contains("[3") { n / 3 * 12 } else { 4 * n };
+        let header =
+            format!(r#"{{"{name}":{{"dtype":"F32","shape":{shape},"data_offsets":[0,{n_bytes}]}}}}"#);
+        let body = with_header(&header, &vec![0; n_bytes]);
+        let outcome = expect(name, Format::Safetensors, &body, "/problems/problem-too-large");
+        let problem = outcome.problem.as_ref().unwrap();
+        assert_eq!((pointer(&outcome), &problem["limit"]), (at, &limit.into()), "{problem}");
+        assert_eq!(problem["required"], required, "{problem}");
+        assert!(outcome.peak < body.len() + BASE_BYTES);
+    }
+    for header in ["1,".repeat(N_BYTES / 2), "1,".repeat(30_000), "(".repeat(30_000)] {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({header})}}");
+        let mut body = b"\x93NUMPY\x02\x00".to_vec();
+        body.extend((header.len() as u32).to_le_bytes());
+        body.extend(header.bytes());
+        expect("a header of npy", Format::Npy, &body, "/problems/malformed-body");
+    }
+}
+
+fn packed(coding: Coding, plain: &[u8]) -> Vec<u8> {
+    match coding {
+        Coding::Identity => plain.to_vec(),
+        Coding::Zstd => zstd::encode_all(plain, 3).unwrap(),
+        Coding::Gzip => {
+            let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+            encoder.write_all(plain).unwrap();
+            encoder.finish().unwrap()
+        }
+    }
+}
+
+#[test]
+fn compressed_bodies_take_their_plain_size_at_most() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    for coding in [Coding::Gzip, Coding::Zstd] {
+        let mut plain = br#"{"cloud":{}"#.to_vec();
+        plain.resize(LIMIT_BYTES, b' ');
+        *plain.last_mut().unwrap() = b'}';
+        let body = packed(coding, &plain);
+        let outcome = parse(Format::Json, coding, &body);
+        assert_eq!(kind(&outcome), "accepted");
+        assert!(outcome.peak <= plain.len() + body.len() + BASE_BYTES, "{coding:?}: {}", outcome.peak);
+        plain.push(b' ');
+        let body = packed(coding, &plain);
+        let outcome = parse(Format::Json, coding, &body);
+        assert_eq!(kind(&outcome), "/problems/body-too-large");
+        assert!(outcome.peak <= body.len() + BASE_BYTES, "{coding:?}: {}", outcome.peak);
+        // A body of nothing but empty members.
+        let member = packed(coding, b"");
+        let outcome = parse(Format::Json, coding, &member.repeat((1 << 20) / member.len()));
+        assert_eq!(kind(&outcome), "/problems/malformed-json");
+        assert!(outcome.took < Duration::from_secs(20), "{coding:?}: {:?}", outcome.took);
+    }
+}
+
+fn json() -> Vec<u8> {
+    let text = r#"{"cloud": {"points": [[0.5, 1, -2e3], [3, 4.25, 5]], "normals": [[1, 0, 0], [0, 1, 0]]},
+        "kernel": {"family": "g\u0061uss", "length_scale": 0.5}, "values": [1, 2], "noise_variances": [],
+        "queries": [[1, 2, 3]], "include": ["gauss", "matern"]}"#;
+    text.as_bytes().to_vec()
+}
+
+fn safetensors() -> Vec<u8> {
+    let data: Vec<u8> = (0..12).flat_map(|i| f64::from(i).to_le_bytes()).collect();
+    let view = |shape: &[usize]| {
+        let n_bytes = 8 * shape.iter().product::<usize>();
+        TensorView::new(Dtype::F64, shape.to_vec(), &data[..n_bytes]).unwrap()
+    };
+    let tensors = [("cloud.points", view(&[2, 3])), ("values", view(&[2])), ("queries", view(&[4, 3]))];
+    let request = r#"{"kernel": {"family": "matern"}, "cloud": {"normals": []}, "include": ["gauss"]}"#;
+    let metadata = HashMap::from([("request".to_owned(), request.to_owned())]);
+    safetensors::serialize(tensors, Some(metadata)).unwrap()
+}
+
+fn npy() -> Vec<u8> {
+    let header = "{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }          \n";
+    let mut body = b"\x93NUMPY\x01\x00".to_vec();
+    body.extend((header.len() as u16).to_le_bytes());
+    body.extend(header.bytes());
+    body.extend((0..6).flat_map(|i| f64::from(i).to_le_bytes()));
+    body
+}
+
+/// What is done to a body at one place.
+#[derive(Debug, Clone)]
+enum Mutation {
+    Set(u8),
+    Insert(&'static [u8], usize),
+    Remove(usize),
+    Repeat(usize, usize),
+    Cut,
+}
+
+fn mutation() -> impl Strategy<Value = Mutation> {
+    let tokens: &[&[u8]] = &[
+        b"[",
+        b"]",
+        b"{",
+        b"}",
+        b",",
+        b":",
+        b"\"",
+        b"0",
+        b"-",
+        b"1e",
+        b"null",
+        b"[1,2],",
+        b"\\u",
+        b"\xff",
+        b"\0",
+        b"\"values\":",
+        b".",
+        b" ",
+        b"__metadata__",
+        b"18446744073709551615",
+    ];
+    prop_oneof![
+        any::<u8>().prop_map(Mutation::Set),
+        (proptest::sample::select(tokens), 1_usize..3000).prop_map(|(token, n)| Mutation::Insert(token, n)),
+        (1_usize..40).prop_map(Mutation::Remove),
+        (1_usize..60, 2_usize..500).prop_map(|(length, n)| Mutation::Repeat(length, n)),
+        Just(Mutation::Cut),
+    ]
+}
+
+fn mutate(body: &mut Vec<u8>, at: proptest::sample::Index, mutation: &Mutation) {
+    if body.is_empty() {
+        return;
+    }
+    let at = at.index(body.len());
+    let end = |length: usize| body.len().min(at + length);
+    match *mutation {
+        Mutation::Set(byte) => body[at] = byte,
+        Mutation::Insert(token, n) => drop(body.splice(at..at, token.repeat(n))),
+        Mutation::Remove(length) => drop(body.drain(at..end(length))),
+        Mutation::Repeat(length, n) => {
+            let part = body[at..end(length)].repeat(n);
+            body.splice(at..at, part);
+        }
+        Mutation::Cut => body.truncate(at),
+    }
+}
+
+#[test]
+fn mutated_bodies_are_read_or_refused() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let originals = [(Format::Json, json()), (Format::Safetensors, safetensors()), (Format::Npy, npy())];
+    for (format, body) in &originals {
+        let outcome = parse(*format, Coding::Identity, body);
+        assert_eq!(kind(&outcome), "accepted", "{format:?}: {:?}", outcome.problem);
+    }
+    let change = || (any::<proptest::sample::Index>(), mutation());
+    let strategy = (
+        proptest::sample::select(originals.to_vec()),
+        proptest::sample::select(vec![Coding::Identity, Coding::Gzip, Coding::Zstd]),
+        proptest::collection::vec(change(), 1..4),
+        proptest::option::weighted(0.3, change()),
+    );
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(6000) };
+    let rng = proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
+    let mut runner = proptest::test_runner::TestRunner::new_with_rng(config, rng);
+    let outcome = runner.run(&strategy, |((format, mut plain), coding, changes, change)| {
+        changes.iter().for_each(|(at, mutation)| mutate(&mut plain, *at, mutation));
+        let mut body = packed(coding, &plain);
+        if let Some((at, mutation)) = change {
+            mutate(&mut body, at, &mutation);
+        }
+        let outcome = parse(format, coding, &body);
+        // Numbers take up to twelve times their text while a list of them grows, which the limits bound.
+        let allowed = 16 * plain.len().max(body.len()) + BASE_BYTES;
+        prop_assert!(outcome.peak <= allowed, "{} bytes for {}", outcome.peak, plain.len());
+        prop_assert!(outcome.took < Duration::from_secs(5), "{:?}", outcome.took);
+        Ok(())
+    });
+    outcome.unwrap_or_else(|error| panic!("{error}"));
+}
