@@ -13,6 +13,7 @@ use axum::response::{IntoResponse, Response};
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use super::slug::Slug;
+use super::transport::refusal_of_head;
 use crate::app::App;
 
 /// Bytes of a method and of a path that are logged: clients may send any number.
@@ -26,8 +27,7 @@ const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'sel
 
 /// Headers that browsers obey: nothing is taken for another type than its own, and pages are shown in no frame, load nothing
 /// from elsewhere and tell nobody where a link was followed from.
-pub async fn secure(mut response: Response) -> Response {
-    let headers = response.headers_mut();
+fn secure(headers: &mut HeaderMap) {
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     let media_type = headers.get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
     if media_type.starts_with(b"text/html") {
@@ -35,10 +35,9 @@ pub async fn secure(mut response: Response) -> Response {
         headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
         headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     }
-    response
 }
 
-/// Names the request, writes problem documents that need that name, and logs one line.
+/// Names the request, refuses it if its head is ambiguous, writes problem documents that need that name, and logs one line.
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
 pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
@@ -47,7 +46,12 @@ pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: N
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
     let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
     let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
-    let mut response = with_problem_document(next.run(request).await, &request_id);
+    let response = match refusal_of_head(&request) {
+        Some(refusal) => refusal,
+        None => next.run(request).await,
+    };
+    let mut response = with_problem_document(response, &request_id);
+    secure(response.headers_mut());
     if let Ok(value) = HeaderValue::from_str(&request_id) {
         response.headers_mut().insert("x-request-id", value);
     }

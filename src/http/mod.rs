@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::http::{HeaderName, HeaderValue, Method, header};
-use axum::middleware::{from_fn, from_fn_with_state, map_response};
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{MethodRouter, get};
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -66,9 +66,7 @@ pub fn router(app: Arc<App>) -> Router {
         .layer(CatchPanicLayer::custom(middleware::recover))
         .layer(from_fn_with_state(app.clone(), transport::refuse_while_draining))
         .layer(option_layer(app.config.cors_origins.as_ref().map(cors)))
-        .layer(from_fn(transport::refuse_ambiguous_heads))
         .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
-        .layer(map_response(middleware::secure))
         .with_state(app)
 }
 

@@ -85,14 +85,12 @@ impl Arrival {
     }
 }
 
-/// Answers 400 to heads that a proxy in front may understand differently, and ends the connection: what follows on it may be a
-/// request that somebody else has smuggled in.
-pub async fn refuse_ambiguous_heads(request: Request, next: Next) -> Response {
+/// The answer (400) to a head that a proxy in front may understand differently. It ends the connection: what follows on it may
+/// be a request that somebody else has smuggled in.
+pub fn refusal_of_head(request: &Request) -> Option<Response> {
     let fault = request.extensions().get::<Arrival>().and_then(|arrival| arrival.fault);
-    let detail = fault.map(HeadFault::detail).or_else(|| host_fault(&request));
-    let Some(detail) = detail else { return next.run(request).await };
-    let version = request.version();
-    close(version, Problem::new(Slug::MalformedRequest, detail).into_response())
+    let detail = fault.map(HeadFault::detail).or_else(|| host_fault(request))?;
+    Some(close(request.version(), Problem::new(Slug::MalformedRequest, detail).into_response()))
 }
 
 /// What is wrong with the name of the host: there is exactly one, in the target or in `Host` (RFC 9112, section 3.2), but for

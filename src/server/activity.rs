@@ -70,6 +70,7 @@ impl Activity {
     /// A request has arrived; it is under way until the guard is dropped, with the body of its answer.
     pub fn enter(self: &Arc<Self>) -> InFlight {
         self.n_in_flight.fetch_add(1, Relaxed);
+        self.is_answered_early.store(false, Relaxed);
         InFlight(self.clone())
     }
 

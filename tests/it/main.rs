@@ -5,6 +5,7 @@ mod bodies;
 mod cache;
 mod clouds;
 mod compatibility;
+mod connections;
 mod contract;
 mod docs;
 mod examples;
