@@ -1,7 +1,9 @@
 //! What every request shares.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::AtomicUsize;
+
+use tokio_util::sync::CancellationToken;
 
 use crate::config::Config;
 use crate::http::auth::Keys;
@@ -25,8 +27,8 @@ pub struct App {
     pub compute: Compute,
     /// Requests between their arrival and their answer.
     pub n_requests: AtomicUsize,
-    /// Set when the server drains: it still answers, but is not ready for more.
-    pub is_draining: AtomicBool,
+    /// Cancelled when the server drains: it still answers, but is not ready for more.
+    pub draining: CancellationToken,
 }
 
 impl App {
@@ -47,7 +49,7 @@ impl App {
             memory,
             keys,
             n_requests: AtomicUsize::new(0),
-            is_draining: AtomicBool::new(false),
+            draining: CancellationToken::new(),
             config,
         }))
     }

@@ -1,7 +1,14 @@
 //! Every setting of the process: one flag and one environment variable of the same name each.
+//!
+//! A setting that is blank, no number or out of its range ends the process at the start, with its name: a service that
+//! starts with another meaning of a setting than its operator's is worse than one that does not.
 
 use std::net::SocketAddr;
+use std::str::FromStr;
 use std::time::Duration;
+
+use axum::http::Uri;
+use clap::Args;
 
 use crate::memory;
 
@@ -13,7 +20,7 @@ pub struct Config {
     pub bind: SocketAddr,
 
     /// Compute threads; 0 means one per core.
-    #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0)]
+    #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0, value_parser = whole::<0, 4096>)]
     pub threads: usize,
 
     /// Bytes of memory for everything: bodies, clouds, factorizations, work and answers. Absent: three quarters of what the
@@ -31,28 +38,32 @@ pub struct Config {
     pub cloud_bytes: usize,
 
     /// Points a cloud may have; a dense factorization takes 4 n² bytes and n³/3 flops.
-    #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 20_000)]
+    #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 20_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_points: usize,
 
     /// Queries a request may have.
-    #[arg(long, env = "GRAMIAN_MAX_QUERIES", default_value_t = 100_000)]
+    #[arg(long, env = "GRAMIAN_MAX_QUERIES", default_value_t = 100_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_queries: usize,
 
     /// Coordinates a point may have.
-    #[arg(long, env = "GRAMIAN_MAX_DIMENSION", default_value_t = 16)]
+    #[arg(long, env = "GRAMIAN_MAX_DIMENSION", default_value_t = 16, value_parser = whole::<1, MAX_COUNT>)]
     pub max_dimension: usize,
 
     /// Bytes a request body may have.
-    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 64 << 20)]
+    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 64 << 20, value_parser = whole::<1, MAX_BYTES>)]
     pub max_body_bytes: usize,
 
     /// Bytes an answer may have, estimated at 25 bytes a number before anything is computed.
-    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 512 << 20)]
+    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 512 << 20, value_parser = whole::<1, MAX_BYTES>)]
     pub max_response_bytes: usize,
 
     /// Compute requests that may wait for a thread; the next one is answered 503.
-    #[arg(long, env = "GRAMIAN_MAX_QUEUE", default_value_t = 256)]
+    #[arg(long, env = "GRAMIAN_MAX_QUEUE", default_value_t = 256, value_parser = whole::<0, MAX_COUNT>)]
     pub max_queue: usize,
+
+    /// Connections at once; beyond it the one without a request for longest is closed, or the next one is answered 503.
+    #[arg(long, env = "GRAMIAN_MAX_CONNECTIONS", default_value_t = 1000, value_parser = whole::<1, MAX_COUNT>)]
+    pub max_connections: usize,
 
     /// Seconds from the arrival of a request to its answer; later it is answered 504.
     #[arg(long, env = "GRAMIAN_DEADLINE_SECONDS", default_value_t = 120.0, value_parser = positive_seconds)]
@@ -62,13 +73,25 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_BODY_SECONDS", default_value_t = 10.0, value_parser = positive_seconds)]
     pub body_seconds: f64,
 
-    /// Bearer keys, separated by commas; none leaves the service open.
-    #[arg(long, env = "GRAMIAN_API_KEYS", value_delimiter = ',', hide_env_values = true)]
+    /// Seconds a connection may be without a request: between two of them, or with a head that is not complete.
+    #[arg(long, env = "GRAMIAN_IDLE_SECONDS", default_value_t = 60.0, value_parser = positive_seconds)]
+    pub idle_seconds: f64,
+
+    /// Seconds that a client may leave an answer unread, or fall behind a reader of 64 KiB per second; then it is cut.
+    #[arg(long, env = "GRAMIAN_SEND_SECONDS", default_value_t = 30.0, value_parser = positive_seconds)]
+    pub send_seconds: f64,
+
+    /// Seconds for clients to read their answers once the server has been told to end and computes nothing any more.
+    #[arg(long, env = "GRAMIAN_DRAIN_SECONDS", default_value_t = 30.0, value_parser = positive_seconds)]
+    pub drain_seconds: f64,
+
+    /// Bearer keys, separated by commas; without this setting the service is open.
+    #[arg(long, env = "GRAMIAN_API_KEYS", value_delimiter = ',', hide_env_values = true, value_parser = api_key)]
     pub api_keys: Vec<String>,
 
     /// Origins that browsers may call from, separated by commas, or `*`.
-    #[arg(long, env = "GRAMIAN_CORS_ORIGINS", value_delimiter = ',')]
-    pub cors_origins: Vec<String>,
+    #[arg(long, env = "GRAMIAN_CORS_ORIGINS")]
+    pub cors_origins: Option<Origins>,
 }
 
 impl Config {
@@ -94,6 +117,34 @@ impl Config {
     pub fn deadline(&self) -> Duration {
         Duration::from_secs_f64(self.deadline_seconds)
     }
+
+    /// [`Config::idle_seconds`] as a duration.
+    pub fn idle(&self) -> Duration {
+        Duration::from_secs_f64(self.idle_seconds)
+    }
+
+    /// [`Config::send_seconds`] as a duration.
+    pub fn sending(&self) -> Duration {
+        Duration::from_secs_f64(self.send_seconds)
+    }
+
+    /// [`Config::drain_seconds`] as a duration.
+    pub fn drain(&self) -> Duration {
+        Duration::from_secs_f64(self.drain_seconds)
+    }
+
+    /// Whether other machines reach it and need no key.
+    pub fn is_exposed(&self) -> bool {
+        self.api_keys.is_empty() && !self.bind.ip().to_canonical().is_loopback()
+    }
+
+    /// Those of the names that look like settings and are none: mistyped ones, most of the time.
+    pub fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
+        let command = Self::augment_args(clap::Command::new("gramian"));
+        let is_known =
+            |name: &str| command.get_arguments().any(|arg| arg.get_env().is_some_and(|env| env == name));
+        names.filter(|name| name.starts_with("GRAMIAN_") && !is_known(name)).collect()
+    }
 }
 
 /// As many as the process needs to answer at all.
@@ -104,10 +155,151 @@ fn enough_bytes(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Up to ten years, so that the deadline is representable as an instant.
+/// Bounds beyond which no machine goes, and sums of products of settings stay within 64 bits.
+const MAX_COUNT: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 50;
+
+fn whole<const MIN: u64, const MAX: u64>(text: &str) -> Result<usize, String> {
+    let number = text.parse::<u64>().ok().filter(|number| (MIN..=MAX).contains(number));
+    let number = number.and_then(|number| usize::try_from(number).ok());
+    number.ok_or_else(|| format!("must be a whole number from {MIN} to {MAX}"))
+}
+
+/// Up to ten years, so that instants that far ahead are representable.
 fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3e8 => Ok(seconds),
         _ => Err("must be a positive number of seconds, at most 3e8".to_owned()),
+    }
+}
+
+/// One entry. A blank one is refused: a variable that was meant to hold keys and holds none would leave the service open.
+fn api_key(text: &str) -> Result<String, String> {
+    match text.trim() {
+        "" => Err("a key is blank; unset GRAMIAN_API_KEYS to run without keys".to_owned()),
+        key => Ok(key.to_owned()),
+    }
+}
+
+/// Where browsers may call from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origins {
+    /// From everywhere.
+    Any,
+    /// From these, as browsers write them: `scheme://host[:port]`.
+    Listed(Vec<String>),
+}
+
+impl FromStr for Origins {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let entries: Vec<&str> = text.split(',').map(str::trim).collect();
+        match entries[..] {
+            ["*"] => Ok(Self::Any),
+            _ if entries.contains(&"*") => Err("* stands alone: it means every origin".to_owned()),
+            _ => entries.into_iter().map(origin).collect::<Result<_, _>>().map(Self::Listed),
+        }
+    }
+}
+
+/// Browsers send origins in lower case, without a path and without the port that the scheme implies; one that is written
+/// otherwise would never match.
+fn origin(text: &str) -> Result<String, String> {
+    let refused = || format!("{text:?} is no origin such as https://app.example or http://localhost:3000");
+    let uri: Uri = text.parse().map_err(|_| refused())?;
+    let (Some(scheme), Some(authority)) = (uri.scheme(), uri.authority()) else { return Err(refused()) };
+    let is_implied = |port| matches!((scheme.as_str(), port), ("http", 80) | ("https", 443));
+    let is_plain = text == format!("{scheme}://{authority}") && !text.contains('@');
+    let is_canonical = text == text.to_ascii_lowercase() && !authority.port_u16().is_some_and(is_implied);
+    let is_port = authority.port().is_some() || !authority.as_str().ends_with(':');
+    (is_plain && is_canonical && is_port && !authority.host().is_empty())
+        .then(|| text.to_owned())
+        .ok_or_else(refused)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        config: Config,
+    }
+
+    fn config(flags: &[&str]) -> Result<Config, String> {
+        let flags = Flags::try_parse_from(["gramian"].iter().chain(flags));
+        flags.map(|flags| flags.config).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn origins_are_written_as_browsers_send_them() {
+        assert_eq!("*".parse(), Ok(Origins::Any));
+        let listed = |text: &str| text.parse::<Origins>().unwrap();
+        let two = Origins::Listed(vec!["https://a.example".into(), "http://localhost:3000".into()]);
+        assert_eq!(listed("https://a.example, http://localhost:3000"), two);
+        assert_eq!(listed("http://[::1]:8080"), Origins::Listed(vec!["http://[::1]:8080".into()]));
+        for bad in [
+            "",
+            " ",
+            ",",
+            "https://a.example,",
+            "https://a.example, *",
+            "*,*",
+            "null",
+            "a.example",
+            "a.example:80",
+            "https://",
+            "https://a.example/",
+            "https://a.example/path",
+            "https://a.example?q",
+            "https://A.example",
+            "HTTPS://a.example",
+            "https://a.example:443",
+            "http://a.example:80",
+            "https://a.example:",
+            "https://me@a.example",
+            "https://a b.example",
+            "//a.example",
+            "https://a.example https://b.example",
+            "https://ä.example",
+        ] {
+            assert!(bad.parse::<Origins>().is_err(), "{bad:?} is taken");
+        }
+    }
+
+    #[test]
+    fn a_blank_key_is_refused_wherever_it_stands() {
+        for bad in ["", " ", ",", "a,", ",a", "a,,b", "a, ,b"] {
+            let error = config(&["--api-keys", bad]).unwrap_err();
+            assert!(error.contains("GRAMIAN_API_KEYS") && error.contains("--api-keys"), "{error}");
+        }
+        assert_eq!(config(&["--api-keys", " a ,b"]).unwrap().api_keys, ["a", "b"]);
+        assert!(config(&[]).unwrap().api_keys.is_empty());
+    }
+
+    #[test]
+    fn a_service_without_keys_is_exposed_beyond_the_loopback() {
+        for (bind, is_exposed) in [
+            ("127.0.0.1:0", false),
+            ("127.8.8.8:0", false),
+            ("[::1]:0", false),
+            ("[::ffff:127.0.0.1]:0", false),
+            ("0.0.0.0:0", true),
+            ("[::]:0", true),
+            ("192.0.2.1:0", true),
+        ] {
+            assert_eq!(config(&["--bind", bind]).unwrap().is_exposed(), is_exposed, "{bind}");
+            assert!(!config(&["--bind", bind, "--api-keys", "a"]).unwrap().is_exposed());
+        }
+    }
+
+    #[test]
+    fn mistyped_variables_are_found() {
+        let names = ["GRAMIAN_API_KEY", "GRAMIAN_API_KEYS", "GRAMIAN_BIND", "PATH"].map(str::to_owned);
+        assert_eq!(Config::unknown_variables(names.into_iter()), ["GRAMIAN_API_KEY"]);
     }
 }

@@ -7,7 +7,10 @@ use gramian::app::App;
 use gramian::config::Config;
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal, SignalKind, signal};
+
+/// The status of a process that was told to end and told again before it had: 128 and the number of SIGINT, as shells have it.
+const INTERRUPTED: i32 = 130;
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -50,15 +53,46 @@ fn main() -> ExitCode {
 #[tokio::main]
 async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     telemetry::start();
-    let listener = TcpListener::bind(config.bind).await?;
-    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
+    {
+        tracing::warn!(name, "there is no such setting");
+    }
+    let listener = TcpListener::bind(config.bind).await;
+    let listener =
+        listener.map_err(|error| format!("cannot listen on {} (GRAMIAN_BIND): {error}", config.bind))?;
+    if config.is_exposed() {
+        tracing::warn!("anyone who reaches this address may use the service: there are no GRAMIAN_API_KEYS");
+    }
+    let mut signals = Signals::new()?;
     let stop = async move {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
+        signals.next().await;
+        tokio::spawn(async move {
+            signals.next().await;
+            tracing::warn!("told to end a second time: ending at once");
+            std::process::exit(INTERRUPTED);
+        });
     };
-    tracing::info!(address = %listener.local_addr()?, threads = config.n_threads(), "listening");
+    let (address, n_api_keys) = (listener.local_addr()?, config.api_keys.len());
+    tracing::info!(%address, threads = config.n_threads(), n_api_keys, "listening");
     server::serve(App::new(config)?, listener, stop).await?;
     Ok(())
+}
+
+/// What tells the process to end.
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+    }
+
+    async fn next(&mut self) {
+        tokio::select! {
+            _ = self.terminate.recv() => {}
+            _ = self.interrupt.recv() => {}
+        }
+    }
 }

@@ -13,25 +13,62 @@ use axum::response::{IntoResponse, Response};
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use super::slug::Slug;
+use super::transport::refusal_of_head;
 use crate::app::App;
 
-/// Names the request, writes problem documents that need that name, and logs one line.
+/// Bytes of a method and of a path that are logged: clients may send any number.
+const LOGGED_METHOD_BYTES: usize = 32;
+const LOGGED_PATH_BYTES: usize = 200;
+
+/// What the pages for people may load and do: their own files. Swagger UI writes styles into its elements, and has icons in
+/// its style sheet.
+const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
+    font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Headers that browsers obey: nothing is taken for another type than its own, and pages are shown in no frame, load nothing
+/// from elsewhere and tell nobody where a link was followed from.
+fn secure(headers: &mut HeaderMap) {
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    let media_type = headers.get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
+    if media_type.starts_with(b"text/html") {
+        headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(PAGE_POLICY));
+        headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+        headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    }
+}
+
+/// Names the request, refuses it if its head is ambiguous, writes problem documents that need that name, and logs one line.
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
 pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let _counted = Counted::new(app);
     let began = Instant::now();
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
-    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
-    let mut response = with_problem_document(next.run(request).await, &request_id);
+    let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
+    let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
+    let response = match refusal_of_head(&request) {
+        Some(refusal) => refusal,
+        None => next.run(request).await,
+    };
+    let mut response = with_problem_document(response, &request_id);
+    secure(response.headers_mut());
     if let Ok(value) = HeaderValue::from_str(&request_id) {
         response.headers_mut().insert("x-request-id", value);
     }
     let status = response.status().as_u16();
     let duration_ms = began.elapsed().as_secs_f64() * 1e3;
     let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
-    tracing::info!(request_id, %method, path, status, duration_ms, cache, "{method} {path} {status}");
+    tracing::info!(request_id, method, path, status, duration_ms, cache, "{method} {path} {status}");
     response
+}
+
+/// The beginning of a text, with a mark where more follows.
+fn cut(text: &str, n_bytes: usize) -> String {
+    if text.len() <= n_bytes {
+        return text.to_owned();
+    }
+    let end = (0..=n_bytes).rev().find(|&end| text.is_char_boundary(end)).unwrap_or(0);
+    format!("{}…", &text[..end])
 }
 
 /// A request under way, also if its client leaves.
@@ -131,6 +168,13 @@ pub async fn meet_deadline(State(app): State<Arc<App>>, request: Request, next: 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_texts_are_cut_between_characters() {
+        assert_eq!(cut("/v1", 3), "/v1");
+        assert_eq!(cut("/v1/", 3), "/v1…");
+        assert_eq!(cut("ää", 3), "ä…");
+    }
 
     #[test]
     fn only_harmless_request_ids_are_taken_over() {

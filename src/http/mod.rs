@@ -33,6 +33,7 @@ mod schemas;
 mod shared;
 pub mod slug;
 mod tensors;
+pub mod transport;
 
 use std::sync::Arc;
 
@@ -49,6 +50,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 use crate::app::App;
+use crate::config::Origins;
 use routes::{
     clouds, interpolation, kernels, laplace_beltrami, pages, posterior, process, surface, surface_gradient,
 };
@@ -72,7 +74,8 @@ pub fn router(app: Arc<App>) -> Router {
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(CatchPanicLayer::custom(middleware::recover))
-        .layer(option_layer(cors(&app.config.cors_origins)))
+        .layer(from_fn_with_state(app.clone(), transport::refuse_while_draining))
+        .layer(option_layer(app.config.cors_origins.as_ref().map(cors)))
         .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
         .with_state(app)
 }
@@ -124,10 +127,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
 }
 
 /// Nothing unless origins are configured: then OPTIONS is a method like any other that no path has.
-fn cors(origins: &[String]) -> Option<CorsLayer> {
-    if origins.iter().all(|origin| origin.trim().is_empty()) {
-        return None;
-    }
+fn cors(origins: &Origins) -> CorsLayer {
     let exposed = ["x-request-id", "server-timing", "cache-status", "location", "retry-after", "etag"];
     let layer = CorsLayer::new()
         .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
@@ -139,9 +139,10 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
             HeaderName::from_static("x-request-id"),
         ])
         .expose_headers(exposed.map(HeaderName::from_static));
-    if origins.iter().any(|origin| origin == "*") {
-        return Some(layer.allow_origin(AllowOrigin::any()));
-    }
-    let origins = origins.iter().filter_map(|origin| HeaderValue::from_str(origin.trim()).ok());
-    Some(layer.allow_origin(AllowOrigin::list(origins)))
+    layer.allow_origin(match origins {
+        Origins::Any => AllowOrigin::any(),
+        Origins::Listed(listed) => {
+            AllowOrigin::list(listed.iter().filter_map(|origin| HeaderValue::from_str(origin).ok()))
+        }
+    })
 }

@@ -148,6 +148,14 @@ impl Problem {
         problem
     }
 
+    /// 503 for another reason than a full queue.
+    pub fn unavailable(reason: &str, retry_after_seconds: u64) -> Self {
+        let detail = format!("{reason}; try again in {retry_after_seconds} s");
+        let mut problem = Self::new(Slug::Overloaded, detail);
+        problem.members.retry_after_seconds = Some(retry_after_seconds);
+        problem
+    }
+
     /// Says nothing internal: the log has the cause under the request id.
     pub fn internal() -> Self {
         Self::new(Slug::Internal, "an internal error occurred; the request id identifies it in the logs")

@@ -1,4 +1,5 @@
-//! The problems that operations can answer, as sets for the document. [`Problem`] is what handlers return.
+//! The problems that operations can answer, as sets for the document. [`Problem`] is what handlers return. Every set has what any
+//! request may meet: an ambiguous head, a bug, and a server that drains or has no connection left.
 //!
 //! [`Problem`]: super::problem::Problem
 
@@ -27,7 +28,8 @@ macro_rules! problem_set {
 problem_set! {
     /// Operations that compute.
     ComputeProblems:
-    MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
+    ProblemTooLarge,
     UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
     KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, Internal, Overloaded, DeadlineExceeded
 }
@@ -35,43 +37,44 @@ problem_set! {
 problem_set! {
     /// The registration of a cloud.
     RegisterProblems:
-    MalformedJson, MalformedBody, Unauthorized, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge, UnsupportedMediaType,
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
+    UnsupportedMediaType,
     InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// The description of one cloud. What is not UTF-8 in the path is no path.
-    DescribeProblems: Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+    DescribeProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only look a cloud up, and answer without a body.
-    LookUpProblems: Unauthorized, UnknownCloud, NotFound, Internal
+    LookUpProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, Internal, Overloaded
 }
 
 problem_set! {
     /// The list of clouds.
-    ListProblems: Unauthorized, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
+    ListProblems: MalformedRequest, Unauthorized, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only read what is built in.
-    ReadProblems: Unauthorized, NotAcceptable, Internal
+    ReadProblems: MalformedRequest, Unauthorized, NotAcceptable, Internal, Overloaded
 }
 
 problem_set! {
-    /// Probes and pages that cannot be refused.
-    ProbeProblems: Internal
+    /// Probes and pages, which are only refused with the connection or its head.
+    ProbeProblems: MalformedRequest, Internal, Overloaded
 }
 
 problem_set! {
     /// The readiness probe.
-    ReadyProblems: Internal, Overloaded
+    ReadyProblems: MalformedRequest, Internal, Overloaded
 }
 
 problem_set! {
     /// Pages of one problem.
-    PageProblems: NotFound, Internal
+    PageProblems: MalformedRequest, NotFound, Internal, Overloaded
 }
 
 /// One response for each status, with the problems that have it and an example of each.

@@ -5,6 +5,7 @@ use axum::http::StatusCode;
 /// Every kind of problem the service answers with; part of the contract, added to and never renamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Slug {
+    MalformedRequest,
     MalformedJson,
     MalformedBody,
     InvalidRequest,
@@ -30,7 +31,8 @@ pub enum Slug {
 }
 
 impl Slug {
-    pub const ALL: [Slug; 22] = [
+    pub const ALL: [Slug; 23] = [
+        Self::MalformedRequest,
         Self::MalformedJson,
         Self::MalformedBody,
         Self::InvalidRequest,
@@ -79,6 +81,14 @@ impl Slug {
 
     fn entry(self) -> (&'static str, StatusCode, &'static str, &'static str) {
         match self {
+            Self::MalformedRequest => (
+                "malformed-request",
+                StatusCode::BAD_REQUEST,
+                "The head of the request is ambiguous",
+                "There is no Host or more than one, Host and target disagree, there is a Transfer-Encoding beside a \
+                 Content-Length or another one than chunked, or a line does not end in CR LF. Two programs may understand \
+                 such a request differently, so it is refused and the connection is closed.",
+            ),
             Self::MalformedJson => (
                 "malformed-json",
                 StatusCode::BAD_REQUEST,
@@ -212,8 +222,8 @@ impl Slug {
                 "overloaded",
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The server has all it can do",
-                "More requests wait for a thread than the server queues, the memory for requests is taken, or the server is \
-                 shutting down. Try again after the seconds in Retry-After.",
+                "More requests wait for a thread than the server queues, the memory for requests is taken, all its connections \
+                 are in use, or it is shutting down. Try again after the seconds in Retry-After.",
             ),
             Self::DeadlineExceeded => (
                 "deadline-exceeded",

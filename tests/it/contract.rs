@@ -22,9 +22,20 @@ use document::{Contract, Operation, Response, Served};
 /// Paths beside the interface, and all below them: pages for people, and the documents themselves.
 const BESIDE: [&str; 3] = ["/docs", "/openapi.json", "/openapi-3.0.json"];
 
-/// Headers that HTTP, its compression and CORS bring along with any answer. All others belong to the interface.
-const OF_HTTP: [&str; 7] =
-    ["content-type", "content-length", "content-encoding", "transfer-encoding", "connection", "date", "vary"];
+/// Headers that HTTP, its compression, CORS and what browsers obey bring along with any answer. All others belong to the interface.
+const OF_HTTP: [&str; 11] = [
+    "content-type",
+    "content-length",
+    "content-encoding",
+    "transfer-encoding",
+    "connection",
+    "date",
+    "vary",
+    "x-content-type-options",
+    "content-security-policy",
+    "x-frame-options",
+    "referrer-policy",
+];
 
 /// Panics if the document does not promise this answer.
 pub fn check(method: &str, path: &str, answer: &Received) {

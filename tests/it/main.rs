@@ -8,6 +8,7 @@ mod bodies;
 mod cache;
 mod clouds;
 mod compatibility;
+mod connections;
 mod contention;
 mod contract;
 mod docs;

@@ -1,6 +1,6 @@
 //! The binary itself: settings, readiness, logs, and how it ends.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use crate::contract::{self, Received};
 use crate::support::{fibonacci_sphere, receive};
 
 /// The binary, serving on a port of its own; killed when dropped.
@@ -219,8 +220,12 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
         "MAX_BODY_BYTES",
         "MAX_RESPONSE_BYTES",
         "MAX_QUEUE",
+        "MAX_CONNECTIONS",
         "DEADLINE_SECONDS",
         "BODY_SECONDS",
+        "IDLE_SECONDS",
+        "SEND_SECONDS",
+        "DRAIN_SECONDS",
         "API_KEYS",
         "CORS_ORIGINS",
     ] {
@@ -252,18 +257,219 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
 
 #[test]
 fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
-    for (name, value) in [
+    let never = [
         ("BIND", "nowhere"),
         ("THREADS", "-1"),
-        ("MAX_POINTS", "many"),
+        ("THREADS", "99999"),
+        ("MAX_QUEUE", "-1"),
         ("MEMORY_BYTES", "1000"),
-        ("BODY_SECONDS", "0"),
-        ("DEADLINE_SECONDS", "0"),
-        ("DEADLINE_SECONDS", "NaN"),
-    ] {
-        let output = gramian().env(format!("GRAMIAN_{name}"), value).output().unwrap();
-        assert_eq!(output.status.code(), Some(2), "{name}={value}");
+    ];
+    let counts = [
+        "MAX_POINTS",
+        "MAX_QUERIES",
+        "MAX_DIMENSION",
+        "MAX_BODY_BYTES",
+        "MAX_RESPONSE_BYTES",
+        "MAX_CONNECTIONS",
+    ];
+    let counts = counts.iter().flat_map(|name| ["0", "-1", "many", "1e30"].map(|value| (*name, value)));
+    let seconds = ["DEADLINE_SECONDS", "BODY_SECONDS", "IDLE_SECONDS", "SEND_SECONDS", "DRAIN_SECONDS"];
+    let seconds =
+        seconds.iter().flat_map(|name| ["0", "NaN", "inf", "-1", "1e30"].map(|value| (*name, value)));
+    let blank = [
+        "BIND",
+        "THREADS",
+        "MEMORY_BYTES",
+        "CACHE_BYTES",
+        "CLOUD_BYTES",
+        "MAX_POINTS",
+        "MAX_QUEUE",
+        "DEADLINE_SECONDS",
+        "API_KEYS",
+        "CORS_ORIGINS",
+    ];
+    let blank = blank.iter().flat_map(|name| ["", " "].map(|value| (*name, value)));
+    let lists = [
+        ("API_KEYS", ","),
+        ("API_KEYS", "one,,two"),
+        ("CORS_ORIGINS", "https://a.example, *"),
+        ("CORS_ORIGINS", "a.example"),
+    ];
+    for (name, value) in never.into_iter().chain(counts).chain(seconds).chain(blank).chain(lists) {
+        // On a port of its own, should it start after all.
+        let mut command = gramian();
+        command.env("GRAMIAN_BIND", "127.0.0.1:0").env(format!("GRAMIAN_{name}"), value);
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let mut text = String::new();
+        let mut stderr = BufReader::new(child.stderr.take().unwrap());
+        while !text.contains("listening") && stderr.read_line(&mut text).unwrap() > 0 {}
+        child.kill().ok();
+        assert_eq!(child.wait().unwrap().code(), Some(2), "{name}={value}: {text}");
         let flag = format!("--{}", name.to_lowercase().replace('_', "-"));
-        assert!(String::from_utf8(output.stderr).unwrap().contains(&flag), "{name}={value}");
+        assert!(text.contains(&flag), "{name}={value}: {text}");
     }
+}
+
+#[test]
+fn a_busy_port_is_named_with_its_setting() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let output = gramian().env("GRAMIAN_BIND", &address).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains(&address) && text.contains("GRAMIAN_BIND"), "{text}");
+}
+
+/// The fields of the first log line that has this text.
+fn logged(lines: &[String], text: &str) -> Value {
+    let line =
+        lines.iter().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text}: {lines:#?}"));
+    serde_json::from_str::<Value>(line).unwrap()["fields"].clone()
+}
+
+#[test]
+fn the_log_says_how_many_keys_there_are_and_which_settings_there_are_not() {
+    for (keys, n_keys) in [(None, 0), (Some("one,two"), 2)] {
+        let mut command = gramian();
+        command.args(["--bind", "127.0.0.1:0"]).env("GRAMIAN_API_KEY", "mistyped");
+        command.envs(keys.map(|keys| ("GRAMIAN_API_KEYS", keys)));
+        let process = Process::of(&mut command);
+        process.terminate();
+        let lines = process.finish().1;
+        assert_eq!(logged(&lines, "listening")["n_api_keys"], n_keys);
+        assert_eq!(logged(&lines, "no such setting")["name"], "GRAMIAN_API_KEY");
+        assert!(!lines.join("\n").contains("mistyped"));
+    }
+}
+
+#[tokio::test]
+async fn lines_of_the_log_are_short_whatever_clients_send() {
+    let process = Process::start(&[]);
+    let long = "\"%0a".repeat(5000);
+    for request in [
+        format!("GET /{long} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"),
+        format!(
+            "GET /v1/clouds?{long} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nX-Request-Id: {long}\r\n\r\n"
+        ),
+        format!("{} / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n", "M".repeat(20_000)),
+        format!("GET /v1/kernels HTTP/1.1\r\nHost: {long}\r\nConnection: close\r\n\r\n"),
+    ] {
+        let mut stream = std::net::TcpStream::connect(&process.address).unwrap();
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 "), "{answer}");
+    }
+    process.terminate();
+    let lines = process.finish().1;
+    let requests = lines.iter().filter(|line| line.contains("duration_ms"));
+    assert!(requests.count() >= 3, "{lines:#?}");
+    for line in &lines {
+        serde_json::from_str::<Value>(line).unwrap();
+        assert!(line.len() <= 1400, "{} bytes: {line}", line.len());
+    }
+}
+
+/// Asks for an answer of some 10 MB, and reads its beginning.
+fn begin_large_answer(process: &Process) -> std::net::TcpStream {
+    let mut body = curvatures(700);
+    body.as_object_mut().unwrap().remove("queries");
+    let body = body.to_string();
+    let mut stream = std::net::TcpStream::connect(&process.address).unwrap();
+    write!(
+        stream,
+        "POST /v1/laplace-beltrami/matrix HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    )
+    .unwrap();
+    let mut beginning = [0; 12];
+    stream.read_exact(&mut beginning).unwrap();
+    assert_eq!(&beginning, b"HTTP/1.1 200");
+    stream
+}
+
+#[tokio::test]
+async fn readers_are_waited_for_and_then_cut_without_an_end() {
+    let process = Process::start(&["--drain-seconds", "2"]);
+    let (mut reader, mut sleeper) = (begin_large_answer(&process), begin_large_answer(&process));
+    process.terminate();
+    let mut received = Vec::new();
+    reader.read_to_end(&mut received).unwrap();
+    assert!(received.ends_with(b"\r\n0\r\n\r\n"), "{} bytes", received.len());
+    let began = Instant::now();
+    let (status, lines) = process.finish();
+    assert!(began.elapsed() < Duration::from_secs(20));
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(logged(&lines, "are cut")["n_connections"], 1);
+    received.clear();
+    let outcome = sleeper.read_to_end(&mut received);
+    assert!(outcome.is_err() || !received.ends_with(b"0\r\n\r\n"));
+    assert!(received.len() < 8 << 20, "{} bytes", received.len());
+}
+
+#[tokio::test]
+async fn what_has_not_been_read_is_refused_while_the_server_drains() {
+    let process = Process::start(&["--drain-seconds", "60"]);
+    // It keeps the process alive.
+    let reader = begin_large_answer(&process);
+    let head = "POST /v1/normals HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n";
+    let mut uploads = [head.to_owned(), format!("{head}{{")].map(|text| {
+        let mut stream = std::net::TcpStream::connect(&process.address).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream
+    });
+    let mut kept = std::net::TcpStream::connect(&process.address).unwrap();
+    kept.write_all(b"GET /health/live HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+    kept.read_exact(&mut [0; 12]).unwrap();
+    process.terminate();
+    for upload in &mut uploads {
+        let mut text = String::new();
+        upload.read_to_string(&mut text).unwrap();
+        let answer = Received::parse(&text);
+        contract::check("POST", "/v1/normals", &answer);
+        assert_eq!((answer.status, answer.header("connection")), (503, "close"), "{text}");
+        assert_eq!(answer.json().unwrap()["type"], "/problems/overloaded");
+    }
+    // Idle connections are ended, and nobody is accepted.
+    kept.read_to_end(&mut Vec::new()).unwrap();
+    assert!(std::net::TcpStream::connect(&process.address).is_err());
+    drop(reader);
+    assert_eq!(process.finish().0.code(), Some(0));
+}
+
+#[tokio::test]
+async fn a_second_signal_ends_the_process_at_once() {
+    for second in ["-TERM", "-INT"] {
+        let mut process = Process::start(&["--drain-seconds", "3600", "--send-seconds", "3600"]);
+        let _unread = begin_large_answer(&process);
+        process.terminate();
+        let has_begun = || process.lines.lock().unwrap().iter().any(|line| line.contains("draining"));
+        while !has_begun() {
+            std::thread::yield_now();
+        }
+        assert!(process.child.try_wait().unwrap().is_none());
+        let pid = process.child.id().to_string();
+        assert!(Command::new("kill").args([second, &pid]).status().unwrap().success());
+        let began = Instant::now();
+        let (status, _) = process.finish();
+        assert!(began.elapsed() < Duration::from_secs(20));
+        assert_eq!(status.code(), Some(130));
+    }
+}
+
+#[tokio::test]
+async fn a_process_out_of_files_says_so_briefly_and_goes_on() {
+    let binary = env!("CARGO_BIN_EXE_gramian");
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -n 60; exec {binary} --bind 127.0.0.1:0 --max-connections 1000")]);
+    let process = Process::of(&mut command);
+    let idle: Vec<_> = (0..200).map(|_| std::net::TcpStream::connect(&process.address).unwrap()).collect();
+    // Idle connections make room for it, one by one.
+    assert_eq!(get(&process, "/health/live").await.0, 200);
+    drop(idle);
+    assert_eq!(get(&process, "/health/ready").await.0, 200);
+    process.terminate();
+    let lines = process.finish().1;
+    let n_lines = lines.iter().filter(|line| line.contains("cannot accept")).count();
+    assert!((1..20).contains(&n_lines), "{n_lines}");
 }

@@ -1,7 +1,6 @@
 //! What the process says of itself: health and version. None of it needs a key.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use axum::Json;
 use axum::extract::State;
@@ -62,7 +61,7 @@ pub async fn check_live() -> Json<Health> {
     security(())
 )]
 pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Problem> {
-    if app.is_draining.load(Ordering::Relaxed) {
+    if app.draining.is_cancelled() {
         return Err(Problem::overloaded(1));
     }
     app.compute.check_ready().await?;

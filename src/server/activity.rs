@@ -1,0 +1,166 @@
+//! What a connection is doing, for those who decide whether it may go on: its own deadlines, and the newcomer that needs its
+//! place.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use tokio::sync::Notify;
+
+use super::pace::Pace;
+use crate::http::transport::HeadFault;
+
+/// Time for a client to read a refusal that came before it had sent its body.
+const LINGERING: Duration = Duration::from_secs(2);
+
+/// Time for half a head to become a request, once the server drains.
+const DRAINING_IDLE: Duration = Duration::from_millis(500);
+
+/// One connection.
+pub struct Activity {
+    began: Instant,
+    n_in_flight: AtomicUsize,
+    /// Milliseconds after `began`: when it last had a request or sent a byte that was waited for.
+    idle_since: AtomicU64,
+    /// Milliseconds after `began`, plus one; 0 unless its last answer is sent and only the client's end is waited for.
+    lingering_since: AtomicU64,
+    /// The client as a reader of its socket.
+    pub pace: Pace,
+    /// Evicted in favour of a newcomer.
+    pub evicted: Notify,
+    is_evicted: AtomicBool,
+    is_draining: AtomicBool,
+    /// An answer was given up before its end: nothing must make it look complete.
+    is_broken: AtomicBool,
+    /// An answer was given before its request had been read.
+    is_answered_early: AtomicBool,
+    fault: AtomicU8,
+}
+
+/// Why a connection is ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expiry {
+    /// Without a request for too long.
+    Idle,
+    /// Its client does not read what it asked for.
+    Unread,
+}
+
+impl Activity {
+    pub fn new() -> Arc<Self> {
+        Arc::new(Self {
+            began: Instant::now(),
+            n_in_flight: 0.into(),
+            idle_since: 0.into(),
+            lingering_since: 0.into(),
+            pace: Pace::new(),
+            evicted: Notify::new(),
+            is_evicted: false.into(),
+            is_draining: false.into(),
+            is_broken: false.into(),
+            is_answered_early: false.into(),
+            fault: 0.into(),
+        })
+    }
+
+    fn now(&self) -> u64 {
+        self.began.elapsed().as_millis() as u64
+    }
+
+    /// A request has arrived; it is under way until the guard is dropped, with the body of its answer.
+    pub fn enter(self: &Arc<Self>) -> InFlight {
+        self.n_in_flight.fetch_add(1, Relaxed);
+        self.is_answered_early.store(false, Relaxed);
+        InFlight(self.clone())
+    }
+
+    /// The client took bytes that waited for it: that is not idle.
+    pub fn stir(&self) {
+        self.idle_since.store(self.now(), Relaxed);
+    }
+
+    pub fn drain(&self) {
+        self.is_draining.store(true, Relaxed);
+    }
+
+    pub fn break_answer(&self) {
+        self.is_broken.store(true, Relaxed);
+    }
+
+    /// Whether the client would take half an answer for a whole one if the connection ended in order.
+    pub fn has_half_an_answer(&self) -> bool {
+        self.is_broken.load(Relaxed) || self.n_in_flight.load(Relaxed) > 0 || self.pace.is_waiting()
+    }
+
+    pub fn answer_early(&self) {
+        self.is_answered_early.store(true, Relaxed);
+    }
+
+    /// Whether the client may still be sending what was refused.
+    pub fn is_answered_early(&self) -> bool {
+        self.is_answered_early.load(Relaxed)
+    }
+
+    /// From now on only the client's end is waited for.
+    pub fn linger(&self) {
+        let _ = self.lingering_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed);
+    }
+
+    /// A head on this connection cannot be trusted, so none that follows can.
+    pub fn distrust(&self, fault: HeadFault) {
+        self.fault.store(fault.into(), Relaxed);
+    }
+
+    pub fn fault(&self) -> Option<HeadFault> {
+        HeadFault::from_code(self.fault.load(Relaxed))
+    }
+
+    /// How long it has had no request; `None` if it has one, or is on its way out.
+    pub fn idle_for(&self) -> Option<Duration> {
+        let is_busy = self.n_in_flight.load(Relaxed) > 0 || self.pace.is_waiting();
+        (!is_busy && !self.is_evicted.load(Relaxed))
+            .then(|| Duration::from_millis(self.now().saturating_sub(self.idle_since.load(Relaxed))))
+    }
+
+    /// Ends it, in favour of another.
+    pub fn evict(&self) {
+        self.is_evicted.store(true, Relaxed);
+        self.evicted.notify_one();
+    }
+
+    /// Resolves when it has had no request for `idle`, or its client owes more than `sending` as a reader.
+    ///
+    /// Looked at from time to time, one timer for each connection: what happens on it stays free of timers.
+    pub async fn expired(&self, idle: Duration, sending: Duration) -> Expiry {
+        let tick = (idle.min(sending) / 8).clamp(Duration::from_millis(10), Duration::from_millis(500));
+        loop {
+            tokio::time::sleep(tick).await;
+            if self.pace.owed() > sending {
+                return Expiry::Unread;
+            }
+            let idle = if self.is_draining.load(Relaxed) { idle.min(DRAINING_IDLE) } else { idle };
+            let lingering_since = self.lingering_since.load(Relaxed);
+            let has_lingered = lingering_since > 0
+                && Duration::from_millis((self.now() + 1).saturating_sub(lingering_since)) > LINGERING;
+            if has_lingered || lingering_since == 0 && self.idle_for().is_some_and(|time| time >= idle) {
+                return Expiry::Idle;
+            }
+        }
+    }
+}
+
+/// A request under way, from its head to the last byte of its answer that hyper takes.
+pub struct InFlight(Arc<Activity>);
+
+impl InFlight {
+    pub fn activity(&self) -> &Activity {
+        &self.0
+    }
+}
+
+impl Drop for InFlight {
+    fn drop(&mut self) {
+        self.0.stir();
+        self.0.n_in_flight.fetch_sub(1, Relaxed);
+    }
+}

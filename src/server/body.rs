@@ -1,0 +1,156 @@
+//! The bodies of one exchange, as the connection sees them.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use bytes::Bytes;
+use http_body::{Body, Frame, SizeHint};
+use hyper::body::Incoming;
+
+use super::activity::InFlight;
+use super::pace::Pace;
+use crate::http::transport::Arrival;
+
+/// Bytes that hyper is given at a time. It takes another piece while it has less than `connection::SEND_BUFFER` unsent, so no
+/// more than the sum of the two is neither with the client nor in the body.
+const PIECE: usize = 32 << 10;
+
+/// At the end of a frame pieces are copies: a slice that hyper has not sent yet would keep the whole frame, which may be an
+/// answer of hundreds of megabytes, long after the body that paid for it.
+const COPIED_TAIL: usize = 256 << 10;
+
+/// Frames up to this size are sent as slices throughout.
+const SMALL_FRAME: usize = 2 * COPIED_TAIL;
+
+/// The body of an answer. Its request is under way until it is dropped.
+pub struct Sending<B> {
+    body: B,
+    /// What is left of the last frame.
+    rest: Bytes,
+    copies_tail: bool,
+    /// Of one stream of HTTP/2, whose client may refuse to take an answer while it reads the socket.
+    pace: Option<Arc<Pace>>,
+    /// Bytes of the last piece.
+    n_given: usize,
+    is_ended: bool,
+    in_flight: InFlight,
+}
+
+impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
+    /// Without `pace` the answer is one of HTTP/1, whose client is watched by its socket. Answers to HEAD are never sent, and
+    /// so not missed.
+    pub fn new(body: B, in_flight: InFlight, pace: Option<Arc<Pace>>, is_sent: bool) -> Self {
+        let is_ended = !is_sent || body.is_end_stream();
+        Self { body, rest: Bytes::new(), copies_tail: false, pace, n_given: 0, is_ended, in_flight }
+    }
+
+    /// The next piece of the frame. In HTTP/2 its last byte is a piece of its own: hyper hands a piece over as soon as the client has
+    /// room for one byte, so the stream is only through with an answer, and no longer watched, when there is room for it all.
+    fn next_piece(&mut self) -> Bytes {
+        let left = self.rest.len();
+        let n = match left {
+            n if n > PIECE => PIECE,
+            n if n > 1 && self.pace.is_some() => n - 1,
+            n => n,
+        };
+        let piece = self.rest.split_to(n);
+        if self.copies_tail && left <= COPIED_TAIL { Bytes::copy_from_slice(&piece) } else { piece }
+    }
+
+    fn give(&mut self, piece: Bytes) -> Frame<Bytes> {
+        self.n_given = piece.len();
+        if let Some(pace) = &self.pace {
+            pace.wait();
+        }
+        Frame::data(piece)
+    }
+}
+
+impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
+    type Data = Bytes;
+    type Error = B::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, B::Error>>> {
+        let this = &mut *self;
+        if let Some(pace) = &this.pace {
+            // Whoever asks for more has taken what was given.
+            pace.took(std::mem::take(&mut this.n_given));
+        }
+        if this.rest.is_empty() {
+            let frame = match std::task::ready!(Pin::new(&mut this.body).poll_frame(cx)) {
+                Some(Ok(frame)) => frame,
+                outcome => {
+                    this.is_ended = outcome.is_none();
+                    return Poll::Ready(outcome);
+                }
+            };
+            match frame.into_data() {
+                Ok(data) => {
+                    this.copies_tail = data.len() > SMALL_FRAME;
+                    this.rest = data;
+                }
+                Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+            }
+        }
+        let piece = this.next_piece();
+        this.is_ended = this.rest.is_empty() && this.body.is_end_stream();
+        Poll::Ready(Some(Ok(this.give(piece))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_empty() && self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let (hint, rest) = (self.body.size_hint(), self.rest.len() as u64);
+        let mut sum = SizeHint::new();
+        sum.set_lower(hint.lower().saturating_add(rest));
+        if let Some(upper) = hint.upper() {
+            sum.set_upper(upper.saturating_add(rest));
+        }
+        sum
+    }
+}
+
+impl<B> Drop for Sending<B> {
+    fn drop(&mut self) {
+        // A stream of HTTP/2 has a reset of its own.
+        if !self.is_ended && self.pace.is_none() {
+            self.in_flight.activity().break_answer();
+        }
+    }
+}
+
+/// The body of a request, which says when it is read to its end.
+pub struct Receiving {
+    pub body: Incoming,
+    pub arrival: Arrival,
+}
+
+impl Body for Receiving {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
+        let outcome = Pin::new(&mut self.body).poll_frame(cx);
+        if matches!(outcome, Poll::Ready(None)) || self.body.is_end_stream() {
+            self.arrival.set_read();
+        }
+        outcome
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}

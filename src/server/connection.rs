@@ -1,0 +1,172 @@
+//! One connection, from its first byte to its last.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use hyper::body::{Body as _, Incoming};
+use hyper::rt::Executor;
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::conn::auto;
+use tokio::net::TcpStream;
+use tokio_util::sync::CancellationToken;
+use tower::ServiceExt;
+
+use super::activity::{Activity, Expiry};
+use super::body::{Receiving, Sending};
+use super::pace::Pace;
+use super::socket::Socket;
+use crate::http::transport::Arrival;
+
+/// Bytes of a head of HTTP/1, and of what is read ahead or not yet sent; a larger head is answered 431. hyper takes 100
+/// headers at most.
+const BUFFER: usize = 64 << 10;
+
+/// Bytes of a head of HTTP/2.
+const HTTP_2_HEAD: u32 = 16 << 10;
+
+/// Bytes of an answer that a stream of HTTP/2 holds beyond what its client has room for.
+const SEND_BUFFER: usize = 32 << 10;
+
+/// Requests at once on a connection of HTTP/2.
+const STREAMS: u32 = 64;
+
+/// Bytes that a client of HTTP/2 may send before a handler reads them: of one request, and of all on its connection.
+const STREAM_WINDOW: u32 = 256 << 10;
+const CONNECTION_WINDOW: u32 = 512 << 10;
+
+/// Streams that a client has reset and the server has not looked at yet, and streams that the server had to reset: beyond
+/// them the connection is ended (CVE-2023-44487, CVE-2025-8671).
+const PENDING_RESETS: usize = 16;
+const LOCAL_RESETS: usize = 64;
+
+/// A client of HTTP/2 that does not answer a ping is gone.
+const PING_INTERVAL: Duration = Duration::from_secs(20);
+const PING_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Time to take leave of a client whose connection ends: its last frames, or its end of the connection.
+const LEAVE: Duration = Duration::from_secs(1);
+
+/// How long clients are waited for.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// Without a request: between two, or until the head of one is complete.
+    pub idle: Duration,
+    /// As a reader of an answer, beyond what its bytes take at [`super::pace::LEAST_RATE`].
+    pub sending: Duration,
+}
+
+tokio::task_local! {
+    /// The client as the reader of the stream of HTTP/2 that this task serves.
+    static STREAM: Arc<Pace>;
+}
+
+/// Serves what comes on a connection until it ends, or has to: see [`Activity::expired`]. Draining, it ends after the answers
+/// under way.
+pub async fn serve(
+    socket: TcpStream,
+    router: Router,
+    patience: Patience,
+    activity: Arc<Activity>,
+    draining: CancellationToken,
+) {
+    // Fails if the client has gone already.
+    let _ = socket.set_nodelay(true);
+    let exchanges = activity.clone();
+    let service = service_fn(move |request| exchange(request, router.clone(), exchanges.clone()));
+    let io = TokioIo::new(Socket::new(socket, activity.clone()));
+    let builder = builder(patience.sending);
+    let mut connection = std::pin::pin!(builder.serve_connection(io, service));
+    let mut expired = std::pin::pin!(activity.expired(patience.idle, patience.sending));
+    let mut is_draining = false;
+    let expiry = loop {
+        tokio::select! {
+            outcome = connection.as_mut() => {
+                if let Err(error) = outcome {
+                    tracing::debug!(%error, "connection ended");
+                }
+                return;
+            }
+            expiry = expired.as_mut() => break expiry,
+            () = activity.evicted.notified() => return,
+            () = draining.cancelled(), if !is_draining => {
+                is_draining = true;
+                activity.drain();
+                connection.as_mut().graceful_shutdown();
+            }
+        }
+    };
+    tracing::debug!(?expiry, "connection is ended");
+    if expiry == Expiry::Idle {
+        connection.as_mut().graceful_shutdown();
+        // Whoever does not answer is left without a farewell.
+        let _ = tokio::time::timeout(LEAVE, connection).await;
+    }
+}
+
+/// No timer of hyper's for heads: [`Activity::expired`] ends half a head as it ends any other idleness, also before it is
+/// known which version a connection speaks, and without a timer for each request.
+fn builder(sending: Duration) -> auto::Builder<Streams> {
+    let mut builder = auto::Builder::new(Streams { sending });
+    builder.http1().max_buf_size(BUFFER);
+    builder
+        .http2()
+        .timer(TokioTimer::new())
+        .keep_alive_interval(PING_INTERVAL)
+        .keep_alive_timeout(PING_TIMEOUT)
+        .max_header_list_size(HTTP_2_HEAD)
+        .max_concurrent_streams(STREAMS)
+        .initial_stream_window_size(STREAM_WINDOW)
+        .initial_connection_window_size(CONNECTION_WINDOW)
+        .max_send_buf_size(SEND_BUFFER)
+        .max_pending_accept_reset_streams(PENDING_RESETS)
+        .max_local_error_reset_streams(LOCAL_RESETS);
+    builder
+}
+
+/// One request and its answer.
+async fn exchange(
+    request: Request<Incoming>,
+    router: Router,
+    activity: Arc<Activity>,
+) -> Result<Response<Sending<Body>>, Infallible> {
+    let in_flight = activity.enter();
+    let arrival = Arrival::new(activity.fault());
+    if request.body().is_end_stream() {
+        arrival.set_read();
+    }
+    let is_sent = request.method() != Method::HEAD;
+    let received = arrival.clone();
+    let mut request = request.map(|body| Body::new(Receiving { body, arrival: received }));
+    request.extensions_mut().insert(arrival.clone());
+    let response = router.oneshot(request).await?;
+    let pace = STREAM.try_with(Arc::clone).ok();
+    if pace.is_none() && !arrival.is_read() {
+        activity.answer_early();
+    }
+    Ok(response.map(|body| Sending::new(body, in_flight, pace, is_sent)))
+}
+
+/// Runs the streams of HTTP/2, each for as long as its client takes what it asked for. The end of the task resets the stream
+/// and frees handler and body, also if the client leaves it no room to send; the other streams go on.
+#[derive(Clone)]
+struct Streams {
+    sending: Duration,
+}
+
+impl<F: Future<Output: Send> + Send + 'static> Executor<F> for Streams {
+    fn execute(&self, stream: F) {
+        let (pace, allowed) = (Arc::new(Pace::new()), self.sending);
+        let watched = pace.clone();
+        tokio::spawn(STREAM.scope(pace, async move {
+            tokio::select! {
+                _ = stream => {}
+                () = watched.is_overdue(allowed) => tracing::debug!("stream is reset, its answer is not read"),
+            }
+        }));
+    }
+}

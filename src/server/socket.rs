@@ -1,0 +1,114 @@
+//! The socket beneath hyper: notes when its client does not read, looks at heads, and ends as the last answer deserves.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::TcpStream;
+
+use super::activity::Activity;
+use super::head::HeadScanner;
+
+pub struct Socket {
+    inner: TcpStream,
+    activity: Arc<Activity>,
+    scanner: HeadScanner,
+    /// The last answer is sent and the client knows that none follows.
+    is_shut_down: bool,
+}
+
+impl Socket {
+    pub fn new(inner: TcpStream, activity: Arc<Activity>) -> Self {
+        Self { inner, activity, scanner: HeadScanner::new(), is_shut_down: false }
+    }
+
+    /// Counts the time in which the client does not take what is written.
+    fn note(&self, outcome: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
+        match &outcome {
+            Poll::Pending => self.activity.pace.wait(),
+            Poll::Ready(written) => {
+                if self.activity.pace.is_waiting() {
+                    self.activity.stir();
+                }
+                self.activity.pace.took(*written.as_ref().unwrap_or(&0));
+            }
+        }
+        outcome
+    }
+}
+
+impl AsyncRead for Socket {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let n_before = buffer.filled().len();
+        let outcome = Pin::new(&mut self.inner).poll_read(cx, buffer);
+        if let Err(fault) = self.scanner.scan(&buffer.filled()[n_before..]) {
+            self.activity.distrust(fault);
+        }
+        outcome
+    }
+}
+
+impl AsyncWrite for Socket {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let outcome = Pin::new(&mut self.inner).poll_write(cx, bytes);
+        self.note(outcome)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let outcome = Pin::new(&mut self.inner).poll_write_vectored(cx, slices);
+        self.note(outcome)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.inner.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.inner).poll_flush(cx)
+    }
+
+    /// Ends the answers. If the last one came before its request was read, what the client still sends is read and thrown
+    /// away for a while: closing on unread bytes would reset the connection, and take the answer from a client that only
+    /// reads after sending.
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        if !self.is_shut_down {
+            std::task::ready!(Pin::new(&mut self.inner).poll_shutdown(cx))?;
+            self.is_shut_down = true;
+        }
+        if !self.activity.is_answered_early() {
+            return Poll::Ready(Ok(()));
+        }
+        self.activity.linger();
+        let mut scratch = [0; 16 << 10];
+        // A few at a time, so that one fast client does not keep a thread.
+        for _ in 0..16 {
+            let mut buffer = ReadBuf::new(&mut scratch);
+            let outcome = std::task::ready!(Pin::new(&mut self.inner).poll_read(cx, &mut buffer));
+            if outcome.is_err() || buffer.filled().is_empty() {
+                return Poll::Ready(Ok(()));
+            }
+        }
+        cx.waker().wake_by_ref();
+        Poll::Pending
+    }
+}
+
+impl Drop for Socket {
+    /// An answer that is cut ends in a reset: to a client of HTTP/1.0 the orderly end of a connection is the end of an answer.
+    fn drop(&mut self) {
+        if self.activity.has_half_an_answer() {
+            // It fails if the client has gone, which is as well.
+            let _ = self.inner.set_zero_linger();
+        }
+    }
+}
