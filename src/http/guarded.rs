@@ -234,11 +234,13 @@ struct Entries<'g, A, const IS_BARE: bool> {
     n_left: usize,
 }
 
-impl<'g, A, const IS_BARE: bool> Entries<'g, A, IS_BARE> {
+impl<'de, 'g, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'g, A, IS_BARE> {
     fn new(inner: A, guard: &'g Guard<'g>, list: List) -> Self {
         let max_length = guard.context.max_entries(list);
-        // A row is granted its coordinates with itself.
-        let n_granted = if IS_BARE { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
+        // A row is granted its first coordinates with itself. Of a tensor it knows its length, and may be too long from the start.
+        let fits = inner.size_hint().is_none_or(|length| length <= max_length);
+        let is_granted = list == List::Coordinates && fits;
+        let n_granted = if is_granted { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
         Self { inner, guard, list, max_length, n_granted, n_left: n_granted }
     }
 
