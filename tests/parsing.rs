@@ -180,7 +180,7 @@ fn texts_nesting_and_names_of_megabytes_are_refused_in_bounds() {
         (r#"{"kernel":{"length_scale":""#, "\u{7f}", r#""}}"#, "invalid-request", "/kernel/length_scale"),
         (r#"{"cloud":{"id":""#, "0", r#""}}"#, "accepted", "-"),
         (r#"{"include":["gauss""#, r#","gauss""#, r#"],"cloud":{}}"#, "accepted", "-"),
-        (r#"{"include":["gauss""#, r#","matern""#, r#",1]}"#, "invalid-request", "/include/838861"),
+        (r#"{"include":["gauss""#, r#","matern""#, r#",1]}"#, "invalid-request", "/include/932068"),
         (r#"{"cloud":{"points":[[0],[1,2]"#, " ", r#",[3,"x"]]}}"#, "invalid-request", "/cloud/points/2/1"),
     ] {
         let expected = if expected == "accepted" { expected.into() } else { format!("/problems/{expected}") };

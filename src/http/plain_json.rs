@@ -188,6 +188,7 @@ impl Entries<'_, '_> {
 impl<'de> SeqAccess<'de> for Entries<'_, 'de> {
     type Error = Unknown;
 
+    #[inline(always)]
     fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Unknown> {
         if !self.goes_on(b']')? {
             return Ok(None);
