@@ -237,7 +237,7 @@ async fn pieces_still_to_be_sent_do_not_keep_a_whole_answer() {
             received.extend_from_slice(&piece);
             unsent.push_back(piece);
             // What hyper has not sent yet, in whichever buffer.
-            while unsent.iter().map(Bytes::len).sum::<usize>() > 100 << 10 {
+            while unsent.iter().map(Bytes::len).sum::<usize>() > 192 << 10 {
                 unsent.pop_front();
             }
         }
