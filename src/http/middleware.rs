@@ -13,7 +13,7 @@ use axum::response::{IntoResponse, Response};
 use super::negotiation::{Format, Wanted};
 use super::problem::Problem;
 use super::slug::Slug;
-use super::transport::refusal_of_head;
+use super::transport;
 use crate::app::App;
 
 /// Bytes of a method and of a path that are logged: clients may send any number.
@@ -37,19 +37,16 @@ fn secure(headers: &mut HeaderMap) {
     }
 }
 
-/// Names the request, refuses it if its head is ambiguous, writes problem documents that need that name, and logs one line.
+/// Names the request, has it answered, writes problem documents that need that name, and logs one line.
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
 pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let _counted = Counted::new(app);
+    let _counted = Counted::new(app.clone());
     let began = Instant::now();
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
     let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
     let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
-    let response = match refusal_of_head(&request) {
-        Some(refusal) => refusal,
-        None => next.run(request).await,
-    };
+    let response = transport::answer(&app, request, next).await;
     let mut response = with_problem_document(response, &request_id);
     secure(response.headers_mut());
     if let Ok(value) = HeaderValue::from_str(&request_id) {

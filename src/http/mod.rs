@@ -74,7 +74,6 @@ pub fn router(app: Arc<App>) -> Router {
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
         .layer(CatchPanicLayer::custom(middleware::recover))
-        .layer(from_fn_with_state(app.clone(), transport::refuse_while_draining))
         .layer(option_layer(app.config.cors_origins.as_ref().map(cors)))
         .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
         .with_state(app)

@@ -117,6 +117,11 @@ impl Connections {
         true
     }
 
+    /// Has each end after the answers under way.
+    pub fn drain(&self) {
+        self.activities.values().for_each(|activity| activity.drain());
+    }
+
     /// Ends all of them, wherever they are.
     pub async fn cut(&mut self) {
         self.tasks.shutdown().await;

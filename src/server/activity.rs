@@ -26,8 +26,8 @@ pub struct Activity {
     lingering_since: AtomicU64,
     /// The client as a reader of its socket.
     pub pace: Pace,
-    /// Evicted in favour of a newcomer.
-    pub evicted: Notify,
+    /// Somebody else has decided about it: see [`Activity::notice`].
+    noticed: Notify,
     is_evicted: AtomicBool,
     is_draining: AtomicBool,
     /// An answer was given up before its end: nothing must make it look complete.
@@ -46,6 +46,15 @@ pub enum Expiry {
     Unread,
 }
 
+/// What others have decided about a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notice {
+    /// A newcomer needs its place.
+    Evicted,
+    /// The server ends.
+    Draining,
+}
+
 impl Activity {
     pub fn new() -> Arc<Self> {
         Arc::new(Self {
@@ -54,7 +63,7 @@ impl Activity {
             idle_since: 0.into(),
             lingering_since: 0.into(),
             pace: Pace::new(),
-            evicted: Notify::new(),
+            noticed: Notify::new(),
             is_evicted: false.into(),
             is_draining: false.into(),
             is_broken: false.into(),
@@ -77,10 +86,6 @@ impl Activity {
     /// The client took bytes that waited for it: that is not idle.
     pub fn stir(&self) {
         self.idle_since.store(self.now(), Relaxed);
-    }
-
-    pub fn drain(&self) {
-        self.is_draining.store(true, Relaxed);
     }
 
     pub fn break_answer(&self) {
@@ -122,10 +127,22 @@ impl Activity {
             .then(|| Duration::from_millis(self.now().saturating_sub(self.idle_since.load(Relaxed))))
     }
 
-    /// Ends it, in favour of another.
+    /// Ends it at once, in favour of another.
     pub fn evict(&self) {
         self.is_evicted.store(true, Relaxed);
-        self.evicted.notify_one();
+        self.noticed.notify_one();
+    }
+
+    /// Ends it after the answers under way.
+    pub fn drain(&self) {
+        self.is_draining.store(true, Relaxed);
+        self.noticed.notify_one();
+    }
+
+    /// Resolves when it is to end: at once or after the answers under way.
+    pub async fn notice(&self) -> Notice {
+        self.noticed.notified().await;
+        if self.is_evicted.load(Relaxed) { Notice::Evicted } else { Notice::Draining }
     }
 
     /// Resolves when it has had no request for `idle`, or its client owes more than `sending` as a reader.

@@ -12,9 +12,11 @@ use super::activity::InFlight;
 use super::pace::Pace;
 use crate::http::transport::Arrival;
 
-/// Bytes that hyper is given at a time. It takes another piece while it has less than `connection::SEND_BUFFER` unsent, so no
-/// more than the sum of the two is neither with the client nor in the body.
-const PIECE: usize = 32 << 10;
+/// Bytes that hyper is given at a time: few calls of the kernel in HTTP/1, and as much as a stream of HTTP/2 holds. hyper takes
+/// another piece while it has less than its buffer unsent (`connection::BUFFER`, `connection::SEND_BUFFER`), so no more than the
+/// sum of the two is neither with the kernel nor in the body.
+const PIECE: usize = 128 << 10;
+const STREAM_PIECE: usize = 32 << 10;
 
 /// At the end of a frame pieces are copies: a slice that hyper has not sent yet would keep the whole frame, which may be an
 /// answer of hundreds of megabytes, long after the body that paid for it.
@@ -49,8 +51,9 @@ impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
     /// room for one byte, so the stream is only through with an answer, and no longer watched, when there is room for it all.
     fn next_piece(&mut self) -> Bytes {
         let left = self.rest.len();
+        let most = if self.pace.is_some() { STREAM_PIECE } else { PIECE };
         let n = match left {
-            n if n > PIECE => PIECE,
+            n if n > most => most,
             n if n > 1 && self.pace.is_some() => n - 1,
             n => n,
         };

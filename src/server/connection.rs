@@ -13,10 +13,9 @@ use hyper::{Method, Request, Response};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
 use tokio::net::TcpStream;
-use tokio_util::sync::CancellationToken;
 use tower::ServiceExt;
 
-use super::activity::{Activity, Expiry};
+use super::activity::{Activity, Expiry, Notice};
 use super::body::{Receiving, Sending};
 use super::pace::Pace;
 use super::socket::Socket;
@@ -67,13 +66,7 @@ tokio::task_local! {
 
 /// Serves what comes on a connection until it ends, or has to: see [`Activity::expired`]. Draining, it ends after the answers
 /// under way.
-pub async fn serve(
-    socket: TcpStream,
-    router: Router,
-    patience: Patience,
-    activity: Arc<Activity>,
-    draining: CancellationToken,
-) {
+pub async fn serve(socket: TcpStream, router: Router, patience: Patience, activity: Arc<Activity>) {
     // Fails if the client has gone already.
     let _ = socket.set_nodelay(true);
     let exchanges = activity.clone();
@@ -82,7 +75,6 @@ pub async fn serve(
     let builder = builder(patience.sending);
     let mut connection = std::pin::pin!(builder.serve_connection(io, service));
     let mut expired = std::pin::pin!(activity.expired(patience.idle, patience.sending));
-    let mut is_draining = false;
     let expiry = loop {
         tokio::select! {
             outcome = connection.as_mut() => {
@@ -92,12 +84,10 @@ pub async fn serve(
                 return;
             }
             expiry = expired.as_mut() => break expiry,
-            () = activity.evicted.notified() => return,
-            () = draining.cancelled(), if !is_draining => {
-                is_draining = true;
-                activity.drain();
-                connection.as_mut().graceful_shutdown();
-            }
+            notice = activity.notice() => match notice {
+                Notice::Evicted => return,
+                Notice::Draining => connection.as_mut().graceful_shutdown(),
+            },
         }
     };
     tracing::debug!(?expiry, "connection is ended");

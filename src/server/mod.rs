@@ -19,7 +19,6 @@ use std::time::Duration;
 
 use axum::Router;
 use tokio::net::TcpListener;
-use tokio_util::sync::CancellationToken;
 
 use crate::app::App;
 use crate::http::router;
@@ -51,12 +50,11 @@ pub async fn serve(
 ) -> io::Result<()> {
     let config = &app.config;
     let patience = Patience { idle: config.idle(), sending: config.sending() };
-    let draining = app.draining.clone();
-    let listening =
-        Listening { router: router(app.clone()), patience, limit: config.max_connections, draining };
+    let listening = Listening { router: router(app.clone()), patience, limit: config.max_connections };
     let mut connections = listening.until(listener, stop).await?;
     tracing::info!(n_connections = connections.len(), "draining");
     app.draining.cancel();
+    connections.drain();
     let over = async {
         while app.n_requests.load(Ordering::Relaxed) > 0 {
             tokio::time::sleep(DRAINING_INTERVAL).await;
@@ -80,7 +78,6 @@ struct Listening {
     patience: Patience,
     /// Connections at once.
     limit: usize,
-    draining: CancellationToken,
 }
 
 impl Listening {
@@ -103,8 +100,8 @@ impl Listening {
             match newcomer {
                 Some(socket) if has_room => {
                     let activity = Activity::new();
-                    let (router, draining) = (self.router.clone(), self.draining.clone());
-                    let served = connection::serve(socket, router, self.patience, activity.clone(), draining);
+                    let router = self.router.clone();
+                    let served = connection::serve(socket, router, self.patience, activity.clone());
                     connections.add(activity, served);
                 }
                 Some(socket) => door.turn_away(socket),

@@ -91,7 +91,7 @@ async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
         .route("/paused", get(async move || Watched::body(&paused, 4, 100, 2 * SENDING)))
         .route("/whole", get(async move || Watched::body(&whole, 1, 8 << 20, none)));
     let patience = Patience { idle: Duration::from_secs(30), sending };
-    let listening = Listening { router, patience, limit: 100, draining: CancellationToken::new() };
+    let listening = Listening { router, patience, limit: 100 };
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     tokio::spawn(async move { listening.until(listener, std::future::pending()).await.map(drop) });
@@ -237,7 +237,7 @@ async fn pieces_still_to_be_sent_do_not_keep_a_whole_answer() {
             received.extend_from_slice(&piece);
             unsent.push_back(piece);
             // What hyper has not sent yet, in whichever buffer.
-            while unsent.iter().map(Bytes::len).sum::<usize>() > 100 << 10 {
+            while unsent.iter().map(Bytes::len).sum::<usize>() > 192 << 10 {
                 unsent.pop_front();
             }
         }
