@@ -32,7 +32,7 @@ pub struct Budget {
 
 struct Ledger {
     total: usize,
-    /// What one owner may hold.
+    /// What one owner may hold, if there are several.
     share: usize,
     state: Mutex<State>,
     released: Notify,
@@ -63,7 +63,7 @@ pub struct BeyondBudget {
 impl Budget {
     /// A budget of so many bytes for so many owners.
     pub fn new(total: usize, n_owners: usize) -> Self {
-        let share = if n_owners > 1 { total / 2 } else { total };
+        let share = if n_owners > 1 { total / 2 } else { usize::MAX };
         let ledger = Ledger { total, share, state: Mutex::default(), released: Notify::new() };
         Self { ledger: Arc::new(ledger) }
     }
@@ -137,7 +137,7 @@ impl Budget {
     /// What is missing for a reservation, apart from its turn.
     pub fn shortage(&self, owner: Owner, n_bytes: usize) -> Option<Shortage> {
         let state = self.ledger.state();
-        let of_owner = (state.of(owner) + n_bytes).saturating_sub(self.ledger.share);
+        let of_owner = state.of(owner).saturating_add(n_bytes).saturating_sub(self.ledger.share);
         let free = self.ledger.total - state.held;
         let of_all = (n_bytes + self.ledger.closed_to(n_bytes)).saturating_sub(free);
         (of_owner > 0 || of_all > 0).then_some(Shortage { owner, of_owner, of_all })
@@ -190,7 +190,7 @@ impl Ledger {
     }
 
     fn may_hold(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
-        state.of(owner) + n_bytes <= self.share
+        state.of(owner).saturating_add(n_bytes) <= self.share
     }
 
     fn has_room(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {

@@ -34,7 +34,8 @@ async fn rounds(n_threads: usize) {
     for (index, route) in ROUTES.iter().enumerate() {
         let all = async {
             for round in 0..N_ROUNDS {
-                let mut body = json!({"cloud": {"points": cloud(index, round)}});
+                let points = cloud(index, round);
+                let mut body = json!({"cloud": {"points": points}, "queries": [points[1], points[2]]});
                 if route.has_values {
                     body["values"] = json!(vec![1.0; N_POINTS]);
                 }

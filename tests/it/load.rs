@@ -5,7 +5,6 @@ use std::time::Instant;
 use futures_util::future::join_all;
 use serde_json::{Value, json};
 
-use crate::limits::slow_request;
 use crate::routes::{lattice, route_of};
 use crate::support::{Answer, Server, fibonacci_sphere};
 
@@ -65,10 +64,8 @@ async fn one_key_leaves_places_turns_and_memory_to_another() {
     let server = Server::with_flags(&flags).await;
     let slow: Vec<_> = (0..3)
         .map(|k| {
-            let mut body = slow_request();
-            body["cloud"]["points"][0][0] = json!(0.01 * f64::from(k));
-            let request = server.client.post(server.url("/v1/curvatures")).bearer_auth("greedy");
-            tokio::spawn(request.json(&body).send())
+            let request = server.client.post(server.url("/v1/normals")).bearer_auth("greedy");
+            tokio::spawn(request.json(&request_of(6000, k)).send())
         })
         .collect();
     let small = route_of("/v1/normals").request();

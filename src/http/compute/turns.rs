@@ -57,6 +57,10 @@ impl Turns {
             state.n_free += 1;
             return None;
         };
+        // Who has left costs its owner no turn.
+        while queue.front().is_some_and(oneshot::Sender::is_closed) {
+            queue.pop_front();
+        }
         let next = queue.pop_front();
         if !queue.is_empty() {
             state.waiting.push_back((owner, queue));
