@@ -12,6 +12,7 @@ use hyper::service::service_fn;
 use hyper::{Method, Request, Response};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
+use socket2::SockRef;
 use tokio::net::TcpStream;
 use tower::ServiceExt;
 
@@ -50,6 +51,11 @@ const PING_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time to take leave of a client whose connection ends: its last frames, or its end of the connection.
 const LEAVE: Duration = Duration::from_secs(1);
 
+/// Bytes that the kernel takes of each connection's answers, half of what it then reserves. With the kernel's own choice, which
+/// grows to megabytes, a slow reader makes no room for so long that it looks like one that does not read, and many
+/// hold memory that nothing counts. It bounds the speed of one answer to 512 KiB for each round trip.
+const SOCKET_BUFFER: usize = 256 << 10;
+
 /// How long clients are waited for.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
@@ -67,8 +73,9 @@ tokio::task_local! {
 /// Serves what comes on a connection until it ends, or has to: see [`Activity::expired`]. Draining, it ends after the answers
 /// under way.
 pub async fn serve(socket: TcpStream, router: Router, patience: Patience, activity: Arc<Activity>) {
-    // Fails if the client has gone already.
+    // Both fail if the client has gone already. On the listener the buffer would miss who came before it was set.
     let _ = socket.set_nodelay(true);
+    let _ = SockRef::from(&socket).set_send_buffer_size(SOCKET_BUFFER);
     let exchanges = activity.clone();
     let service = service_fn(move |request| exchange(request, router.clone(), exchanges.clone()));
     let io = TokioIo::new(Socket::new(socket, activity.clone()));

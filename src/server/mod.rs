@@ -30,11 +30,6 @@ pub use probe::is_ready;
 /// How often a draining server looks whether requests are still being computed.
 const DRAINING_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Bytes that the kernel takes of each connection's answers, half of what it then reserves. With the kernel's own choice, which
-/// grows to megabytes, a slow reader makes no room for so long that it looks like one that does not read, and many
-/// hold memory that nothing counts. It bounds the speed of one answer to 512 KiB for each round trip.
-const SOCKET_BUFFER: usize = 256 << 10;
-
 /// Serves until `stop` resolves, then drains and returns.
 ///
 /// DRAINING. Nobody is accepted any more. Requests whose body has not been read are refused (503), those being computed are
@@ -42,7 +37,7 @@ const SOCKET_BUFFER: usize = 256 << 10;
 /// then finds its connection broken, never an answer that looks complete and is not.
 ///
 /// # Errors
-/// Those of the listener.
+/// None so far: failures to accept are logged, and pass.
 pub async fn serve(
     app: Arc<App>,
     listener: TcpListener,
@@ -51,7 +46,7 @@ pub async fn serve(
     let config = &app.config;
     let patience = Patience { idle: config.idle(), sending: config.sending() };
     let listening = Listening { router: router(app.clone()), patience, limit: config.max_connections };
-    let mut connections = listening.until(listener, stop).await?;
+    let mut connections = listening.until(listener, stop).await;
     tracing::info!(n_connections = connections.len(), "draining");
     app.draining.cancel();
     connections.drain();
@@ -82,15 +77,13 @@ struct Listening {
 
 impl Listening {
     /// Serves newcomers until `stop` resolves; what is left are the connections under way.
-    async fn until(self, listener: TcpListener, stop: impl Future<Output = ()>) -> io::Result<Connections> {
-        // Accepted sockets inherit it.
-        socket2::SockRef::from(&listener).set_send_buffer_size(SOCKET_BUFFER)?;
+    async fn until(self, listener: TcpListener, stop: impl Future<Output = ()>) -> Connections {
         let (mut acceptor, mut connections, door) =
             (Acceptor::default(), Connections::default(), Door::new());
         let mut stop = std::pin::pin!(stop);
         loop {
             let newcomer = tokio::select! {
-                () = stop.as_mut() => return Ok(connections),
+                () = stop.as_mut() => return connections,
                 () = connections.ended() => continue,
                 newcomer = acceptor.accept(&listener) => newcomer,
             };

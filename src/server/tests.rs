@@ -94,7 +94,7 @@ async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
     let listening = Listening { router, patience, limit: 100 };
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
-    tokio::spawn(async move { listening.until(listener, std::future::pending()).await.map(drop) });
+    tokio::spawn(async move { listening.until(listener, std::future::pending()).await });
     (address, count)
 }
 
