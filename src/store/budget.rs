@@ -361,8 +361,8 @@ mod tests {
             assert_eq!((shortage.of_owner, shortage.of_all > 0), (0, true));
             cached.lock().unwrap().pop();
         };
-        let found = budget.reserve(A, 500 << 10, make_room).await.unwrap();
-        assert_eq!((found.n_bytes(), cached.lock().unwrap().len()), (500 << 10, 1));
+        let found = budget.reserve(A, 450 << 10, make_room).await.unwrap();
+        assert_eq!((found.n_bytes(), cached.lock().unwrap().len()), (450 << 10, 1));
     }
 
     #[test]
