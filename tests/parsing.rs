@@ -3,6 +3,9 @@
 //!
 //! A process of its own, for the allocator that counts. The tests wait for each other: its count is everybody's.
 
+// These threads are no pool's.
+#![allow(clippy::disallowed_methods)]
+
 use std::collections::HashMap;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};

@@ -90,6 +90,8 @@ async fn retry_after_is_when_there_is_a_place() {
     for k in 0..3 {
         let slow = server.client.post(server.url("/v1/normals")).json(&request_of(5000, k));
         let slow = tokio::spawn(slow.send());
+        // It has the only place once there is none; the probe takes none.
+        while server.get("/health/ready").await.status == 200 && !slow.is_finished() {}
         let refused = loop {
             let answer = server.post("/v1/normals", &request_of(30, k)).await;
             // A moment later it has begun, and with it the prediction.

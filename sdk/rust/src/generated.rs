@@ -35,7 +35,8 @@ pub mod types {
         pub n_duplicates: u64,
         ///Number of points, n.
         pub n_points: u64,
-        ///Distances between nearest points; absent if all points coincide.
+        /**Distances between nearest points; absent if all points coincide, and in lists until the cloud was registered or
+described by itself, or a kernel chosen for it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub spacing: ::std::option::Option<Spacing>,
     }
@@ -121,7 +122,8 @@ pub mod types {
         ///The id of a registered cloud, 64 hexadecimal digits.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub id: ::std::option::Option<CloudId>,
-        ///Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward.
+        /**Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward. An empty list
+counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The points, one row of coordinates each, all of the same length; the cloud is registered with them.
@@ -137,7 +139,7 @@ pub mod types {
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct CloudRequest {
-        ///Normals at the points, one row each, of any length but 0. Their side is outward.
+        ///Normals at the points, one row each, of any length but 0. Their side is outward. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The points, one row of coordinates each, all of the same length.
@@ -223,7 +225,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Which way normals point, and with them the sign of curvatures; `outward` if absent.
@@ -557,7 +559,7 @@ the request.*/
         ///The kernel of its signature function.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///One entry per point of its cloud, instead of `alpha`.
+        ///One entry per point of its cloud, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///How its linear system is solved.
@@ -603,7 +605,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted; the points of the cloud if absent.
@@ -828,7 +830,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
@@ -879,7 +881,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted; the points of the surface's cloud if absent.
@@ -979,7 +981,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Which way normals point; `outward` if absent.
@@ -1163,7 +1165,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted; the points of the cloud if absent.
@@ -1491,7 +1493,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
@@ -1544,7 +1546,7 @@ the noise of the points, 1e-3 at least.*/
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The variance of the noise at each point, instead of `alpha`.
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
         ///Where answers are wanted; the points of the surface's cloud if absent.
@@ -6660,7 +6662,7 @@ let response = client.check_live()
     }
     /**Check that the process takes requests
 
-503 while its queue is full and while it shuts down.
+503 while its queue is full, while it shuts down, and if its compute threads do not move.
 
 Sends a `GET` request to `/health/ready`
 
@@ -6773,6 +6775,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 401u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -6917,6 +6926,13 @@ pub mod builder {
                         ),
                     )
                 }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 413u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7023,6 +7039,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 401u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7127,6 +7150,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 204u16 => Ok(ResponseValue::empty(response)),
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 401u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7142,6 +7172,13 @@ pub mod builder {
                     )
                 }
                 500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -7202,9 +7239,11 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => Ok(ResponseValue::empty(response)),
+                400u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 401u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 404u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 500u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
+                503u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 _ => Err(Error::UnexpectedResponse(response)),
             }
         }
@@ -7253,6 +7292,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 401u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7268,6 +7314,13 @@ pub mod builder {
                     )
                 }
                 500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -7380,6 +7433,13 @@ pub mod builder {
                     )
                 }
                 406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -7538,6 +7598,13 @@ pub mod builder {
                         ),
                     )
                 }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 413u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7684,6 +7751,13 @@ pub mod builder {
                     )
                 }
                 406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -7842,6 +7916,13 @@ pub mod builder {
                         ),
                     )
                 }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 413u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -7993,6 +8074,13 @@ pub mod builder {
                     )
                 }
                 406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -8158,6 +8246,13 @@ pub mod builder {
                         ),
                     )
                 }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 413u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -8309,6 +8404,13 @@ pub mod builder {
                     )
                 }
                 406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -8474,6 +8576,13 @@ pub mod builder {
                         ),
                     )
                 }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 413u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -8564,7 +8673,21 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -8619,6 +8742,13 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -8681,7 +8811,21 @@ pub mod builder {
             let response = result?;
             match response.status().as_u16() {
                 200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,

@@ -19,7 +19,8 @@ class CloudRef:
         points (list[list[float]] | Unset): The points, one row of coordinates each, all of the same length; the cloud
             is registered with them.
         normals (list[list[float]] | Unset): Normals at the points, one row each, of any length but 0, with `points`
-            only. Their side is outward.
+            only. Their side is outward. An empty list
+            counts as absent.
     """
 
     id: str | Unset = UNSET

@@ -17,7 +17,7 @@ class CloudRequest:
     Attributes:
         points (list[list[float]]): The points, one row of coordinates each, all of the same length.
         normals (list[list[float]] | Unset): Normals at the points, one row each, of any length but 0. Their side is
-            outward.
+            outward. An empty list counts as absent.
     """
 
     points: list[list[float]]

@@ -29,7 +29,8 @@ class Geometry:
             kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
                 another family is refused.
             alpha (float | Unset): Added to the diagonal of its Gram matrix.
-            noise_variances (list[float] | Unset): One entry per point of its cloud, instead of `alpha`.
+            noise_variances (list[float] | Unset): One entry per point of its cloud, instead of `alpha`. An empty list
+                counts as absent.
             solver (SolverChoice | Unset): How the linear system is solved.
             surface (SurfaceChoice | Unset): Which function's level surface is meant.
     """

@@ -31,7 +31,8 @@ class PosteriorRequest:
             interpolates, the variance
             of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
             the noise of the points, 1e-3 at least.
-        noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`.
+        noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
+            list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.
         duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
         queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.

@@ -30,6 +30,9 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
     if response.status_code == 304:
         return
 
+    if response.status_code == 400:
+        return
+
     if response.status_code == 401:
         return
 
@@ -37,6 +40,9 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
         return
 
     if response.status_code == 500:
+        return
+
+    if response.status_code == 503:
         return
 
     if client.raise_on_unexpected_status:

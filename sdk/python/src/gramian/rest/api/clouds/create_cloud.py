@@ -63,6 +63,11 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
 
         return response_406
 
+    if response.status_code == 408:
+        response_408 = Problem.from_dict(response.json())
+
+        return response_408
+
     if response.status_code == 413:
         response_413 = Problem.from_dict(response.json())
 
@@ -124,7 +129,8 @@ def sync_detailed(
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -161,7 +167,8 @@ def sync(
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -193,7 +200,8 @@ async def asyncio_detailed(
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -228,7 +236,8 @@ async def asyncio(
         body (CloudRequest): Points to register.
         body (File): The points, `[n, d]`, as little- or big-endian float64 or float32.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

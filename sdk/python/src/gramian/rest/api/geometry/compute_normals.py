@@ -62,6 +62,11 @@ def _parse_response(
 
         return response_406
 
+    if response.status_code == 408:
+        response_408 = Problem.from_dict(response.json())
+
+        return response_408
+
     if response.status_code == 413:
         response_413 = Problem.from_dict(response.json())
 
@@ -126,7 +131,8 @@ def sync_detailed(
         body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -164,7 +170,8 @@ def sync(
         body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -197,7 +204,8 @@ async def asyncio_detailed(
         body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -233,7 +241,8 @@ async def asyncio(
         body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

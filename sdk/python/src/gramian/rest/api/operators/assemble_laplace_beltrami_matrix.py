@@ -62,6 +62,11 @@ def _parse_response(
 
         return response_406
 
+    if response.status_code == 408:
+        response_408 = Problem.from_dict(response.json())
+
+        return response_408
+
     if response.status_code == 413:
         response_413 = Problem.from_dict(response.json())
 
@@ -123,7 +128,8 @@ def sync_detailed(
         body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
             Laplace–Beltrami matrix are wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -158,7 +164,8 @@ def sync(
         body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
             Laplace–Beltrami matrix are wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -188,7 +195,8 @@ async def asyncio_detailed(
         body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
             Laplace–Beltrami matrix are wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -221,7 +229,8 @@ async def asyncio(
         body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
             Laplace–Beltrami matrix are wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

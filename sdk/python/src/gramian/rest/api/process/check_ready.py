@@ -26,6 +26,11 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
 
         return response_200
 
+    if response.status_code == 400:
+        response_400 = Problem.from_dict(response.json())
+
+        return response_400
+
     if response.status_code == 500:
         response_500 = Problem.from_dict(response.json())
 
@@ -57,7 +62,7 @@ def sync_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full and while it shuts down.
+     503 while its queue is full, while it shuts down, and if its compute threads do not move.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -82,7 +87,7 @@ def sync(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full and while it shuts down.
+     503 while its queue is full, while it shuts down, and if its compute threads do not move.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -103,7 +108,7 @@ async def asyncio_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full and while it shuts down.
+     503 while its queue is full, while it shuts down, and if its compute threads do not move.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -126,7 +131,7 @@ async def asyncio(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full and while it shuts down.
+     503 while its queue is full, while it shuts down, and if its compute threads do not move.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -62,6 +62,11 @@ def _parse_response(
 
         return response_406
 
+    if response.status_code == 408:
+        response_408 = Problem.from_dict(response.json())
+
+        return response_408
+
     if response.status_code == 413:
         response_413 = Problem.from_dict(response.json())
 
@@ -124,7 +129,8 @@ def sync_detailed(
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -160,7 +166,8 @@ def sync(
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -191,7 +198,8 @@ async def asyncio_detailed(
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -225,7 +233,8 @@ async def asyncio(
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
             wanted.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
-            `cloud.points`; the other fields as JSON text in the metadata entry `request`.
+            `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
+            tensors and a header of 64 KiB.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
