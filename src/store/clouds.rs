@@ -33,12 +33,14 @@ pub struct StoredCloud {
 
 impl StoredCloud {
     fn new(id: CloudId, cloud: Cloud, normals: Option<Cloud>) -> Self {
+        // What is kept comes first, what is needed for a moment behind it.
+        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
         Self {
             id,
             n_duplicates: count_duplicates(&cloud),
             bounding_box: cloud.bounding_box(),
-            cloud: Arc::new(cloud.compact()),
-            normals: normals.map(Cloud::compact),
+            cloud,
+            normals,
             created_at: SystemTime::now(),
             scales: OnceLock::new(),
             noise: OnceLock::new(),
