@@ -66,9 +66,12 @@ async fn one_key_leaves_places_turns_and_memory_to_another() {
         .map(|k| {
             let request = server.client.post(server.url("/v1/normals")).bearer_auth("greedy");
             let request = request.json(&request_of(6000, k));
-            // Until it has its place, which one of the small requests below may have before.
+            // Until it has its place, which one of the small requests below may have before. A refusal comes before the body is
+            // read, so that the connection may break while it is sent.
             tokio::spawn(async move {
-                while request.try_clone().unwrap().send().await.unwrap().status() == 503 {}
+                while request.try_clone().unwrap().send().await.map_or(503, |answer| answer.status().into())
+                    == 503
+                {}
             })
         })
         .collect();
