@@ -50,22 +50,22 @@ impl Turns {
         receiver.await.unwrap_or(Turn { turns: None })
     }
 
-    /// The next who waits, whose owner goes to the end of the line.
+    /// The next who waits, whose owner goes to the end of the line. If there is none, the turn is counted as free.
     fn next(&self) -> Option<oneshot::Sender<Turn>> {
         let mut state = self.state();
-        let Some((owner, mut queue)) = state.waiting.pop_front() else {
-            state.n_free += 1;
-            return None;
-        };
-        // Who has left costs its owner no turn.
-        while queue.front().is_some_and(oneshot::Sender::is_closed) {
-            queue.pop_front();
+        while let Some((owner, mut queue)) = state.waiting.pop_front() {
+            // Who has left costs its owner no turn.
+            while queue.front().is_some_and(oneshot::Sender::is_closed) {
+                queue.pop_front();
+            }
+            let Some(next) = queue.pop_front() else { continue };
+            if !queue.is_empty() {
+                state.waiting.push_back((owner, queue));
+            }
+            return Some(next);
         }
-        let next = queue.pop_front();
-        if !queue.is_empty() {
-            state.waiting.push_back((owner, queue));
-        }
-        next
+        state.n_free += 1;
+        None
     }
 
     #[expect(clippy::disallowed_methods, reason = "a queue, for as long as it takes to look at its ends")]
@@ -117,6 +117,20 @@ mod tests {
         drop(of_b);
         drop(of_a.remove(0).await);
         assert_eq!(turns.state().n_free, 1);
+    }
+
+    #[tokio::test]
+    async fn a_turn_that_all_who_waited_left_is_free() {
+        let turns = Turns::new(1);
+        let first = turns.take(A).await;
+        let mut leaving = [Box::pin(turns.take(A)), Box::pin(turns.take(B)), Box::pin(turns.take(B))];
+        for waiting in &mut leaving {
+            assert!(futures_util::poll!(waiting).is_pending());
+        }
+        drop(leaving);
+        drop(first);
+        assert_eq!(turns.state().n_free, 1);
+        assert!(turns.state().waiting.is_empty());
     }
 
     #[tokio::test]
