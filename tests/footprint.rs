@@ -127,9 +127,9 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
     let (stored, _) = store.get_or_factorize(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
         let factor = stored.factor.clone();
-        let make = || async move {
+        let make = |memory| async move {
             let signature = Interpolant::signature(factor, &Unobserved).unwrap();
-            Ok(Surface::of(signature, None, &Unobserved).unwrap())
+            Ok((Surface::of(signature, None, &Unobserved).unwrap(), memory))
         };
         let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3)).await.unwrap();
         let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();

@@ -5,6 +5,7 @@ use std::io::{self, BufRead, Read, Write};
 use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
+use super::limits::SMALLER_BODY;
 use super::negotiation::Coding;
 use super::problem::{Place, Problem};
 use super::slug::Slug;
@@ -97,7 +98,7 @@ pub fn decompress(
     let within = read_blocks(open().map_err(refused)?, limit, observer, |block| length += block.len());
     if !within.map_err(refused)? {
         let what = "bytes of decompressed body";
-        return Err(Problem::too_large(Slug::BodyTooLarge, what, limit, None));
+        return Err(Problem::too_large(Slug::BodyTooLarge, what, limit, None).with_remedy(SMALLER_BODY));
     }
     let mut plain = Vec::with_capacity(length);
     read_blocks(open().map_err(refused)?, length, observer, |block| plain.extend_from_slice(block))

@@ -12,7 +12,7 @@ use super::slug::Slug;
 use crate::app::App;
 use crate::numerics::error::NumericsError;
 use crate::numerics::interpolant::Interpolant;
-use crate::numerics::solver::GramFactor;
+use crate::numerics::solver::{GramFactor, Workspace};
 use crate::numerics::surface::Surface;
 use crate::store::budget::{BeyondBudget, Reservation};
 use crate::store::factors::{Missing, StoredFactor};
@@ -26,6 +26,8 @@ const LEAST_BYTES: usize = 16 << 10;
 pub enum FactorFailure {
     Refused(NumericsError),
     Broken(Problem),
+    /// Cholesky has failed, and there was no memory for the fallback at that moment.
+    NeedsAll,
 }
 
 impl FactorFailure {
@@ -33,6 +35,8 @@ impl FactorFailure {
         match self {
             Self::Refused(error) => plan.refused(error),
             Self::Broken(problem) => problem,
+            // Whoever is told so tries again with all of the memory.
+            Self::NeedsAll => Problem::internal(),
         }
     }
 }
@@ -66,14 +70,16 @@ impl Fitting<'_> {
         report: &mut Report,
     ) -> Result<(Fits, Reservation), Problem> {
         let other = surface.filter(|surface| surface.key != main.key);
+        let mut extent = Extent::Cholesky;
         loop {
             let Memory { work, main: for_main, other: for_other, surface: for_surface } =
-                self.reserve(main, other, cost).await?;
-            // What was there when the memory was counted may be gone: then everything goes back, and is counted again.
-            let Some(fitted) = self.fitted(main, for_main, report).await? else { continue };
+                self.reserve(main, other, cost, extent).await?;
+            // What was there when the memory was counted may be gone, or not enough: then everything goes back, and is counted
+            // again.
+            let Some(fitted) = self.fitted(main, for_main, &mut extent, report).await? else { continue };
             let other = match other {
                 None => None,
-                Some(plan) => match self.fitted(plan, for_other, report).await? {
+                Some(plan) => match self.fitted(plan, for_other, &mut extent, report).await? {
                     None => continue,
                     Some(fitted) => Some(fitted),
                 },
@@ -87,11 +93,17 @@ impl Fitting<'_> {
         }
     }
 
-    async fn reserve(&self, main: &FitPlan, other: Option<&FitPlan>, cost: Cost) -> Result<Memory, Problem> {
+    async fn reserve(
+        &self,
+        main: &FitPlan,
+        other: Option<&FitPlan>,
+        cost: Cost,
+        extent: Extent,
+    ) -> Result<Memory, Problem> {
         let missing = |plan: &FitPlan, with_surface| {
             let Missing { factor, surface } = self.app.factors.missing(plan.key, with_surface);
             let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
-            let factor = if factor { n_bytes_of_factor(plan) } else { Some(0) };
+            let factor = if factor { n_bytes_of_factor(plan, extent) } else { Some(0) };
             let surface = if surface { Surface::n_bytes_needed(n, d) } else { 0 };
             (factor.unwrap_or(usize::MAX), surface)
         };
@@ -107,19 +119,28 @@ impl Fitting<'_> {
         Ok(Memory { work, main, other, surface })
     }
 
-    /// `None` if it is to be factorized, without memory for it.
+    /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
     async fn fitted(
         &self,
         plan: &FitPlan,
         memory: Option<Reservation>,
+        extent: &mut Extent,
         report: &mut Report,
     ) -> Result<Option<Fitted>, Problem> {
         let begin =
             |memory: Reservation| factorize(self.app.clone(), self.admission.clone(), plan.clone(), memory);
-        let found = self.app.factors.get_or_factorize(plan.key, memory, begin).await;
-        let Some((stored, outcome)) = found.map_err(|failure| failure.of(plan))? else { return Ok(None) };
-        report.found(&stored, outcome);
-        Ok(Some(Fitted { plan: plan.clone(), stored }))
+        match self.app.factors.get_or_factorize(plan.key, memory, begin).await {
+            Ok(Some((stored, outcome))) => {
+                report.found(&stored, outcome);
+                Ok(Some(Fitted { plan: plan.clone(), stored }))
+            }
+            Ok(None) => Ok(None),
+            Err(FactorFailure::NeedsAll) => {
+                *extent = Extent::Fallback;
+                Ok(None)
+            }
+            Err(failure) => Err(failure.of(plan)),
+        }
     }
 
     /// `None` if it is to be made, without memory for it.
@@ -131,7 +152,9 @@ impl Fitting<'_> {
     ) -> Result<Option<Arc<Surface>>, Problem> {
         let factors = &self.app.factors;
         let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
-        let begin = || make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone());
+        let begin = |memory: Reservation| {
+            make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone(), memory)
+        };
         let found = factors.get_or_make_surface(key, &fitted.stored, memory, begin).await;
         if let Some(&times) = times.get() {
             report.made_surface(times);
@@ -140,14 +163,28 @@ impl Fitting<'_> {
     }
 }
 
-/// Half the matrix or, where the fallback needs it, all of it, and what lies beside it.
-fn n_bytes_of_factor(plan: &FitPlan) -> Option<usize> {
+/// How much of its matrix a factorization is given memory for.
+#[derive(Clone, Copy)]
+enum Extent {
+    /// Half of it. The fallback takes the other half as well if it is to be had at that moment.
+    Cholesky,
+    /// All of it, from the start: it is known that the fallback is needed.
+    Fallback,
+}
+
+/// The part of the matrix and what lies beside it.
+fn n_bytes_of_factor(plan: &FitPlan, extent: Extent) -> Option<usize> {
     let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
-    GramFactor::n_bytes_needed(n)?.checked_add(n.checked_mul((d + 10) * size_of::<f64>())?)
+    let matrix = match extent {
+        Extent::Cholesky => GramFactor::n_bytes_needed(n),
+        Extent::Fallback => GramFactor::n_bytes_needed_at_most(n),
+    };
+    matrix?.checked_add(n.checked_mul((d + 10) * size_of::<f64>())?)
 }
 
 fn beyond(limit: usize, required: usize) -> Problem {
-    let remedy = "take fewer points or queries, or raise GRAMIAN_MEMORY_BYTES";
+    let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, or raise \
+                  GRAMIAN_MEMORY_BYTES";
     Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(required)).with_remedy(remedy)
 }
 
@@ -155,18 +192,29 @@ async fn factorize(
     app: Arc<App>,
     admission: Arc<Admission>,
     plan: FitPlan,
-    memory: Reservation,
+    mut memory: Reservation,
 ) -> Result<StoredFactor, FactorFailure> {
     let flops = GramFactor::flops_needed(plan.fitted.n_points());
     let spare = app.factors.spare().clone();
     let job = move |observer: &JobObserver| {
+        let (n_taken, mut is_short) = (memory.n_bytes(), false);
+        // It never waits for memory: it holds some already.
+        let mut may_take = |n_bytes: usize| {
+            is_short = n_bytes > n_taken && !memory.try_grow(n_bytes - n_taken);
+            !is_short
+        };
+        let workspace = Workspace { spare: &spare, may_take: &mut may_take };
         let factor =
-            GramFactor::factorize_with(&spare, plan.fitted, plan.kernel, plan.regularization, observer);
-        // The memory goes with the job: it may run on for a moment when nobody waits any more.
-        factor.map(|factor| (factor, memory))
+            GramFactor::factorize_in(workspace, plan.fitted, plan.kernel, plan.regularization, observer);
+        match factor {
+            // The memory goes with the job: it may run on for a moment when nobody waits any more.
+            Ok(factor) => Ok((factor, memory)),
+            Err(_) if is_short => Err(FactorFailure::NeedsAll),
+            Err(error) => Err(FactorFailure::Refused(error)),
+        }
     };
     let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
-    let (factor, memory) = outcome.map_err(FactorFailure::Refused)?;
+    let (factor, memory) = outcome?;
     Ok(StoredFactor::new(factor, times.gram, times.factor, memory))
 }
 
@@ -176,20 +224,23 @@ fn make_surface(
     admission: Arc<Admission>,
     fitted: &Fitted,
     times: Arc<OnceLock<StageTimes>>,
-) -> impl Future<Output = Result<Surface, FactorFailure>> + Send + 'static {
+    memory: Reservation,
+) -> impl Future<Output = Result<(Surface, Reservation), FactorFailure>> + Send + 'static {
     let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
     let flops = Surface::flops_needed(plan.fitted.n_points(), plan.fitted.dimension());
     let shared = app.clone();
     let job = move |observer: &JobObserver| {
         let (factor, given) = (stored.factor.clone(), plan.fitted_normals());
         let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
-        match shared.factors.solution(plan.key, key) {
+        let surface = match shared.factors.solution(plan.key, key) {
             Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
             None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
                 shared.factors.keep_solution(plan.key, key, signature.solution.clone());
                 Surface::with_jets(signature, jets, given.as_deref(), observer)
             }),
-        }
+        };
+        // As with a factor, the memory goes with the job.
+        surface.map(|surface| (surface, memory))
     };
     async move {
         let (surface, taken) =

@@ -8,6 +8,7 @@ use http_body_util::BodyExt;
 use tokio::time::{Instant, timeout_at};
 
 use super::body::RequestBody;
+use super::limits::SMALLER_BODY;
 use super::negotiation::{Format, announced};
 use super::problem::Problem;
 use super::slug::Slug;
@@ -87,7 +88,7 @@ fn announced_length(headers: &HeaderMap) -> Option<usize> {
 }
 
 fn too_large(limit: usize, required: Option<usize>) -> Problem {
-    Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, required)
+    Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, required).with_remedy(SMALLER_BODY)
 }
 
 struct Reader<'a> {

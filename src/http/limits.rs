@@ -6,6 +6,10 @@ use super::slug::Slug;
 use crate::config::Config;
 use crate::numerics::observer::{Observer, Unobserved};
 
+/// What to do about a body that is too large.
+pub(super) const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
+     or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
+
 /// What parsing knows beside the bytes.
 #[derive(Clone, Copy)]
 pub struct ParseContext<'a> {

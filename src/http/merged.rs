@@ -6,7 +6,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, Seq
 use serde::forward_to_deserialize_any;
 
 use super::limits::List;
-use super::tensors::Node;
+use super::tensor::Node;
 
 /// A tensor and the names that lead to it, at least one.
 pub(super) struct Named<'a> {

@@ -23,6 +23,7 @@ pub mod openapi;
 pub mod operation;
 pub mod parse;
 mod plain_json;
+mod planner;
 pub mod points;
 pub mod problem;
 mod report;
@@ -32,6 +33,7 @@ mod sampling;
 mod schemas;
 mod shared;
 pub mod slug;
+mod tensor;
 mod tensors;
 pub mod transport;
 

@@ -2,7 +2,8 @@
 //!
 //! A crate was tried and left: its parser recurses on the brackets of the client and multiplies shapes unchecked.
 
-use super::tensors::{Layout, MAX_HEADER_BYTES, Node, Tensor};
+use super::tensor::{Layout, Node, Tensor};
+use super::tensors::MAX_HEADER_BYTES;
 
 /// Axes of an array at most, as in `NumPy` itself.
 const MAX_RANK: usize = 64;

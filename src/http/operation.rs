@@ -11,12 +11,13 @@ use serde::de::DeserializeOwned;
 use super::answer::Answer;
 use super::compute::{Admission, JobObserver};
 use super::encode::Encoded;
-use super::fit::{FitPlan, PlannedFit, Planner};
+use super::fit::{FitPlan, PlannedFit};
 use super::fitted::Fits;
 use super::fitting::Fitting;
 use super::intake::{Intake, read_body};
 use super::limits::ParseContext;
 use super::negotiation::{Format, Wanted};
+use super::planner::Planner;
 use super::problem::Problem;
 use super::report::Report;
 use super::sampling::sample;
@@ -95,18 +96,18 @@ pub struct Resolved<W> {
 }
 
 impl<W> Resolved<W> {
-    /// The fit of the surface.
-    pub fn of_surface(&self) -> &FitPlan {
-        self.surface.as_ref().unwrap_or(&self.main)
-    }
-
-    /// Flops of everything that may have to be computed.
-    fn total_flops(&self, has_surface: bool) -> f64 {
-        let fits = [Some(&self.main), self.surface.as_ref()];
-        let factors = fits.into_iter().flatten().map(|fit| GramFactor::flops_needed(fit.fitted.n_points()));
-        let cloud = &self.of_surface().fitted;
-        let surface = Surface::flops_needed(cloud.n_points(), cloud.dimension());
-        factors.sum::<f64>() + self.cost.flops + if has_surface { surface } else { 0.0 }
+    /// Flops of what this request will compute by itself, as far as can be seen beforehand.
+    fn expected_flops(&self, app: &App, has_surface: bool) -> f64 {
+        let other = self.surface.as_ref().filter(|surface| surface.key != self.main.key);
+        let fits = [(Some(&self.main), has_surface && other.is_none()), (other, has_surface)];
+        let of_fit = |(fit, with_surface): (Option<&FitPlan>, bool)| {
+            let Some(fit) = fit else { return 0.0 };
+            let (n, d) = (fit.fitted.n_points(), fit.fitted.dimension());
+            let missing = app.factors.missing(fit.key, with_surface);
+            let factor = if missing.factor { GramFactor::flops_expected(n) } else { 0.0 };
+            factor + if missing.surface { Surface::flops_needed(n, d) } else { 0.0 }
+        };
+        self.cost.flops + fits.into_iter().map(of_fit).sum::<f64>()
     }
 }
 
@@ -124,7 +125,7 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let plan = prepare::<O>(&app, &admission, intake).await?;
     let mut report = Report::parsed_in(began.elapsed());
 
-    admission.set_flops(plan.total_flops(O::HAS_SURFACE));
+    admission.set_flops(plan.expected_flops(&app, O::HAS_SURFACE));
     let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
     let Resolved { work, cost, intake, .. } = plan;

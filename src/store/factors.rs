@@ -197,8 +197,8 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         Ok(Some((stored, outcome)))
     }
 
-    /// Returns the surface of a factor, making it at most once however many ask, in `memory`, of which it keeps what it
-    /// takes. Without memory it is not begun, and `None` says that it is needed.
+    /// Returns the surface of a factor, making it at most once however many ask, in `memory`, which goes with the work and
+    /// of which the surface keeps what it takes. Without memory it is not begun, and `None` says that it is needed.
     ///
     /// # Errors
     /// Those of `make`; they are not kept.
@@ -207,10 +207,10 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         key: FactorKey,
         stored: &StoredFactor,
         memory: Option<Reservation>,
-        make: impl FnOnce() -> F,
+        make: impl FnOnce(Reservation) -> F,
     ) -> Result<Option<Arc<Surface>>, E>
     where
-        F: Future<Output = Result<Surface, E>> + Send + 'static,
+        F: Future<Output = Result<(Surface, Reservation), E>> + Send + 'static,
     {
         if let Some(found) = stored.surface() {
             return Ok(Some(found));
@@ -220,12 +220,13 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
                 None => return Ok(None),
                 Some(outcome) => outcome?,
             },
-            Some(mut memory) => {
+            Some(memory) => {
                 let factor_memory = stored.memory.clone();
                 let begin = || {
-                    let making = make();
+                    let making = make(memory);
                     async move {
-                        let surface = Arc::new(making.await?);
+                        let (surface, mut memory) = making.await?;
+                        let surface = Arc::new(surface);
                         memory.shrink_to(surface.n_bytes());
                         Ok(StoredSurface { surface, memory: Arc::new(memory), _factor_memory: factor_memory })
                     }
@@ -290,94 +291,4 @@ pub struct Missing {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::numerics::cloud::Cloud;
-    use crate::numerics::kernel::{Family, Kernel};
-    use crate::numerics::observer::Unobserved;
-    use crate::numerics::regularization::Regularization;
-
-    type Store = FactorStore<&'static str>;
-
-    fn store(budget: usize) -> Store {
-        Store::new(FactorBytes { kept: budget, spare: 0, budget, n_owners: 1 })
-    }
-
-    fn key(alpha: f64) -> FactorKey {
-        let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
-        let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
-        let id = CloudId::of(&cloud, None);
-        FactorKey::of_dense(Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
-    }
-
-    async fn factorize(n: usize, memory: Reservation) -> Result<StoredFactor, &'static str> {
-        let cloud = Arc::new(Cloud::new((0..n).map(|i| i as f64).collect(), 1).unwrap());
-        let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
-        let factor = GramFactor::factorize(cloud, kernel, Regularization::Uniform(1.0), &Unobserved).unwrap();
-        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
-    }
-
-    async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
-        let memory = store.reserve(Owner(0), GramFactor::n_bytes_needed(n).unwrap()).await.unwrap();
-        let found = store.get_or_factorize(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
-        found.unwrap().unwrap().1
-    }
-
-    #[tokio::test]
-    async fn the_second_request_is_a_hit_until_the_cloud_is_forgotten() {
-        let store = store(1 << 20);
-        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
-        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Hit);
-        assert!(store.n_reserved() > 0);
-        store.forget_cloud(Owner(0), key(1.0).cloud_id);
-        assert_eq!(store.n_reserved(), 0);
-        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
-    }
-
-    #[tokio::test]
-    async fn a_failure_does_not_poison_the_key_and_gives_its_memory_back() {
-        let store = store(1 << 20);
-        let memory = store.reserve(Owner(0), 1000).await.unwrap();
-        let failing = |memory: Reservation| async move {
-            drop(memory);
-            Err("no")
-        };
-        let failed = store.get_or_factorize(key(1.0), Some(memory), failing).await;
-        assert_eq!((failed.err(), store.n_reserved()), (Some("no"), 0));
-        assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
-    }
-
-    #[tokio::test]
-    async fn without_memory_nothing_is_begun() {
-        let store = store(1 << 20);
-        let found = store.get_or_factorize(key(1.0), None, |memory| factorize(10, memory)).await;
-        assert!(found.unwrap().is_none());
-        assert_eq!(store.missing(key(1.0), false), Missing { factor: true, surface: false });
-    }
-
-    #[tokio::test]
-    async fn factors_beyond_the_budget_are_computed_each_time() {
-        // 100 points take half of 100² numbers, 40 KB, and the budget of factors keeps 15 parts of 16.
-        let bytes = FactorBytes { kept: 32 << 10, spare: 0, budget: 1 << 20, n_owners: 1 };
-        let store = Store::new(bytes);
-        assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
-        assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
-        assert_eq!((store.n_bytes(), store.n_reserved()), (0, 0));
-    }
-
-    #[tokio::test]
-    async fn what_is_kept_makes_room_for_work_unless_it_is_in_use() {
-        let store = store(400 << 10);
-        for alpha in [1.0, 2.0, 3.0] {
-            outcome_of(&store, alpha, 100).await;
-        }
-        let in_use = store.get_or_factorize(key(1.0), None, |memory| factorize(100, memory)).await;
-        let in_use = in_use.unwrap().unwrap().0;
-        // A factor takes 40 KB and what the allocator adds: there is room for one beside the work, not for three.
-        let work = store.reserve(Owner(0), 280 << 10).await.unwrap();
-        let is_missing = |alpha| store.missing(key(alpha), false).factor;
-        assert_eq!([1.0, 2.0].map(is_missing), [false, true]);
-        drop(in_use);
-        drop(work);
-    }
-}
+mod tests;

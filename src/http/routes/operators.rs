@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::surface::{check_is_surface, geometry_request, numbers_at_query};
 use crate::http::compute::JobObserver;
-use crate::http::fit::Planner;
 use crate::http::fitted::{Fits, SurfaceGeometry};
 use crate::http::operation::{Cost, Plan};
+use crate::http::planner::Planner;
 use crate::http::points::Points;
 use crate::http::problem::Problem;
 use crate::http::shared::{Diagnostics, Fit, Geometry, OrientationChoice};

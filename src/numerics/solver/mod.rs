@@ -50,21 +50,39 @@ pub struct GramFactor {
     weights_of_one: Vec<f64>,
 }
 
+/// Where a factorization has its memory from.
+pub struct Workspace<'a> {
+    /// The memory of an earlier factorization, if one was given back; this one's is when it is dropped.
+    pub spare: &'a Arc<SpareBuffer>,
+    /// Asked before the factorization takes more than [`GramFactor::n_bytes_needed`], with what it then takes in all.
+    pub may_take: &'a mut dyn FnMut(usize) -> bool,
+}
+
 enum Factorization {
     Cholesky(Cholesky),
     PivotedCholesky { factor: PivotedCholesky, failed_at: usize },
 }
 
 impl GramFactor {
-    /// Bytes that a factorization of n points needs at its peak, checked: half an n×n buffer for Cholesky, and, when that has
-    /// failed and given it back, up to a whole one for the fallback. O(n) numbers per thread come on top.
+    /// Bytes that a factorization of n points needs at its peak, checked: half an n×n buffer. O(n) numbers per thread come on
+    /// top.
     pub fn n_bytes_needed(n_points: usize) -> Option<usize> {
-        let fallback = n_points.checked_mul(n_points)?.checked_mul(size_of::<f64>())?;
-        Some(fallback.max(Cholesky::n_numbers_needed(n_points)?.checked_mul(size_of::<f64>())?))
+        Cholesky::n_numbers_needed(n_points)?.checked_mul(size_of::<f64>())
     }
 
-    /// Flops that a factorization of n points takes at most: n³/3 for Cholesky, and where that fails up to 0.54 n³ for the
-    /// fallback (at rank 2n/3).
+    /// Bytes that it needs at most, checked: a whole n×n buffer for the fallback, where the rank is more than n/4, when Cholesky
+    /// has failed and given its own back.
+    pub fn n_bytes_needed_at_most(n_points: usize) -> Option<usize> {
+        let fallback = PivotedCholesky::n_numbers_needed(n_points)?.checked_mul(size_of::<f64>())?;
+        Some(fallback.max(Self::n_bytes_needed(n_points)?))
+    }
+
+    /// Flops that a factorization of n points takes unless Cholesky fails: n³/3.
+    pub fn flops_expected(n_points: usize) -> f64 {
+        (n_points as f64).powi(3) / 3.0
+    }
+
+    /// Flops that it takes at most: n³/3 for Cholesky, and where that fails up to 0.54 n³ for the fallback (at rank 2n/3).
     pub fn flops_needed(n_points: usize) -> f64 {
         (n_points as f64).powi(3)
     }
@@ -83,16 +101,17 @@ impl GramFactor {
         regularization: Regularization,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        Self::factorize_with(&SpareBuffer::up_to(0), cloud, kernel, regularization, observer)
+        let (spare, mut may_take) = (SpareBuffer::up_to(0), |_| true);
+        let workspace = Workspace { spare: &spare, may_take: &mut may_take };
+        Self::factorize_in(workspace, cloud, kernel, regularization, observer)
     }
 
-    /// [`GramFactor::factorize`] in the memory of an earlier factorization, if one was given back; this one's is when it is
-    /// dropped.
+    /// [`GramFactor::factorize`] in memory that is somebody's to give.
     ///
     /// # Errors
-    /// Those of [`GramFactor::factorize`].
-    pub fn factorize_with(
-        spare: &Arc<SpareBuffer>,
+    /// Those of [`GramFactor::factorize`]; [`NumericsError::OutOfMemory`] also if it needs more than it may take.
+    pub fn factorize_in(
+        workspace: Workspace<'_>,
         cloud: Arc<Cloud>,
         kernel: Kernel,
         regularization: Regularization,
@@ -105,13 +124,17 @@ impl GramFactor {
             return Err(NumericsError::DuplicatePoints { points: twins });
         }
         observer.enter(Stage::Gram);
-        let gram = Cholesky::assemble(spare, &cloud, &kernel, &regularization, observer)?;
+        let gram = Cholesky::assemble(workspace.spare, &cloud, &kernel, &regularization, observer)?;
         let norm1 = gram.norm1();
         observer.enter(Stage::Factor);
         let factorization = match gram.factorize(SMALLEST_PIVOT * kernel.at_zero(), observer)? {
             Ok(factor) => Factorization::Cholesky(factor),
             Err(failed_at) => {
-                let factor = PivotedCholesky::factorize(&cloud, &kernel, &regularization, observer)?;
+                let n_bytes = Self::n_bytes_needed_at_most(cloud.n_points())
+                    .ok_or(NumericsError::OutOfMemory { n_bytes: usize::MAX })?;
+                let may_take_all = || (workspace.may_take)(n_bytes);
+                let factor =
+                    PivotedCholesky::factorize(&cloud, &kernel, &regularization, may_take_all, observer)?;
                 Factorization::PivotedCholesky { factor, failed_at }
             }
         };

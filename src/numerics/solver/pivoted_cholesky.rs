@@ -38,14 +38,21 @@ pub(super) struct PivotedCholesky {
 }
 
 impl PivotedCholesky {
-    /// Factorizes within n² numbers, and O(n) per thread beside them.
+    /// Numbers for any rank, checked; O(n) per thread come beside them.
+    pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
+        n.checked_mul(n)
+    }
+
+    /// Factorizes within half of [`Self::n_numbers_needed`], or within all of it if `may_take_all` says so when it is asked.
     ///
     /// # Errors
-    /// [`NumericsError::WeightsOverflow`] beyond the range of float64, [`NumericsError::Cancelled`].
+    /// [`NumericsError::WeightsOverflow`] beyond the range of float64, [`NumericsError::OutOfMemory`] if it may not take all
+    /// and needs it, [`NumericsError::Cancelled`].
     pub(super) fn factorize(
         cloud: &Cloud,
         kernel: &Kernel,
         regularization: &Regularization,
+        may_take_all: impl FnOnce() -> bool,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         let n = cloud.n_points();
@@ -62,6 +69,9 @@ impl PivotedCholesky {
             buffer.shrink_to_fit();
         } else {
             drop(buffer);
+            if !may_take_all() {
+                return Err(NumericsError::OutOfMemory { n_bytes: n_numbers(n, n) * size_of::<f64>() });
+            }
             (buffer, pivots) = attempt(n)?;
         }
         let Pivots { order, rank, .. } = pivots;

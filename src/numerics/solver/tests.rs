@@ -47,6 +47,39 @@ fn the_fallback_serves_what_cholesky_cannot() {
 }
 
 #[test]
+fn the_fallback_asks_before_it_takes_all_of_its_matrix() {
+    // Pairs so close that the kernel cannot tell them apart: rank n/2. A smooth kernel has rank n/20 and asks for nothing.
+    let base = fibonacci_sphere(100);
+    let pairs: Vec<f64> = base.points().flat_map(|x| [x[0], x[1], x[2], x[0] + 1e-10, x[1], x[2]]).collect();
+    let cloud = Arc::new(Cloud::new(pairs, 3).unwrap());
+    let alpha = Regularization::uniform(0.0).unwrap();
+    let attempt = |length_scale: f64, answer: bool| {
+        let kernel = Kernel::new(Family::Matern { order: 2 }, length_scale, 1.0).unwrap();
+        let kernel =
+            if length_scale > 1.0 { Kernel::new(Family::Gauss, length_scale, 1.0).unwrap() } else { kernel };
+        let (spare, mut asked) = (SpareBuffer::up_to(0), Vec::new());
+        let mut may_take = |n_bytes| {
+            asked.push(n_bytes);
+            answer
+        };
+        let workspace = Workspace { spare: &spare, may_take: &mut may_take };
+        let factor = GramFactor::factorize_in(workspace, cloud.clone(), kernel, alpha.clone(), &Unobserved);
+        (factor, asked)
+    };
+    let all = GramFactor::n_bytes_needed_at_most(200).unwrap();
+    assert!(all > GramFactor::n_bytes_needed(200).unwrap());
+    let (refused, asked) = attempt(0.3, false);
+    assert!(matches!(refused, Err(NumericsError::OutOfMemory { n_bytes }) if n_bytes == all));
+    assert_eq!(asked, [all]);
+    let (granted, asked) = attempt(0.3, true);
+    let granted = granted.unwrap();
+    assert!((51..=110).contains(&granted.rank()), "{}", granted.rank());
+    assert_eq!(asked, [all]);
+    let (smooth, asked) = attempt(20.0, false);
+    assert!(smooth.unwrap().rank() < 50 && asked.is_empty());
+}
+
+#[test]
 fn the_transposed_solve_is_the_transpose() {
     // Cholesky; the fallback with more and with fewer pivots than other points.
     for (length_scale, ranks) in [(0.3, 90..91), (5.0, 46..90), (20.0, 1..45)] {
@@ -182,8 +215,9 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
     let mut poisoned = spare.take(1312 * 650).unwrap();
     poisoned.fill(f64::NAN);
     drop(poisoned);
+    let workspace = Workspace { spare: &spare, may_take: &mut |_| unreachable!("it is well conditioned") };
     let recycled =
-        GramFactor::factorize_with(&spare, cloud.clone(), kernel, alpha.clone(), &Unobserved).unwrap();
+        GramFactor::factorize_in(workspace, cloud.clone(), kernel, alpha.clone(), &Unobserved).unwrap();
     let fresh = GramFactor::factorize(cloud, kernel, alpha, &Unobserved).unwrap();
     assert_eq!(recycled.reciprocal_condition(), fresh.reciprocal_condition());
     assert_eq!(recycled.log_determinant(), fresh.log_determinant());
