@@ -20,8 +20,12 @@ pub const LEAST_BYTES: usize = 128 << 20;
 /// Of the budget without what the process itself takes: the part for requests that are read, unpacked, parsed or wait.
 const INTAKE_SHARE: usize = 4;
 
-/// A request is read, unpacked and parsed in less than half of as many times its limit: several owners may have half each.
+/// A body takes six times its limit at most: itself, what it is unpacked to, and four times that as numbers. That fits in seven
+/// parts of eight of as many times its limit, which is the most that one may have.
 const BODIES_PER_REQUEST: usize = 8;
+
+/// The same where there are several owners, of whom one may have half.
+const BODIES_PER_REQUEST_OF_MANY: usize = 14;
 
 /// What each part may take, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +53,10 @@ impl Memory {
         let spare = (config.cache_bytes / 8).min(total / 16);
         let rest = total - own - clouds - spare;
         let intake = rest / INTAKE_SHARE;
+        let n_bodies =
+            if config.api_keys.len() > 1 { BODIES_PER_REQUEST_OF_MANY } else { BODIES_PER_REQUEST };
         let work = rest - intake;
-        let body = config.max_body_bytes.min(intake / BODIES_PER_REQUEST);
+        let body = config.max_body_bytes.min(intake / n_bodies);
         Self {
             intake,
             clouds,
@@ -103,6 +109,7 @@ const FALLBACK_BYTES: u64 = 4 << 30;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::budget::Budget;
 
     fn config(flags: &[&str]) -> Config {
         #[derive(clap::Parser)]
@@ -119,11 +126,15 @@ mod tests {
         for bytes in [LEAST_BYTES, 512 << 20, 1 << 30, 64 << 30] {
             for threads in ["1", "2", "64"] {
                 let bytes_text = bytes.to_string();
-                let config = config(&["--memory-bytes", &bytes_text, "--threads", threads]);
-                let memory = Memory::of(&config);
-                let sum = memory.intake + memory.clouds + memory.work + memory.spare;
-                assert!(sum < bytes && sum > bytes / 2, "{bytes} {threads}: {memory:?}");
-                assert!(memory.cache <= memory.work && memory.body * BODIES_PER_REQUEST <= memory.intake);
+                for (keys, n_owners) in [(&[][..], 1), (&["--api-keys", "a,b"][..], 2)] {
+                    let config =
+                        config(&[&["--memory-bytes", &bytes_text, "--threads", threads][..], keys].concat());
+                    let memory = Memory::of(&config);
+                    let sum = memory.intake + memory.clouds + memory.work + memory.spare;
+                    assert!(sum < bytes && sum > bytes / 2, "{bytes} {threads}: {memory:?}");
+                    let largest = Budget::new(memory.intake, n_owners).largest();
+                    assert!(memory.cache <= memory.work && 6 * memory.body <= largest, "{memory:?}");
+                }
             }
         }
         // With memory enough the settings are what they say.

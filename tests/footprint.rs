@@ -123,7 +123,8 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
         let factor = GramFactor::factorize(Arc::new(cloud), kernel, alpha, &Unobserved).unwrap();
         Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
     };
-    let memory = store.reserve(OWNER, GramFactor::n_bytes_needed(n).unwrap()).await.unwrap();
+    let memory =
+        store.reserve(OWNER, GramFactor::n_bytes_needed(n).unwrap(), || true).await.unwrap().unwrap();
     let (stored, _) = store.get_or_factorize(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
         let factor = stored.factor.clone();
@@ -131,7 +132,7 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
             let signature = Interpolant::signature(factor, &Unobserved).unwrap();
             Ok((Surface::of(signature, None, &Unobserved).unwrap(), memory))
         };
-        let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3)).await.unwrap();
+        let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3), || true).await.unwrap().unwrap();
         let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();
         Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     }

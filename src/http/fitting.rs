@@ -69,54 +69,75 @@ impl Fitting<'_> {
         cost: Cost,
         report: &mut Report,
     ) -> Result<(Fits, Reservation), Problem> {
-        let other = surface.filter(|surface| surface.key != main.key);
-        let mut extent = Extent::Cholesky;
+        let mut wanted = Wanted {
+            main,
+            other: surface.filter(|surface| surface.key != main.key),
+            of_main: Extent::Cholesky,
+            of_other: Extent::Cholesky,
+            cost,
+        };
         loop {
-            let Memory { work, main: for_main, other: for_other, surface: for_surface } =
-                self.reserve(main, other, cost, extent).await?;
-            // What was there when the memory was counted may be gone, or not enough: then everything goes back, and is counted
-            // again.
-            let Some(fitted) = self.fitted(main, for_main, &mut extent, report).await? else { continue };
-            let other = match other {
-                None => None,
-                Some(plan) => match self.fitted(plan, for_other, &mut extent, report).await? {
-                    None => continue,
-                    Some(fitted) => Some(fitted),
-                },
-            };
-            let mut fits = Fits { app: self.app.clone(), main: fitted, surface: other, made: None };
-            if self.has_surface {
-                let Some(made) = self.surface(fits.surface(), for_surface, report).await? else { continue };
-                fits.made = Some(made);
+            if let Some(found) = self.attempt(&mut wanted, report).await? {
+                return Ok(found);
             }
-            return Ok((fits, work));
+            // However often that happens, others have their turn.
+            tokio::task::yield_now().await;
         }
     }
 
-    async fn reserve(
+    /// `None` if what was there when the memory was counted is gone, or what was missing is there, or the memory was not enough:
+    /// then everything goes back, and is counted again.
+    async fn attempt(
         &self,
-        main: &FitPlan,
-        other: Option<&FitPlan>,
-        cost: Cost,
-        extent: Extent,
-    ) -> Result<Memory, Problem> {
-        let missing = |plan: &FitPlan, with_surface| {
+        wanted: &mut Wanted<'_>,
+        report: &mut Report,
+    ) -> Result<Option<(Fits, Reservation)>, Problem> {
+        let Some(memory) = self.reserve(wanted).await? else { return Ok(None) };
+        let fitted = self.fitted(wanted.main, memory.main, &mut wanted.of_main, report).await?;
+        let Some(main) = fitted else { return Ok(None) };
+        let mut fits = Fits { app: self.app.clone(), main, surface: None, made: None };
+        if let Some(other) = wanted.other {
+            fits.surface = self.fitted(other, memory.other, &mut wanted.of_other, report).await?;
+            if fits.surface.is_none() {
+                return Ok(None);
+            }
+        }
+        if self.has_surface {
+            fits.made = self.surface(fits.surface(), memory.surface, report).await?;
+            if fits.made.is_none() {
+                return Ok(None);
+            }
+        }
+        Ok(Some((fits, memory.work)))
+    }
+
+    /// `None` if what is missing has changed while it waited.
+    async fn reserve(&self, wanted: &Wanted<'_>) -> Result<Option<Memory>, Problem> {
+        let counted = self.count(wanted);
+        let work = LEAST_BYTES.saturating_add(wanted.cost.n_bytes());
+        let total = counted.into_iter().fold(work, usize::saturating_add);
+        let is_wanted = || self.count(wanted) == counted;
+        let reserved = self.app.factors.reserve(self.admission.owner, total, is_wanted).await;
+        let Some(mut work) = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))? else {
+            return Ok(None);
+        };
+        let [main, other, surface] = counted.map(|n_bytes| (n_bytes > 0).then(|| work.split(n_bytes)));
+        Ok(Some(Memory { work, main, other, surface }))
+    }
+
+    /// Bytes for the factorizations and the surface that are missing now.
+    fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
+        let missing = |plan: &FitPlan, extent, with_surface| {
             let Missing { factor, surface } = self.app.factors.missing(plan.key, with_surface);
             let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
             let factor = if factor { n_bytes_of_factor(plan, extent) } else { Some(0) };
             let surface = if surface { Surface::n_bytes_needed(n, d) } else { 0 };
             (factor.unwrap_or(usize::MAX), surface)
         };
-        let (for_main, of_main) = missing(main, self.has_surface && other.is_none());
-        let (for_other, of_other) = other.map_or((0, 0), |other| missing(other, self.has_surface));
-        let for_surface = of_main + of_other;
-        let work = LEAST_BYTES.saturating_add(cost.n_bytes());
-        let total = [for_main, for_other, for_surface, work].into_iter().fold(0, usize::saturating_add);
-        let reserved = self.app.factors.reserve(self.admission.owner, total).await;
-        let mut work = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))?;
-        let mut part = |n_bytes: usize| (n_bytes > 0).then(|| work.split(n_bytes));
-        let (main, other, surface) = (part(for_main), part(for_other), part(for_surface));
-        Ok(Memory { work, main, other, surface })
+        let of_main = missing(wanted.main, wanted.of_main, self.has_surface && wanted.other.is_none());
+        let of_other = wanted.other.map(|other| missing(other, wanted.of_other, self.has_surface));
+        let of_other = of_other.unwrap_or((0, 0));
+        [of_main.0, of_other.0, of_main.1 + of_other.1]
     }
 
     /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
@@ -161,6 +182,16 @@ impl Fitting<'_> {
         }
         found.map_err(|failure| failure.of(&fitted.plan))
     }
+}
+
+/// The fits that one request wants, and how much of their matrices they are given memory for.
+struct Wanted<'a> {
+    main: &'a FitPlan,
+    /// That of the surface, where it is another one.
+    other: Option<&'a FitPlan>,
+    of_main: Extent,
+    of_other: Extent,
+    cost: Cost,
 }
 
 /// How much of its matrix a factorization is given memory for.

@@ -1,6 +1,6 @@
 //! The Gaussian process behind the interpolant: variances, covariance, likelihood (Rasmussen and Williams 2006, ch. 2).
 
-use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::matmul::matmul;
 use faer::{Accum, ColRef, MatMut, MatRef};
 use rayon::prelude::*;
 
@@ -84,29 +84,31 @@ pub fn covariance(
 ) -> Result<Covariance, NumericsError> {
     let (n, m) = (factor.n_points(), queries.n_points());
     factor.cloud().check_same_dimension(queries)?;
+    let nodes = Nodes::of(factor.cloud());
     let mut v = vec![0.0; n * m];
-    whitened_cross_gram(factor, &Nodes::of(factor.cloud()), queries, &mut v, observer)?;
+    let rows = queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension());
+    for (rows, columns) in rows.zip(v.chunks_mut(QUERIES_PER_BLOCK * n)) {
+        let block = Cloud::new(rows.to_vec(), queries.dimension())?;
+        whitened_cross_gram(factor, &nodes, &block, columns, observer)?;
+    }
     observer.enter(Stage::Evaluate);
     let mut covariance = vec![0.0; m * m];
     fill_lower_gram(queries, factor.kernel(), &Regularization::Uniform(0.0), &mut covariance, m, observer)?;
     let v = MatRef::from_column_major_slice(&v, n, m);
-    triangular::matmul(
-        MatMut::from_column_major_slice_mut(&mut covariance, m, m),
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        v.transpose(),
-        BlockStructure::Rectangular,
-        v,
-        BlockStructure::Rectangular,
-        -1.0,
-        parallelism((n * m * m) as f64),
-    );
+    let mut lower = MatMut::from_column_major_slice_mut(&mut covariance, m, m);
+    for first in (0..m).step_by(QUERIES_PER_BLOCK) {
+        observer.checkpoint()?;
+        let width = QUERIES_PER_BLOCK.min(m - first);
+        let (rows, columns) = (v.subcols(first, m - first), v.subcols(first, width));
+        let block = lower.as_mut().submatrix_mut(first, first, m - first, width);
+        let par = parallelism((2 * n * width * (m - first)) as f64);
+        matmul(block, Accum::Add, rows.transpose(), columns, -1.0, par);
+    }
     for j in 0..m {
         for i in 0..j {
             covariance[j * m + i] = covariance[i * m + j];
         }
     }
-    let nodes = Nodes::of(factor.cloud());
     let mut clamped = Vec::new();
     for query in 0..m {
         let variance = &mut covariance[query * (m + 1)];

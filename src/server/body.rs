@@ -35,16 +35,34 @@ pub struct Sending<B> {
     pace: Option<Arc<Pace>>,
     /// Bytes of the last piece.
     n_given: usize,
+    /// Bytes of the announced length that are not given yet.
+    n_announced: Option<u64>,
     is_ended: bool,
     in_flight: InFlight,
 }
 
 impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
     /// Without `pace` the answer is one of HTTP/1, whose client is watched by its socket. Answers to HEAD are never sent, and
-    /// so not missed.
-    pub fn new(body: B, in_flight: InFlight, pace: Option<Arc<Pace>>, is_sent: bool) -> Self {
-        let is_ended = !is_sent || body.is_end_stream();
-        Self { body, rest: Bytes::new(), copies_tail: false, pace, n_given: 0, is_ended, in_flight }
+    /// so not missed. A body of an announced length ends with its last byte: hyper does not ask for more.
+    pub fn new(
+        body: B,
+        in_flight: InFlight,
+        pace: Option<Arc<Pace>>,
+        is_sent: bool,
+        n_announced: Option<u64>,
+    ) -> Self {
+        let n_announced = n_announced.or_else(|| body.size_hint().exact());
+        let is_ended = !is_sent || body.is_end_stream() || n_announced == Some(0);
+        Self {
+            body,
+            rest: Bytes::new(),
+            copies_tail: false,
+            pace,
+            n_given: 0,
+            n_announced,
+            is_ended,
+            in_flight,
+        }
     }
 
     /// The next piece of the frame. In HTTP/2 its last byte is a piece of its own: hyper hands a piece over as soon as the client has
@@ -63,6 +81,8 @@ impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
 
     fn give(&mut self, piece: Bytes) -> Frame<Bytes> {
         self.n_given = piece.len();
+        self.n_announced = self.n_announced.map(|n_bytes| n_bytes.saturating_sub(piece.len() as u64));
+        self.is_ended = self.n_announced == Some(0) || self.is_end_stream();
         if let Some(pace) = &self.pace {
             pace.wait();
         }
@@ -100,7 +120,6 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
             }
         }
         let piece = this.next_piece();
-        this.is_ended = this.rest.is_empty() && this.body.is_end_stream();
         Poll::Ready(Some(Ok(this.give(piece))))
     }
 

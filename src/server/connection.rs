@@ -145,7 +145,9 @@ async fn exchange(
     if pace.is_none() && !arrival.is_read() {
         activity.answer_early();
     }
-    Ok(response.map(|body| Sending::new(body, in_flight, pace, is_sent)))
+    let length = response.headers().get(hyper::header::CONTENT_LENGTH);
+    let n_announced = length.and_then(|length| length.to_str().ok()?.parse().ok());
+    Ok(response.map(|body| Sending::new(body, in_flight, pace, is_sent, n_announced)))
 }
 
 /// Runs the streams of HTTP/2, each for as long as its client takes what it asked for. The end of the task resets the stream

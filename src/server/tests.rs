@@ -228,7 +228,7 @@ async fn pieces_still_to_be_sent_do_not_keep_a_whole_answer() {
     for pace in [None, Some(Arc::new(pace::Pace::new()))] {
         let frame: Vec<u8> = (0..3_000_001).map(|i| (i % 251) as u8).collect();
         let owned = Bytes::from_owner(Owner(frame.clone(), count.clone()));
-        let mut body = body::Sending::new(Body::from(owned), Activity::new().enter(), pace, true);
+        let mut body = body::Sending::new(Body::from(owned), Activity::new().enter(), pace, true, None);
         assert_eq!(body.size_hint().exact(), Some(frame.len() as u64));
         let (mut unsent, mut received) = (std::collections::VecDeque::new(), Vec::new());
         let before = count.dropped.load(SeqCst);

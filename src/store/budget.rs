@@ -9,6 +9,7 @@
 //! they need at once, and split it afterwards.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -84,8 +85,8 @@ impl Budget {
         self.ledger.has_room(&state, owner, n_bytes).then(|| self.take(&mut state, owner, n_bytes))
     }
 
-    /// Takes so many bytes when it is their turn. Before each look `make_room` is called with what is missing, to let go of
-    /// what can be done without.
+    /// Takes so many bytes when it is their turn. Whenever they are not to be had `look` is called with what is missing
+    /// apart from the turn, to let go of what can be done without, and to say whether they are still wanted: `None` if not.
     ///
     /// # Errors
     /// [`BeyondBudget`] if there will never be so many.
@@ -93,8 +94,8 @@ impl Budget {
         &self,
         owner: Owner,
         n_bytes: usize,
-        make_room: impl Fn(Shortage),
-    ) -> Result<Reservation, BeyondBudget> {
+        look: impl Fn(Option<Shortage>) -> ControlFlow<()>,
+    ) -> Result<Option<Reservation>, BeyondBudget> {
         if n_bytes > self.largest() {
             return Err(BeyondBudget { limit: self.largest() });
         }
@@ -104,13 +105,13 @@ impl Budget {
             tokio::pin!(released);
             released.as_mut().enable();
             if let Some(reservation) = self.take_turn(&place) {
-                return Ok(reservation);
+                return Ok(Some(reservation));
             }
-            if let Some(shortage) = self.shortage(owner, n_bytes) {
-                make_room(shortage);
-                if let Some(reservation) = self.take_turn(&place) {
-                    return Ok(reservation);
-                }
+            if look(self.shortage(owner, n_bytes)).is_break() {
+                return Ok(None);
+            }
+            if let Some(reservation) = self.take_turn(&place) {
+                return Ok(Some(reservation));
             }
             // Either way it looks again.
             let _ = tokio::time::timeout(LOOK_AGAIN, released).await;
@@ -306,17 +307,19 @@ mod tests {
     const A: Owner = Owner(0);
     const B: Owner = Owner(1);
 
-    fn keep_everything(_: Shortage) {}
+    fn keep_everything(_: Option<Shortage>) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 
     #[tokio::test]
     async fn small_reservations_pass_large_ones_that_wait() {
         let budget = Budget::new(1 << 20, 1);
-        let most = budget.reserve(A, 700 << 10, keep_everything).await.unwrap();
+        let most = budget.reserve(A, 700 << 10, keep_everything).await.unwrap().unwrap();
         let mut large = Box::pin(budget.reserve(A, 600 << 10, keep_everything));
         assert!(futures_util::poll!(&mut large).is_pending());
-        let small = budget.reserve(A, 4 << 10, keep_everything).await.unwrap();
+        let small = budget.reserve(A, 4 << 10, keep_everything).await.unwrap().unwrap();
         drop(most);
-        assert_eq!(large.await.unwrap().n_bytes(), 600 << 10);
+        assert_eq!(large.await.unwrap().unwrap().n_bytes(), 600 << 10);
         drop(small);
         assert_eq!(budget.n_held(), 0);
     }
@@ -324,7 +327,7 @@ mod tests {
     #[tokio::test]
     async fn large_reservations_are_not_passed_by_large_ones_that_come_later() {
         let budget = Budget::new(1 << 20, 1);
-        let first = budget.reserve(A, 500 << 10, keep_everything).await.unwrap();
+        let first = budget.reserve(A, 500 << 10, keep_everything).await.unwrap().unwrap();
         let mut second = Box::pin(budget.reserve(A, 800 << 10, keep_everything));
         let mut third = Box::pin(budget.reserve(A, 100 << 10, keep_everything));
         assert!(
@@ -342,11 +345,11 @@ mod tests {
             budget.reserve(A, 600 << 10, keep_everything).await.err(),
             Some(BeyondBudget { limit: 512 << 10 })
         );
-        let of_a = budget.reserve(A, 400 << 10, keep_everything).await.unwrap();
+        let of_a = budget.reserve(A, 400 << 10, keep_everything).await.unwrap().unwrap();
         let mut more_of_a = Box::pin(budget.reserve(A, 200 << 10, keep_everything));
         assert!(futures_util::poll!(&mut more_of_a).is_pending());
         // It may not, so that it holds up nobody else.
-        let of_b = budget.reserve(B, 400 << 10, keep_everything).await.unwrap();
+        let of_b = budget.reserve(B, 400 << 10, keep_everything).await.unwrap().unwrap();
         assert!(budget.try_reserve(A, 200 << 10).is_none());
         drop(of_a);
         assert!(more_of_a.await.is_ok());
@@ -357,12 +360,34 @@ mod tests {
     async fn room_is_made_before_anybody_waits() {
         let budget = Budget::new(1 << 20, 1);
         let cached = Mutex::new(vec![budget.try_reserve(A, 400 << 10), budget.try_reserve(A, 400 << 10)]);
-        let make_room = |shortage: Shortage| {
+        let make_room = |shortage: Option<Shortage>| {
+            let shortage = shortage.unwrap();
             assert_eq!((shortage.of_owner, shortage.of_all > 0), (0, true));
             cached.lock().unwrap().pop();
+            ControlFlow::Continue(())
         };
-        let found = budget.reserve(A, 450 << 10, make_room).await.unwrap();
+        let found = budget.reserve(A, 450 << 10, make_room).await.unwrap().unwrap();
         assert_eq!((found.n_bytes(), cached.lock().unwrap().len()), (450 << 10, 1));
+    }
+
+    #[tokio::test]
+    async fn who_does_not_want_them_any_more_gives_up_the_turn() {
+        let budget = Budget::new(1 << 20, 1);
+        let most = budget.try_reserve(A, 700 << 10).unwrap();
+        let is_wanted = std::sync::atomic::AtomicBool::new(true);
+        let look = |_: Option<Shortage>| match is_wanted.load(std::sync::atomic::Ordering::Relaxed) {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        };
+        let mut first = Box::pin(budget.reserve(A, 800 << 10, look));
+        let mut second = Box::pin(budget.reserve(A, 100 << 10, keep_everything));
+        assert!(
+            futures_util::poll!(&mut first).is_pending() && futures_util::poll!(&mut second).is_pending()
+        );
+        is_wanted.store(false, std::sync::atomic::Ordering::Relaxed);
+        assert!(first.await.unwrap().is_none());
+        assert!(second.await.unwrap().is_some());
+        drop(most);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Factorizations and the weights solved with them.
 
+use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
@@ -124,13 +125,28 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         &self.spare
     }
 
-    /// Waits for so many bytes of memory for work; what is kept here and not in use makes room for it. Whoever waits must
-    /// hold no other memory of this store, nor wait for anybody who does.
+    /// Waits for so many bytes of memory for work, as long as they are wanted; what is kept here and not in use makes room for
+    /// it. `None` if they are not wanted any more: before anything is let go it is asked whether that is what was waited
+    /// for. Whoever waits must hold no other memory of this store, nor wait for anybody who does.
     ///
     /// # Errors
     /// [`BeyondBudget`] if there will never be so many.
-    pub async fn reserve(&self, owner: Owner, n_bytes: usize) -> Result<Reservation, BeyondBudget> {
-        self.budget.reserve(owner, n_bytes, |shortage| self.make_room(shortage)).await
+    pub async fn reserve(
+        &self,
+        owner: Owner,
+        n_bytes: usize,
+        is_wanted: impl Fn() -> bool,
+    ) -> Result<Option<Reservation>, BeyondBudget> {
+        let look = |shortage: Option<Shortage>| {
+            if !is_wanted() {
+                return ControlFlow::Break(());
+            }
+            if let Some(shortage) = shortage {
+                self.make_room(shortage);
+            }
+            ControlFlow::Continue(())
+        };
+        self.budget.reserve(owner, n_bytes, look).await
     }
 
     /// Lets go of the least recently used: first of the owner's own, where the owner is over the share, then of whoever has most.

@@ -90,7 +90,8 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         }
     }
 
-    /// Lets go of the least recently used value for which `may_go` holds: of one owner, or of whoever has most.
+    /// Lets go of the least recently used value for which `may_go` holds: of one owner, or of
+    /// whoever has most among those who have such a one.
     pub(super) fn evict(&self, owner: Option<Owner>, may_go: impl Fn(&V) -> bool) -> Option<V> {
         self.lock().evict(owner, may_go).map(|entry| entry.value)
     }
@@ -180,8 +181,15 @@ impl<K: Hash + Eq, V> Entries<K, V> {
     }
 
     fn evict(&mut self, owner: Option<Owner>, may_go: impl Fn(&V) -> bool) -> Option<Entry<V>> {
-        let richest = || self.of.iter().max_by_key(|(_, of)| of.n_bytes).map(|(owner, _)| *owner);
-        let owner = owner.or_else(richest)?;
+        if let Some(owner) = owner {
+            return self.evict_of(owner, may_go);
+        }
+        let mut owners: Vec<_> = self.of.iter().map(|(owner, of)| (of.n_bytes, *owner)).collect();
+        owners.sort_unstable_by_key(|(n_bytes, _)| std::cmp::Reverse(*n_bytes));
+        owners.into_iter().find_map(|(_, owner)| self.evict_of(owner, &may_go))
+    }
+
+    fn evict_of(&mut self, owner: Owner, may_go: impl Fn(&V) -> bool) -> Option<Entry<V>> {
         let of = self.of.get_mut(&owner)?;
         for _ in 0..of.by_use.len() {
             let (key, entry) = of.by_use.pop_lru()?;
@@ -252,5 +260,8 @@ mod tests {
         assert_eq!(cache.evict(Some(A), |&value| value >= 4), None);
         assert_eq!(cache.evict(Some(B), |_| true), None);
         assert_eq!(keys(&cache, A), [0, 1, 3]);
+        // All that the richest has is in use: then somebody else's.
+        assert!(cache.insert(B, 7, 7, 100));
+        assert_eq!(cache.evict(None, |&value| value >= 4), Some(7));
     }
 }

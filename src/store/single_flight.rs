@@ -5,9 +5,10 @@ use std::hash::Hash;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use futures_util::FutureExt;
-use futures_util::future::{BoxFuture, WeakShared};
+use futures_util::future::{BoxFuture, Shared, WeakShared};
 
 type Outcome<V, E> = Result<V, E>;
+type Flight<V, E> = Shared<BoxFuture<'static, Outcome<V, E>>>;
 type WeakFlight<V, E> = WeakShared<BoxFuture<'static, Outcome<V, E>>>;
 
 /// Futures under way, by key.
@@ -42,12 +43,12 @@ where
 
     /// Whether a flight of `key` is under way.
     pub(super) fn is_under_way(&self, key: &K) -> bool {
-        self.flights().get(key).is_some_and(|weak| weak.upgrade().is_some())
+        self.flights().get(key).and_then(under_way).is_some()
     }
 
     /// Joins the flight of `key` if there is one.
     pub(super) async fn join_if_under_way(&self, key: &K) -> Option<Outcome<V, E>> {
-        let flight = self.flights().get(key).and_then(WeakShared::upgrade);
+        let flight = self.flights().get(key).and_then(under_way);
         match flight {
             Some(flight) => Some(flight.await),
             None => None,
@@ -59,23 +60,34 @@ where
     where
         F: Future<Output = Outcome<V, E>> + Send + 'static,
     {
-        let (boarding, flight) = {
-            let mut flights = self.flights();
-            match flights.get(&key).and_then(WeakShared::upgrade) {
-                Some(flight) => (Boarding::Joined, flight),
-                None => {
-                    let flight = compute().boxed().shared();
-                    // Entries of flights that nobody finished are swept here, so the map stays as small as the traffic.
-                    flights.retain(|_, weak| weak.upgrade().is_some());
-                    if let Some(weak) = flight.downgrade() {
-                        flights.insert(key, weak);
-                    }
-                    (Boarding::Began, flight)
-                }
-            }
-        };
+        let (boarding, flight) = self.board(key, compute);
         (boarding, flight.await)
     }
+
+    /// What `compute` holds is dropped if it is not needed, before anybody waits.
+    fn board<F>(&self, key: K, compute: impl FnOnce() -> F) -> (Boarding, Flight<V, E>)
+    where
+        F: Future<Output = Outcome<V, E>> + Send + 'static,
+    {
+        let mut flights = self.flights();
+        if let Some(flight) = flights.get(&key).and_then(under_way) {
+            drop(flights);
+            return (Boarding::Joined, flight);
+        }
+        let flight = compute().boxed().shared();
+        // Entries of flights that nobody finished are swept here, so the map stays as small as the traffic.
+        flights.retain(|_, weak| weak.upgrade().is_some());
+        if let Some(weak) = flight.downgrade() {
+            flights.insert(key, weak);
+        }
+        (Boarding::Began, flight)
+    }
+}
+
+/// The flight, unless it has landed: those who waited may not all have looked yet, and hold it, but whoever comes now comes
+/// too late for its outcome.
+fn under_way<V: Clone, E: Clone>(weak: &WeakFlight<V, E>) -> Option<Flight<V, E>> {
+    weak.upgrade().filter(|flight| flight.peek().is_none())
 }
 
 #[cfg(test)]
@@ -121,6 +133,40 @@ mod tests {
         let flights = Numbers::new();
         assert_eq!(flights.join(1, || async { Err("no") }).await, (Boarding::Began, Err("no")));
         assert_eq!(flights.join(1, || async { Ok(2) }).await, (Boarding::Began, Ok(2)));
+    }
+
+    #[tokio::test]
+    async fn a_flight_that_has_landed_is_not_under_way_whoever_has_not_looked_yet() {
+        let flights = Numbers::new();
+        let (release, released) = oneshot::channel::<()>();
+        let compute = async move {
+            released.await.ok();
+            Err("no")
+        };
+        let (mut first, mut second) =
+            (Box::pin(flights.join(1, || compute)), Box::pin(flights.join_if_under_way(&1)));
+        assert!(
+            futures_util::poll!(&mut first).is_pending() && futures_util::poll!(&mut second).is_pending()
+        );
+        release.send(()).unwrap();
+        assert_eq!(first.await.1, Err("no"));
+        assert!(!flights.is_under_way(&1) && flights.join_if_under_way(&1).await.is_none());
+        assert_eq!(flights.join(1, || async { Ok(2) }).await, (Boarding::Began, Ok(2)));
+        assert_eq!(second.await, Some(Err("no")));
+    }
+
+    #[tokio::test]
+    async fn who_joins_lets_go_of_what_beginning_would_have_taken() {
+        let flights = Numbers::new();
+        let mut first = Box::pin(flights.join(1, std::future::pending));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        let (held, is_held) = oneshot::channel::<()>();
+        let mut second = Box::pin(flights.join(1, || async move {
+            drop(held);
+            Ok(1)
+        }));
+        assert!(futures_util::poll!(&mut second).is_pending());
+        assert!(is_held.await.is_err());
     }
 
     #[tokio::test]

@@ -78,6 +78,32 @@ fn large_request() -> String {
     )
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_of_a_known_length_end_in_order() {
+    let server = Server::start().await;
+    let cloud =
+        json!({"cloud": {"points": fibonacci_sphere(300)}, "kernel": {"family": "gauss"}, "alpha": 1e-3});
+    let body = cloud.to_string();
+    // An answer of a few hundred bytes, and one that takes more than the socket's buffer at once.
+    for (path, least) in [("/v1/normals", 1000), ("/v1/laplace-beltrami/matrix", 700_000)] {
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n\
+             Accept: application/x-safetensors\r\nContent-Length: {}\r\n\r\n",
+            body.len()
+        );
+        let mut stream = sent(&server, head + &body).await;
+        stream.readable().await.unwrap();
+        let mut received = Vec::new();
+        // A reset would be an error, and would have thrown away what was not read yet.
+        let read = stream.read_to_end(&mut received);
+        tokio::time::timeout(PATIENCE, read).await.expect("the connection stays open").unwrap();
+        let head = received.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap() + 4;
+        let answer = Received::parse(str::from_utf8(&received[..head]).unwrap());
+        assert_eq!(received.len() - head, answer.header("content-length").parse::<usize>().unwrap());
+        assert!(received.len() > least, "{}", received.len());
+    }
+}
+
 #[tokio::test]
 async fn connections_without_a_request_are_ended() {
     let server = Server::with_flags(&["--idle-seconds", "0.4"]).await;

@@ -127,6 +127,29 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     assert!(peak <= LIMIT, "{peak} bytes at the peak, {LIMIT} allowed");
 }
 
+#[tokio::test]
+async fn packed_bodies_are_served_whoever_shares_a_small_budget() {
+    let process = Process::start(&[&SMALL[..], &["--api-keys", "one,two"]].concat());
+    let body = zstd::encode_all(request(20).to_string().as_bytes(), 3).unwrap();
+    let post = reqwest::Client::new().post(process.url("/v1/normals")).bearer_auth("one").body(body);
+    let post = post.header("content-type", "application/json").header("content-encoding", "zstd");
+    assert_eq!(receive(post).await.status, 200);
+}
+
+#[tokio::test]
+async fn equal_requests_wait_for_one_factor_and_not_for_memory_for_their_own() {
+    // There is memory for one factor of 6,000 points, and that of others is kept.
+    let process = Process::start(&SMALL);
+    let post = |body: &Value| reqwest::Client::new().post(process.url("/v1/normals")).json(body);
+    assert_eq!(receive(post(&request(5900))).await.status, 200);
+    let mut equal = request(6000);
+    equal["queries"] = json!([[0, 0, 1]]);
+    let answers = futures_util::future::join_all((0..4).map(|_| receive(post(&equal)))).await;
+    assert!(answers.iter().all(|answer| answer.status == 200));
+    let made = answers.iter().filter(|answer| answer.header("cache-status") == "gramian; fwd=miss; stored");
+    assert_eq!(made.count(), 1);
+}
+
 fn request(n: usize) -> Value {
     let points = fibonacci_sphere(n);
     let kernel = json!({"family": "matern", "length_scale": 0.3});

@@ -28,7 +28,8 @@ async fn factorize(n: usize, memory: Reservation) -> Result<StoredFactor, &'stat
 }
 
 async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
-    let memory = store.reserve(Owner(0), GramFactor::n_bytes_needed(n).unwrap()).await.unwrap();
+    let memory =
+        store.reserve(Owner(0), GramFactor::n_bytes_needed(n).unwrap(), || true).await.unwrap().unwrap();
     let found = store.get_or_factorize(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
     found.unwrap().unwrap().1
 }
@@ -47,7 +48,7 @@ async fn the_second_request_is_a_hit_until_the_cloud_is_forgotten() {
 #[tokio::test]
 async fn a_failure_does_not_poison_the_key_and_gives_its_memory_back() {
     let store = store(1 << 20);
-    let memory = store.reserve(Owner(0), 1000).await.unwrap();
+    let memory = store.reserve(Owner(0), 1000, || true).await.unwrap().unwrap();
     let failing = |memory: Reservation| async move {
         drop(memory);
         Err("no")
@@ -84,7 +85,7 @@ async fn what_is_kept_makes_room_for_work_unless_it_is_in_use() {
     let in_use = store.get_or_factorize(key(1.0), None, |memory| factorize(100, memory)).await;
     let in_use = in_use.unwrap().unwrap().0;
     // A factor takes 40 KB and what the allocator adds: there is room for one beside the work, not for three.
-    let work = store.reserve(Owner(0), 280 << 10).await.unwrap();
+    let work = store.reserve(Owner(0), 280 << 10, || true).await.unwrap().unwrap();
     let is_missing = |alpha| store.missing(key(alpha), false).factor;
     assert_eq!([1.0, 2.0].map(is_missing), [false, true]);
     drop(in_use);
@@ -111,7 +112,7 @@ fn working<V>(
 async fn a_flight_is_paid_for_until_its_work_has_ended_whoever_has_left() {
     let store = store(1 << 20);
     let (end, ended) = oneshot::channel::<()>();
-    let memory = store.reserve(Owner(0), 4000).await.unwrap();
+    let memory = store.reserve(Owner(0), 4000, || true).await.unwrap().unwrap();
     let mut beginner = Box::pin(store.get_or_factorize(key(1.0), Some(memory), working(ended)));
     assert!(futures_util::poll!(&mut beginner).is_pending());
     let mut joined = Box::pin(store.get_or_factorize(key(1.0), None, |memory| factorize(10, memory)));
@@ -130,12 +131,12 @@ async fn a_flight_is_paid_for_until_its_work_has_ended_whoever_has_left() {
 #[tokio::test]
 async fn a_surface_is_paid_for_until_its_work_has_ended() {
     let store = store(1 << 20);
-    let memory = store.reserve(Owner(0), 4000).await.unwrap();
+    let memory = store.reserve(Owner(0), 4000, || true).await.unwrap().unwrap();
     let found = store.get_or_factorize(key(1.0), Some(memory), |memory| factorize(10, memory)).await;
     let stored = found.unwrap().unwrap().0;
     let before = store.n_reserved();
     let (end, ended) = oneshot::channel::<()>();
-    let memory = store.reserve(Owner(0), 5000).await.unwrap();
+    let memory = store.reserve(Owner(0), 5000, || true).await.unwrap().unwrap();
     let mut waiting = Box::pin(store.get_or_make_surface(key(1.0), &stored, Some(memory), working(ended)));
     assert!(futures_util::poll!(&mut waiting).is_pending());
     drop(waiting);
