@@ -52,7 +52,7 @@ fn main() -> ExitCode {
 
 #[tokio::main]
 async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
-    telemetry::start();
+    let log = telemetry::start();
     for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
     {
         tracing::warn!(name, "there is no such setting");
@@ -75,6 +75,7 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     let (address, n_api_keys) = (listener.local_addr()?, config.api_keys.len());
     tracing::info!(%address, threads = config.n_threads(), n_api_keys, "listening");
     server::serve(App::new(config)?, listener, stop).await?;
+    log.mention_losses();
     Ok(())
 }
 

@@ -1,7 +1,8 @@
 //! What the process logs, and what it never does.
 
-use std::io::{Read, Write};
-use std::process::Command;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -98,4 +99,29 @@ async fn a_process_out_of_files_says_so_briefly_and_goes_on() {
     let lines = process.finish().1;
     let n_lines = lines.iter().filter(|line| line.contains("cannot accept")).count();
     assert!((1..20).contains(&n_lines), "{n_lines}");
+}
+
+#[tokio::test]
+async fn nobody_waits_for_whoever_reads_the_log() {
+    let mut child = gramian().args(["--bind", "127.0.0.1:0"]).stderr(Stdio::piped()).spawn().unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("listening") {
+        line.clear();
+        assert!(log.read_line(&mut line).unwrap() > 0);
+    }
+    let entry: Value = serde_json::from_str(&line).unwrap();
+    let url = format!("http://{}/v1/kernels", entry["fields"]["address"].as_str().unwrap());
+    // Their lines are several times what a pipe holds, and more than wait.
+    let client = reqwest::Client::builder().timeout(Duration::from_secs(20)).build().unwrap();
+    for _ in 0..6000 {
+        assert_eq!(client.get(&url).send().await.unwrap().status(), 200);
+    }
+    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    let mut rest = String::new();
+    log.read_to_string(&mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    // What is there is whole lines, in their order.
+    assert!(rest.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()));
+    assert!(rest.contains("/v1/kernels"));
 }
