@@ -14,16 +14,16 @@ use std::time::Instant;
 use axum::Router;
 use axum::routing::get;
 use clap::Parser;
-use gramian::app::App;
 use gramian::config::Config;
-use gramian::http::answer::{Answer, Member, Parts};
-use gramian::http::array::Array;
-use gramian::http::encode::Encoded;
-use gramian::http::limits::ParseContext;
-use gramian::http::negotiation::{Coding, Format, Wanted};
-use gramian::http::parse::parse_json;
-use gramian::http::points::Points;
 use gramian::http::problem::Problem;
+use gramian::http::serve::app::App;
+use gramian::http::wire::negotiation::{Coding, Format, Wanted};
+use gramian::http::wire::read::limits::ParseContext;
+use gramian::http::wire::read::parse::parse_json;
+use gramian::http::wire::read::points::Points;
+use gramian::http::wire::write::answer::{Answer, Member, Parts};
+use gramian::http::wire::write::array::Array;
+use gramian::http::wire::write::encode::Encoded;
 use gramian::store::Owner;
 
 const N_POINTS: usize = 1_000_000;
@@ -132,7 +132,7 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
                 app.factors.reserve(Owner(0), 2 * size_of_val(&*matrix), || true).await.unwrap().unwrap();
             let encode = move || Encoded::of(Matrix(matrix), wanted);
             let encoded = app.compute.run_small(Owner(0), encode).await;
-            encoded.ok().unwrap().ok().unwrap().into_response(&app, memory)
+            encoded.ok().unwrap().ok().unwrap().into_response(&app.compute, memory)
         }
     };
     std::thread::spawn(move || {

@@ -14,8 +14,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::{Observer, Stage};
-use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::regularization::Regularization;
 use support::{ROUNDS, measure, size_argument, sphere, timed};
 
 /// Time spent in each stage.

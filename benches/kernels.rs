@@ -7,13 +7,13 @@
 
 use std::time::Instant;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::gram::fill_cross_gram;
-use gramian::numerics::instruction_set::InstructionSet;
-use gramian::numerics::jets::{JetOrder, Jets};
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
-use gramian::numerics::nodes::Nodes;
+use gramian::numerics::machine::instruction_set::InstructionSet;
 use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::sums::gram::fill_cross_gram;
+use gramian::numerics::sums::jets::{JetOrder, Jets};
+use gramian::numerics::sums::nodes::Nodes;
 
 const N_POINTS: usize = 4096;
 const N_QUERIES: usize = 500;

@@ -11,17 +11,17 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::defaults::{Purpose, Scales, default_fit};
-use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::neighbours::Neighbours;
-use gramian::numerics::noise::estimate_noise;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::neighbours::Neighbours;
+use gramian::numerics::points::noise::estimate_noise;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 

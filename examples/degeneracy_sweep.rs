@@ -7,7 +7,7 @@ mod shapes;
 #[path = "../tests/degeneracy/sweep.rs"]
 mod sweep;
 
-use gramian::numerics::geometry::SurfaceModel;
+use gramian::numerics::surface::geometry::SurfaceModel;
 use rayon::prelude::*;
 use sweep::{Tally, cases};
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use axum::http::Uri;
 use clap::Args;
 
-use crate::memory;
+use crate::machine;
 
 /// The configuration, read once in `main` and passed down.
 #[derive(Debug, Clone, clap::Args)]
@@ -105,7 +105,7 @@ impl Config {
 
     /// Bytes of memory for everything.
     pub fn memory_bytes(&self) -> usize {
-        self.memory_bytes.unwrap_or_else(memory::default_bytes)
+        self.memory_bytes.unwrap_or_else(machine::default_bytes)
     }
 
     /// How late a body may be.
@@ -150,8 +150,8 @@ impl Config {
 /// As many as the process needs to answer at all.
 fn enough_bytes(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
-        Ok(bytes) if bytes >= memory::LEAST_BYTES => Ok(bytes),
-        _ => Err(format!("must be a number of bytes, at least {}", memory::LEAST_BYTES)),
+        Ok(bytes) if bytes >= machine::LEAST_BYTES => Ok(bytes),
+        _ => Err(format!("must be a number of bytes, at least {}", machine::LEAST_BYTES)),
     }
 }
 

@@ -12,8 +12,8 @@ pub mod store;
 
 pub mod http;
 
-pub mod app;
 pub mod config;
+mod machine;
 mod memory;
 pub mod server;
 pub mod telemetry;

@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use gramian::app::App;
 use gramian::config::Config;
+use gramian::http::serve::app::App;
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};

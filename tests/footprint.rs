@@ -5,17 +5,17 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::defaults::Scales;
 use gramian::numerics::error::NumericsError;
-use gramian::numerics::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::neighbours::Neighbours;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::neighbours::Neighbours;
 use gramian::numerics::solver::{GramFactor, Solution};
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::factors::{FactorBytes, FactorStore, StoredFactor};

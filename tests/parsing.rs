@@ -11,13 +11,13 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gramian::http::body::RequestBody;
-use gramian::http::fields::{
+use gramian::http::wire::negotiation::{Coding, Format};
+use gramian::http::wire::read::body::RequestBody;
+use gramian::http::wire::read::limits::ParseContext;
+use gramian::http::wire::read::members::{
     object, present, present_object, present_unless_empty, present_word, present_words,
 };
-use gramian::http::limits::ParseContext;
-use gramian::http::negotiation::{Coding, Format};
-use gramian::http::points::Points;
+use gramian::http::wire::read::points::Points;
 use gramian::numerics::observer::Unobserved;
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;

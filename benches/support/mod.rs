@@ -3,7 +3,7 @@
 use std::io::{BufRead, Write};
 use std::time::{Duration, Instant};
 
-use gramian::numerics::cloud::Cloud;
+use gramian::numerics::points::cloud::Cloud;
 
 /// Rounds of a benchmark that runs by itself.
 pub const ROUNDS: usize = 7;

@@ -1,41 +1,13 @@
 //! HTTP: every route on this page, middleware beneath.
 
-pub mod answer;
-pub mod array;
-pub mod auth;
-pub mod body;
-mod compression;
+pub mod around;
 pub mod compute;
-pub mod encode;
 pub mod fields;
-mod fit;
-mod fitted;
-pub mod fitting;
-mod guarded;
-mod intake;
-mod kernel;
-pub mod limits;
-mod merged;
-mod middleware;
-pub mod negotiation;
-mod npy;
 pub mod openapi;
-pub mod operation;
-pub mod parse;
-mod plain_json;
-mod planner;
-pub mod points;
 pub mod problem;
-mod report;
-mod responses;
 mod routes;
-mod sampling;
-mod schemas;
-mod shared;
-pub mod slug;
-mod tensor;
-mod tensors;
-pub mod transport;
+pub mod serve;
+pub mod wire;
 
 use std::sync::Arc;
 
@@ -51,11 +23,12 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
-use crate::app::App;
 use crate::config::Origins;
+use around::{authentication, middleware};
 use routes::{
     clouds, interpolation, kernels, laplace_beltrami, pages, posterior, process, surface, surface_gradient,
 };
+use serve::app::App;
 
 /// The service as one router.
 pub fn router(app: Arc<App>) -> Router {
@@ -65,7 +38,7 @@ pub fn router(app: Arc<App>) -> Router {
     let [document, document_3_0] = [document, document_3_0].map(|document| serve_json(&document));
     let v1 = v1
         .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
-        .layer(from_fn_with_state(app.clone(), auth::authenticate));
+        .layer(from_fn_with_state(app.clone(), authentication::authenticate));
     v1.merge(probes)
         .route("/openapi.json", document)
         .route("/openapi-3.0.json", document_3_0)

@@ -4,11 +4,11 @@
 
 use rayon::prelude::*;
 
-use super::cloud::{Cloud, squared_distance};
 use super::error::NumericsError;
 use super::kernel::{Family, Kernel};
-use super::neighbours::Neighbours;
 use super::observer::Observer;
+use crate::numerics::points::cloud::{Cloud, squared_distance};
+use crate::numerics::points::neighbours::Neighbours;
 
 /// What a fit is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,13 +176,13 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
-    use crate::numerics::interpolant::Interpolant;
-    use crate::numerics::noise::estimate_noise;
+    use crate::numerics::function::interpolant::Interpolant;
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::regularization::Regularization;
+    use crate::numerics::points::noise::estimate_noise;
     use crate::numerics::solver::GramFactor;
+    use crate::numerics::sums::regularization::Regularization;
     use crate::numerics::surface::Surface;
+    use crate::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     fn of(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64) {

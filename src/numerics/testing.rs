@@ -1,6 +1,6 @@
 //! Clouds for the unit tests of this layer.
 
-use super::cloud::Cloud;
+use crate::numerics::points::cloud::Cloud;
 
 /// n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i (errata.md, "Settled").
 pub(crate) fn fibonacci_sphere(n: usize) -> Cloud {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 
 use super::pace::Pace;
-use crate::http::transport::HeadFault;
+use crate::http::around::transport::HeadFault;
 
 /// Time for a client to read a refusal that came before it had sent its body.
 const LINGERING: Duration = Duration::from_secs(2);

@@ -10,7 +10,7 @@ use hyper::body::Incoming;
 
 use super::activity::InFlight;
 use super::pace::Pace;
-use crate::http::transport::Arrival;
+use crate::http::around::transport::Arrival;
 
 /// Bytes that hyper is given at a time: few calls of the kernel in HTTP/1, and as much as a stream of HTTP/2 holds. hyper takes
 /// another piece while it has less than its buffer unsent (`connection::BUFFER`, `connection::SEND_BUFFER`), so no more than the

@@ -20,7 +20,7 @@ use super::activity::{Activity, Expiry, Notice};
 use super::body::{Receiving, Sending};
 use super::pace::Pace;
 use super::socket::Socket;
-use crate::http::transport::Arrival;
+use crate::http::around::transport::Arrival;
 
 /// Bytes of a head of HTTP/1, and of what is read ahead or not yet sent; a larger head is answered 431. hyper takes 100
 /// headers at most.

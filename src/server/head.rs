@@ -9,7 +9,7 @@
 //! scanner is stricter than hyper, so where it finds no fault the two agree on where a request ends; where it finds one, it
 //! stops for good, and every request from then on is refused and the connection closed.
 
-use crate::http::transport::HeadFault;
+use crate::http::around::transport::HeadFault;
 
 /// Bytes of a line that are kept: what is longer is no header that matters here, or no good value of one.
 const KEPT_BYTES: usize = 64;

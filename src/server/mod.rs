@@ -20,8 +20,8 @@ use std::time::Duration;
 use axum::Router;
 use tokio::net::TcpListener;
 
-use crate::app::App;
 use crate::http::router;
+use crate::http::serve::app::App;
 use accept::{Acceptor, Connections, Door};
 use activity::Activity;
 use connection::Patience;

@@ -7,10 +7,10 @@ use super::Owner;
 use super::fair_cache::FairCache;
 use super::key::CloudId;
 use super::single_flight::SingleFlight;
-use crate::numerics::cloud::Cloud;
 use crate::numerics::defaults::Scales;
-use crate::numerics::duplicates::count_duplicates;
-use crate::numerics::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::duplicates::count_duplicates;
 
 /// A cloud with the lengths that are derived from it once, on demand; not with the tree that they come from, which would
 /// weigh as much again and is built in a small part of their time.
@@ -166,8 +166,8 @@ where
 mod tests {
     use super::*;
     use crate::numerics::error::NumericsError;
-    use crate::numerics::neighbours::Neighbours;
     use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::neighbours::Neighbours;
 
     fn line(n: usize, offset: f64) -> Cloud {
         Cloud::new((0..n).map(|i| i as f64 + offset).collect(), 1).unwrap()

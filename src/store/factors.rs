@@ -9,8 +9,8 @@ use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
 use super::fair_cache::FairCache;
 use super::key::{CloudId, FactorKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
-use crate::numerics::heap::{arc_payload, block_bytes};
-use crate::numerics::memory::SpareBuffer;
+use crate::numerics::machine::heap::{arc_payload, block_bytes};
+use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::solver::{GramFactor, Solution};
 use crate::numerics::surface::Surface;
 

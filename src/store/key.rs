@@ -3,9 +3,9 @@
 use std::fmt;
 
 use super::Owner;
-use crate::numerics::cloud::Cloud;
 use crate::numerics::kernel::{Family, Kernel, WendlandSmoothness};
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::regularization::Regularization;
 
 /// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
 /// likewise if given; written as 64 hexadecimal digits.

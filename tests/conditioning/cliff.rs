@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::Method;
 
 use crate::support::*;

@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::JetOrder;
+use gramian::numerics::function::interpolant::Interpolant;
+use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
-use gramian::numerics::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::sums::jets::JetOrder;
+use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 use serde_json::Value;
 
 use crate::support::{jets as fit_jets, *};

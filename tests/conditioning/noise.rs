@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
 use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::sums::regularization::Regularization;
 
 use crate::support::*;
 

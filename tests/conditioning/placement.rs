@@ -1,10 +1,10 @@
 //! Far from the origin, tiny and huge: only differences of coordinates against ℓ count.
 
-use gramian::numerics::cloud::Cloud;
+use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::{laplace_beltrami, surface_gradient};
-use gramian::numerics::posterior::variances;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::surface::operators::{laplace_beltrami, surface_gradient};
 
 use crate::support::*;
 

@@ -1,10 +1,10 @@
 //! `minimum_alpha` is an α that helps: with it Cholesky succeeds and what needs its factor is answered.
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::error::{NotDefinite, NumericsError};
+use gramian::numerics::function::posterior::{log_marginal_likelihood, variances};
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::posterior::{log_marginal_likelihood, variances};
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::Method;
 
 use crate::support::*;

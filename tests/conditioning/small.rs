@@ -1,9 +1,9 @@
 //! Clouds with too few points or dimensions for a surface: interpolation works, geometry is right or flagged.
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::Geometry;
 use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::surface::geometry::Geometry;
 
 use crate::support::*;
 

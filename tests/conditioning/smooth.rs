@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::{laplace_beltrami, surface_gradient};
 use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::surface::operators::{laplace_beltrami, surface_gradient};
 
 use crate::support::*;
 

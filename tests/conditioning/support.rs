@@ -3,16 +3,16 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::error::NumericsError;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::JetOrder;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::jets::JetOrder;
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 pub use crate::random::Random;
 

@@ -3,13 +3,13 @@
 //! With `δ = 1e-9` a kernel that is `1 − c r^s` near 0 keeps `2c δ^s` of the second point's diagonal entry: 1e-9 for a kink
 //! (s = 1), 1e-18 and so nothing for all others (s = 2).
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::error::{NotDefinite, NumericsError};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::JetOrder;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::Method;
+use gramian::numerics::sums::jets::JetOrder;
 
 use crate::support::*;
 

@@ -1,10 +1,10 @@
 //! Surfaces without mean curvature, and open ones: the signature function has no gradient there, the offset model has.
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::degeneracy::DegeneracyReason;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::surface::degeneracy::DegeneracyReason;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 
 use super::clouds::{Oriented, cylinder, flat_square, graph, half_sphere};
 use super::random::Random;

@@ -1,7 +1,7 @@
 //! Signs of normals where the signature function alone flips them.
 
-use gramian::numerics::geometry::{GeometryRequest, SurfaceModel};
 use gramian::numerics::kernel::Family;
+use gramian::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 
 use super::clouds::{Oriented, closed_curve, dumbbell, half_sphere, plate};
 use super::support::{cosines, geometry, n_wrong, surface_of};

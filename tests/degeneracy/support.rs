@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use super::clouds::Oriented;
 

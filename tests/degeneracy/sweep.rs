@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::degeneracy::DegeneracyReason;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::degeneracy::DegeneracyReason;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 use super::random::Random;
 use super::shapes::Shape;

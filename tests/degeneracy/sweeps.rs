@@ -1,6 +1,6 @@
 //! The sweep of docs/degeneracy.md holds its promises.
 
-use gramian::numerics::geometry::SurfaceModel;
+use gramian::numerics::surface::geometry::SurfaceModel;
 use rayon::prelude::*;
 
 use super::sweep::{Tally, cases};

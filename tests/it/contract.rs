@@ -13,7 +13,7 @@ mod tests;
 
 use std::sync::LazyLock;
 
-use gramian::http::slug::Slug;
+use gramian::http::problem::slug::Slug;
 use serde_json::{Value, json};
 
 pub use answer::{Received, decompressed};

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gramian::http::slug::Slug;
+use gramian::http::problem::slug::Slug;
 use serde_json::Value;
 
 use crate::support::overwrites;

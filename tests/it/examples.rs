@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use gramian::http::openapi::examples::{EXAMPLES, PROBLEMS};
 use gramian::http::problem::Problem;
-use gramian::http::slug::Slug;
+use gramian::http::problem::slug::Slug;
 use serde_json::{Map, Value, json};
 
 use crate::limits::slow_request;

@@ -1,6 +1,6 @@
 //! What the process says of itself: pages of problems, health, version, documents.
 
-use gramian::http::slug::Slug;
+use gramian::http::problem::slug::Slug;
 use serde_json::{Value, json};
 
 use crate::routes::ROUTES;

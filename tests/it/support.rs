@@ -3,8 +3,8 @@
 use std::net::SocketAddr;
 
 use clap::Parser;
-use gramian::app::App;
 use gramian::config::Config;
+use gramian::http::serve::app::App;
 use gramian::server::serve;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-pub use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, GeometryRequest};
-pub use gramian::numerics::geometry::{Orientation, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::{JetOrder, Jets};
+use gramian::numerics::function::interpolant::Interpolant;
+use gramian::numerics::function::posterior;
 pub use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators;
-use gramian::numerics::posterior;
-use gramian::numerics::regularization::Regularization;
+pub use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::jets::{JetOrder, Jets};
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
+pub use gramian::numerics::surface::geometry::{Orientation, SurfaceModel};
+use gramian::numerics::surface::operators;
 
 /// The regularised Laplace kernel of the paper's tables.
 pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };

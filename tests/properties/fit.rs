@@ -1,11 +1,11 @@
 //! Fits: interpolation, the proposition on regularization, derivatives, the Gaussian process.
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::{JetOrder, Jets};
+use gramian::numerics::function::interpolant::Interpolant;
+use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::sums::jets::{JetOrder, Jets};
 
 use crate::support::{
     EPS, cholesky, cross_gram, distance, dot, factorize, families, fit, forward_solve, kernel, largest,

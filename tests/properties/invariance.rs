@@ -3,12 +3,12 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::jets::JetOrder;
+use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::Kernel;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
-use gramian::numerics::posterior::variances;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::sums::jets::JetOrder;
+use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 
 use crate::support::{
     circle, distance, factorize, families, fit, geometry, largest, rounding, sphere, stretched, waves, width,

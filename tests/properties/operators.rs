@@ -3,15 +3,15 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::JetOrder;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
+use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 
 use crate::support::{
     EPS, circle, distance, dot, factorize, families, families_without_kink, fit, geometry, kernel, largest,

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
-use gramian::numerics::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::jets::{JetOrder, Jets};
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::jets::{JetOrder, Jets};
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 pub const EPS: f64 = f64::EPSILON;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::defaults::Purpose;
+use gramian::numerics::points::cloud::Cloud;
 
 use super::support::{Random, geometry, quantile};
 

@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::defaults::Purpose;
-use gramian::numerics::interpolant::Interpolant;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::operators::laplace_beltrami;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::surface::operators::laplace_beltrami;
 
 use super::support::{Random, factor, geometry, quantile};
 

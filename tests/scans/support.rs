@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::cloud::Cloud;
 use gramian::numerics::defaults::{Purpose, Scales, default_fit};
-use gramian::numerics::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::interpolant::Interpolant;
-use gramian::numerics::neighbours::Neighbours;
-use gramian::numerics::noise::estimate_noise;
+use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::regularization::Regularization;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::neighbours::Neighbours;
+use gramian::numerics::points::noise::estimate_noise;
 use gramian::numerics::solver::GramFactor;
+use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
+use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 
 pub use crate::random::Random;
 

@@ -2,12 +2,13 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use tokio::sync::oneshot;
 
 use super::observer::{JobObserver, StageTimes};
+use super::pulse::Pulse;
 use super::turns::{Turn, Turns};
 use crate::store::Owner;
 
@@ -16,29 +17,6 @@ pub(super) struct Lane {
     pool: Arc<rayon::ThreadPool>,
     turns: Arc<Turns>,
     pulse: Arc<Pulse>,
-}
-
-/// The last signs of life of a lane.
-pub(super) struct Pulse {
-    began: Instant,
-    /// Milliseconds at which a job last came to a checkpoint, or a probe through.
-    last: AtomicU64,
-    /// A probe is under way.
-    is_probed: AtomicBool,
-}
-
-impl Pulse {
-    fn new() -> Arc<Self> {
-        Arc::new(Self { began: Instant::now(), last: AtomicU64::new(0), is_probed: AtomicBool::new(false) })
-    }
-
-    pub(super) fn beat(&self) {
-        self.last.store(self.began.elapsed().as_millis() as u64, Ordering::Relaxed);
-    }
-
-    fn silence(&self) -> Duration {
-        self.began.elapsed().saturating_sub(Duration::from_millis(self.last.load(Ordering::Relaxed)))
-    }
 }
 
 impl Lane {

@@ -18,6 +18,7 @@
 mod lane;
 mod observer;
 mod places;
+mod pulse;
 mod turns;
 
 use std::sync::Arc;
@@ -48,6 +49,7 @@ pub struct Compute {
     shared: Lane,
     exclusive: Lane,
     places: Arc<Places>,
+    n_threads: usize,
 }
 
 impl Compute {
@@ -66,7 +68,13 @@ impl Compute {
             shared: Lane::new("gramian-shared", n_threads, n_threads, 2)?,
             exclusive: Lane::new("gramian-exclusive", n_threads, 1, 5)?,
             places: Places::new(n_threads.saturating_add(max_queue), n_owners, deadline),
+            n_threads,
         })
+    }
+
+    /// Threads of each lane.
+    pub fn n_threads(&self) -> usize {
+        self.n_threads
     }
 
     /// Takes a place for a request of this owner.
@@ -154,7 +162,7 @@ fn panicked() -> Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::slug::Slug;
+    use crate::http::problem::slug::Slug;
     use crate::numerics::observer::Observer;
     use tokio::sync::oneshot;
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::lane::Pulse;
+use super::pulse::Pulse;
 use crate::numerics::observer::{Observer, Stage};
 
 /// Time spent in each stage of a job.

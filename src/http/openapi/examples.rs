@@ -9,7 +9,7 @@ use utoipa::openapi::path::Operation;
 use utoipa::openapi::{Content, Ref, RefOr};
 
 use super::{id_of, operations};
-use crate::http::slug::Slug;
+use crate::http::problem::slug::Slug;
 
 /// One example of a file, by the name that it has there.
 macro_rules! example_file {

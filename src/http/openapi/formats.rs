@@ -4,7 +4,7 @@ use utoipa::openapi::schema::{KnownFormat, SchemaFormat, SchemaType, Type};
 use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
 
 use super::{id_of, operations};
-use crate::http::negotiation::Format;
+use crate::http::wire::negotiation::Format;
 
 /// What requests and answers may be beside JSON, by operation id.
 fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) {

@@ -6,6 +6,7 @@ pub mod examples;
 mod formats;
 mod headers;
 mod links;
+pub mod responses;
 pub mod version_3_0;
 
 use serde_json::Value;

@@ -6,21 +6,22 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use crate::app::App;
-use crate::http::answer::answer;
-use crate::http::array::Array;
 use crate::http::compute::JobObserver;
-use crate::http::fields::present;
-use crate::http::fitted::Fits;
-use crate::http::operation::{Cost, Operation, Plan, serve};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
+use crate::http::fields::{Diagnostics, request};
+use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Diagnostics, request};
-use crate::numerics::cloud::Cloud;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::plan::Cost;
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::members::present;
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
 use crate::numerics::defaults::Purpose;
-use crate::numerics::jets::JetOrder;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 
 request! {

@@ -4,8 +4,8 @@ use axum::Json;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::http::responses::ReadProblems;
-use crate::http::shared::KernelFamily;
+use crate::http::fields::KernelFamily;
+use crate::http::openapi::responses::ReadProblems;
 
 /// A parameter that a family takes beside `length_scale` and `variance`.
 #[derive(Serialize, ToSchema)]

@@ -9,20 +9,20 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
-use crate::app::App;
-use crate::http::answer::answer;
-use crate::http::array::Array;
 use crate::http::compute::JobObserver;
-use crate::http::fields::{present, present_object, present_word};
-use crate::http::fitted::Fits;
-use crate::http::negotiation::Format;
-use crate::http::operation::{Operation, Plan, serve};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
+use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
+use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Degenerate, Diagnostics, Geometry, request};
-use crate::numerics::operators::{laplace_beltrami, laplace_beltrami_matrix};
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::wire::negotiation::Format;
+use crate::http::wire::read::members::{present, present_object, present_word};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix};
 use crate::store::Owner;
 
 request! {

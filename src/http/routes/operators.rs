@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use super::surface::{check_is_surface, geometry_request, numbers_at_query};
 use crate::http::compute::JobObserver;
-use crate::http::fitted::{Fits, SurfaceGeometry};
-use crate::http::operation::{Cost, Plan};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
+use crate::http::fields::{Diagnostics, Fit, Geometry, OrientationChoice};
 use crate::http::problem::Problem;
-use crate::http::shared::{Diagnostics, Fit, Geometry, OrientationChoice};
-use crate::numerics::cloud::Cloud;
-use crate::numerics::geometry::GeometryRequest;
+use crate::http::serve::fitted::{Fits, SurfaceGeometry};
+use crate::http::serve::operation::Plan;
+use crate::http::serve::plan::Cost;
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::points::Points;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::surface::geometry::GeometryRequest;
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {

@@ -7,9 +7,9 @@ use std::fmt::Write;
 use axum::extract::Path;
 use axum::response::Html;
 
+use crate::http::openapi::responses::{PageProblems, ProbeProblems};
 use crate::http::problem::Problem;
-use crate::http::responses::{PageProblems, ProbeProblems};
-use crate::http::slug::Slug;
+use crate::http::problem::slug::Slug;
 
 /// Begin here
 ///

@@ -8,23 +8,24 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use crate::app::App;
-use crate::http::answer::answer;
-use crate::http::array::Array;
 use crate::http::compute::JobObserver;
-use crate::http::fields::{present, present_words};
-use crate::http::fit::PlannedFit;
-use crate::http::fitted::Fits;
-use crate::http::operation::{Cost, Operation, Plan, serve};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
+use crate::http::fields::{Diagnostics, Warning, WarningCode, request};
+use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Diagnostics, Warning, WarningCode, request};
-use crate::numerics::cloud::Cloud;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::plan::Cost;
+use crate::http::serve::plan::PlannedFit;
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::members::{present, present_words};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
 use crate::numerics::defaults::Purpose;
-use crate::numerics::jets::JetOrder;
-use crate::numerics::posterior::{covariance, log_marginal_likelihood, variances};
+use crate::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 
 /// What may be asked of a posterior beside its mean.

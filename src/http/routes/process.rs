@@ -7,9 +7,9 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::app::App;
+use crate::http::openapi::responses::{ProbeProblems, ReadyProblems};
 use crate::http::problem::Problem;
-use crate::http::responses::{ProbeProblems, ReadyProblems};
+use crate::http::serve::app::App;
 
 /// The state of the process.
 #[derive(Serialize, ToSchema)]
@@ -84,7 +84,7 @@ pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
         name: env!("CARGO_PKG_NAME"),
         version: env!("CARGO_PKG_VERSION"),
         api: "v1",
-        instruction_set: crate::numerics::instruction_set::InstructionSet::best().name(),
+        instruction_set: crate::numerics::machine::instruction_set::InstructionSet::best().name(),
         threads: app.config.n_threads(),
     })
 }

@@ -6,24 +6,25 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use crate::app::App;
-use crate::http::answer::answer;
-use crate::http::array::Array;
 use crate::http::compute::JobObserver;
-use crate::http::fields::{present, present_word};
-use crate::http::fitted::Fits;
-use crate::http::operation::{Cost, Operation, Plan, serve};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
-use crate::http::problem::Problem;
-use crate::http::responses::ComputeProblems;
-use crate::http::shared::{
+use crate::http::fields::{
     Degenerate, Diagnostics, Fit, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
-use crate::http::slug::Slug;
-use crate::numerics::cloud::Cloud;
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::plan::Cost;
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::members::{present, present_word};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
 use crate::numerics::defaults::Purpose;
-use crate::numerics::geometry::{GeometryRequest, Orientation, SurfaceModel};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::surface::geometry::{GeometryRequest, Orientation, SurfaceModel};
 use crate::store::Owner;
 
 request! {

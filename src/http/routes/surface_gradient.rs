@@ -7,20 +7,20 @@ use axum::extract::{Request, State};
 use axum::response::Response;
 
 use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
-use crate::app::App;
-use crate::http::answer::answer;
-use crate::http::array::Array;
 use crate::http::compute::JobObserver;
-use crate::http::fields::{present, present_object};
-use crate::http::fitted::Fits;
-use crate::http::negotiation::Format;
-use crate::http::operation::{Operation, Plan, serve};
-use crate::http::planner::Planner;
-use crate::http::points::Points;
+use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
+use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::responses::ComputeProblems;
-use crate::http::shared::{Degenerate, Diagnostics, Geometry, request};
-use crate::numerics::operators::{surface_gradient, surface_gradient_matrices};
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::wire::negotiation::Format;
+use crate::http::wire::read::members::{present, present_object};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::numerics::surface::operators::{surface_gradient, surface_gradient_matrices};
 use crate::store::Owner;
 
 request! {

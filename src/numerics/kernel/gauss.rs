@@ -3,8 +3,8 @@
 use pulp::Simd;
 
 use super::Profile;
-use crate::numerics::exp::exp_minus;
-use crate::numerics::simd::Pack;
+use crate::numerics::machine::exp::exp_minus;
+use crate::numerics::machine::registers::Pack;
 
 pub(super) struct Gauss;
 

@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::Profile;
-use crate::numerics::simd::Pack;
+use crate::numerics::machine::registers::Pack;
 
 pub(super) struct InverseMultiquadric;
 

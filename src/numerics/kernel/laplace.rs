@@ -4,8 +4,8 @@
 use pulp::Simd;
 
 use super::{Profile, TINY};
-use crate::numerics::exp::exp_minus;
-use crate::numerics::simd::Pack;
+use crate::numerics::machine::exp::exp_minus;
+use crate::numerics::machine::registers::Pack;
 
 pub(super) struct Laplace {
     pub(super) epsilon: f64,

@@ -6,8 +6,8 @@
 use pulp::Simd;
 
 use super::{Profile, TINY};
-use crate::numerics::exp::exp_minus;
-use crate::numerics::simd::Pack;
+use crate::numerics::machine::exp::exp_minus;
+use crate::numerics::machine::registers::Pack;
 
 /// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
 const FAR: f64 = 1e3;

@@ -13,7 +13,7 @@ mod wendland;
 use pulp::Simd;
 
 use super::error::NumericsError;
-use super::simd::Pack;
+use crate::numerics::machine::registers::Pack;
 
 /// The families, with the parameters that are theirs alone.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,8 @@
 use pulp::WithSimd;
 
 use super::*;
-use crate::numerics::instruction_set::InstructionSet;
-use crate::numerics::simd::{BLOCK, Block};
+use crate::numerics::machine::instruction_set::InstructionSet;
+use crate::numerics::machine::registers::{BLOCK, Block};
 
 /// Every family at parameters that a user might choose.
 pub(crate) fn all_families() -> Vec<Family> {

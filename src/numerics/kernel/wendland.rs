@@ -6,7 +6,7 @@
 use pulp::Simd;
 
 use super::{Profile, TINY};
-use crate::numerics::simd::Pack;
+use crate::numerics::machine::registers::Pack;
 
 /// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it.
 #[inline(always)]

@@ -13,12 +13,12 @@ use faer::{Accum, Mat, MatMut, MatRef};
 use super::packed::Packed;
 use super::parallelism;
 use super::substitution::{solve_backward, solve_forward};
-use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Kernel;
-use crate::numerics::memory::SpareBuffer;
+use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::observer::Observer;
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::regularization::Regularization;
 
 /// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
 ///

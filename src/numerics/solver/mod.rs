@@ -12,14 +12,14 @@ use std::sync::Arc;
 
 use faer::{Mat, MatMut, Par};
 
-use super::cloud::Cloud;
-use super::duplicates::coinciding_points;
 use super::error::{NotDefinite, NumericsError};
-use super::heap::{arc_payload, block_bytes, vec_bytes};
 use super::kernel::Kernel;
-use super::memory::SpareBuffer;
 use super::observer::{Observer, Stage};
-use super::regularization::Regularization;
+use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::numerics::machine::pages::SpareBuffer;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::duplicates::coinciding_points;
+use crate::numerics::sums::regularization::Regularization;
 pub use solution::Solution;
 
 use cholesky::Cholesky;

@@ -16,14 +16,14 @@ use std::sync::Arc;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
-use crate::numerics::gram::fill_kernel_column;
 use crate::numerics::kernel::Kernel;
-use crate::numerics::memory::{Buffer, SpareBuffer};
-use crate::numerics::nodes::Nodes;
+use crate::numerics::machine::pages::{Buffer, SpareBuffer};
 use crate::numerics::observer::Observer;
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::gram::fill_kernel_column;
+use crate::numerics::sums::nodes::Nodes;
+use crate::numerics::sums::regularization::Regularization;
 
 /// Numbers by which the first triangle lies lower than it would in a full matrix: a cache line, so that columns of both
 /// triangles begin at one.

@@ -13,12 +13,12 @@ use faer::{Accum, Mat, MatMut, MatRef};
 use super::cholesky::factorize_in_place;
 use super::parallelism;
 use super::pivoting::{Pivoting, Pivots};
-use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
-use crate::numerics::heap::vec_bytes;
 use crate::numerics::kernel::Kernel;
+use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::regularization::Regularization;
 
 /// Rows or columns between two looks at the observer.
 const ROWS_PER_CHECKPOINT: usize = 512;

@@ -6,13 +6,13 @@ use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 
 use super::parallelism;
-use crate::numerics::cloud::Cloud;
 use crate::numerics::error::NumericsError;
-use crate::numerics::gram::fill_cross_gram;
 use crate::numerics::kernel::Kernel;
-use crate::numerics::nodes::Nodes;
 use crate::numerics::observer::Observer;
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::gram::fill_cross_gram;
+use crate::numerics::sums::nodes::Nodes;
+use crate::numerics::sums::regularization::Regularization;
 
 /// Pivots below this multiple of k₀ are rounding (numerics.md, Fit 2).
 const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;

@@ -4,9 +4,9 @@ use faer::MatMut;
 
 use super::GramFactor;
 use crate::numerics::error::{NotDefinite, NumericsError};
-use crate::numerics::heap::vec_bytes;
-use crate::numerics::jets::{JetOrder, Jets};
+use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::{Observer, Stage};
+use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// Relative residuals above this are worth one step of refinement: backward stable solves stay below it unless the weights
 /// are huge against the values.

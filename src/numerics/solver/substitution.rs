@@ -254,9 +254,9 @@ fn products<S: Simd, const K: usize>(simd: S, columns: [&[f64]; K], x: &[f64]) -
 mod tests {
     use super::*;
     use crate::numerics::kernel::{Family, Kernel};
-    use crate::numerics::memory::SpareBuffer;
+    use crate::numerics::machine::pages::SpareBuffer;
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::regularization::Regularization;
+    use crate::numerics::sums::regularization::Regularization;
     use crate::numerics::testing::fibonacci_sphere;
 
     /// A triangle with a dominant diagonal: that of a Gram matrix, not of its factor.

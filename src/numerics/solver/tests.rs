@@ -189,8 +189,9 @@ fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
     let weights: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { (i as f64).cos() } else { 0.0 }).collect();
     let values: Vec<f64> = (0..200)
         .map(|i| {
-            let k =
-                |j: usize| (-crate::numerics::cloud::squared_distance(cloud.point(i), cloud.point(j))).exp();
+            let k = |j: usize| {
+                (-crate::numerics::points::cloud::squared_distance(cloud.point(i), cloud.point(j))).exp()
+            };
             (0..200).map(|j| k(j) * weights[j]).sum::<f64>() + noise[i] * weights[i]
         })
         .collect();

@@ -2,10 +2,10 @@ use futures_util::future::BoxFuture;
 use tokio::sync::oneshot;
 
 use super::*;
-use crate::numerics::cloud::Cloud;
 use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Unobserved;
-use crate::numerics::regularization::Regularization;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::regularization::Regularization;
 
 type Store = FactorStore<&'static str>;
 

@@ -1,0 +1,187 @@
+//! What happens around every handler: request id and log line, problem documents, negotiation, deadline.
+
+use std::any::Any;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::transport;
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::http::wire::negotiation::{Format, Wanted};
+
+/// Bytes of a method and of a path that are logged: clients may send any number.
+const LOGGED_METHOD_BYTES: usize = 32;
+const LOGGED_PATH_BYTES: usize = 200;
+
+/// What the pages for people may load and do: their own files. Swagger UI writes styles into its elements, and has icons in
+/// its style sheet.
+const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
+    font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Headers that browsers obey: nothing is taken for another type than its own, and pages are shown in no frame, load nothing
+/// from elsewhere and tell nobody where a link was followed from.
+fn secure(headers: &mut HeaderMap) {
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    let media_type = headers.get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
+    if media_type.starts_with(b"text/html") {
+        headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(PAGE_POLICY));
+        headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+        headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    }
+}
+
+/// Names the request, has it answered, writes problem documents that need that name, and logs one line.
+///
+/// The line has method, path and status, never a body: clouds stay out of the log.
+pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let _counted = Counted::new(app.clone());
+    let began = Instant::now();
+    let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
+    let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
+    let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
+    let response = transport::answer(&app, request, next).await;
+    let mut response = with_problem_document(response, &request_id);
+    secure(response.headers_mut());
+    if let Ok(value) = HeaderValue::from_str(&request_id) {
+        response.headers_mut().insert("x-request-id", value);
+    }
+    let status = response.status().as_u16();
+    let duration_ms = began.elapsed().as_secs_f64() * 1e3;
+    let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
+    tracing::info!(request_id, method, path, status, duration_ms, cache, "{method} {path} {status}");
+    response
+}
+
+/// The beginning of a text, with a mark where more follows.
+fn cut(text: &str, n_bytes: usize) -> String {
+    if text.len() <= n_bytes {
+        return text.to_owned();
+    }
+    let end = (0..=n_bytes).rev().find(|&end| text.is_char_boundary(end)).unwrap_or(0);
+    format!("{}…", &text[..end])
+}
+
+/// A request under way, also if its client leaves.
+struct Counted(Arc<App>);
+
+impl Counted {
+    fn new(app: Arc<App>) -> Self {
+        app.n_requests.fetch_add(1, Ordering::Relaxed);
+        Self(app)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.n_requests.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// A client's own id, if it is short and harmless in logs and headers.
+fn client_request_id(headers: &HeaderMap) -> Option<String> {
+    let id = headers.get("x-request-id")?.to_str().ok()?;
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    (!id.is_empty() && id.len() <= 128 && id.chars().all(is_plain)).then(|| id.to_owned())
+}
+
+/// Writes the document of a problem, also for errors that a library answered on its own. Other headers are kept.
+fn with_problem_document(response: Response, request_id: &str) -> Response {
+    let status = response.status();
+    if !status.is_client_error() && !status.is_server_error() {
+        return response;
+    }
+    let problem = response.extensions().get::<Problem>().cloned().unwrap_or_else(|| foreign(status));
+    let mut documented = problem.to_response(request_id);
+    for (name, value) in response.headers() {
+        if name != header::CONTENT_TYPE && name != header::CONTENT_LENGTH {
+            documented.headers_mut().append(name, value.clone());
+        }
+    }
+    documented
+}
+
+/// An error that no handler of ours made.
+fn foreign(status: StatusCode) -> Problem {
+    match status {
+        // axum's own 400 is about a path that is not UTF-8 once decoded.
+        StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST => not_found_problem(),
+        StatusCode::METHOD_NOT_ALLOWED => Problem::new(Slug::MethodNotAllowed, "see the Allow header"),
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => {
+            Problem::new(Slug::UnsupportedMediaType, "send application/json")
+        }
+        _ if status.is_client_error() => Problem::new(Slug::InvalidRequest, "the request cannot be read"),
+        _ => Problem::internal(),
+    }
+}
+
+pub async fn not_found() -> Problem {
+    not_found_problem()
+}
+
+fn not_found_problem() -> Problem {
+    Problem::new(Slug::NotFound, "no such path; /openapi.json lists every path")
+}
+
+pub async fn method_not_allowed() -> Problem {
+    Problem::new(Slug::MethodNotAllowed, "this path does not have this method; see the Allow header")
+}
+
+/// A panic is a bug: logged by the panic hook, answered without detail.
+pub fn recover(_panic: Box<dyn Any + Send + 'static>) -> Response {
+    Problem::internal().into_response()
+}
+
+/// Refuses requests that accept no JSON, where there is nothing else. Success of HEAD and DELETE has no body, so there is nothing
+/// to accept: generated clients name the media type of problems alone, which are sent whatever is accepted.
+pub async fn negotiate(request: Request, next: Next) -> Response {
+    if matches!(*request.method(), Method::HEAD | Method::DELETE) {
+        return next.run(request).await;
+    }
+    match Wanted::of(request.headers(), &[Format::Json]) {
+        Ok(_) => next.run(request).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+/// Answers 504 when the deadline passes; dropping the handler cancels its work.
+pub async fn meet_deadline(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let deadline = app.config.deadline();
+    match tokio::time::timeout(deadline, next.run(request)).await {
+        Ok(response) => response,
+        Err(_) => {
+            let detail = format!("no answer within {} s; the work was cancelled", deadline.as_secs_f64());
+            Problem::new(Slug::DeadlineExceeded, detail).into_response()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_texts_are_cut_between_characters() {
+        assert_eq!(cut("/v1", 3), "/v1");
+        assert_eq!(cut("/v1/", 3), "/v1…");
+        assert_eq!(cut("ää", 3), "ä…");
+    }
+
+    #[test]
+    fn only_harmless_request_ids_are_taken_over() {
+        let with = |id: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert("x-request-id", HeaderValue::from_str(id).unwrap());
+            client_request_id(&headers)
+        };
+        assert_eq!(with("trace-1.a_b"), Some("trace-1.a_b".to_owned()));
+        assert_eq!(with("a b"), None);
+        assert_eq!(with(&"x".repeat(129)), None);
+    }
+}

@@ -1,0 +1,96 @@
+//! The problems that operations can answer, as sets for the document. [`Problem`] is what handlers return. Every set has what any
+//! request may meet: an ambiguous head, a bug, and a server that drains or has no connection left.
+//!
+//! [`Problem`]: crate::http::problem::Problem
+
+use std::collections::BTreeMap;
+
+use utoipa::IntoResponses;
+use utoipa::openapi::{ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
+
+use super::examples::problem_example;
+use crate::http::problem::slug::Slug;
+
+/// Declares a set of problems.
+macro_rules! problem_set {
+    ($(#[$meta:meta])* $name:ident: $($slug:ident),* $(,)?) => {
+        $(#[$meta])*
+        pub struct $name;
+
+        impl IntoResponses for $name {
+            fn responses() -> BTreeMap<String, RefOr<Response>> {
+                responses_of(&[$(Slug::$slug),*])
+            }
+        }
+    };
+}
+
+problem_set! {
+    /// Operations that compute.
+    ComputeProblems:
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
+    ProblemTooLarge,
+    UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
+    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// The registration of a cloud.
+    RegisterProblems:
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
+    UnsupportedMediaType,
+    InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// The description of one cloud. What is not UTF-8 in the path is no path.
+    DescribeProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// Operations that only look a cloud up, and answer without a body.
+    LookUpProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, Internal, Overloaded
+}
+
+problem_set! {
+    /// The list of clouds.
+    ListProblems: MalformedRequest, Unauthorized, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// Operations that only read what is built in.
+    ReadProblems: MalformedRequest, Unauthorized, NotAcceptable, Internal, Overloaded
+}
+
+problem_set! {
+    /// Probes and pages, which are only refused with the connection or its head.
+    ProbeProblems: MalformedRequest, Internal, Overloaded
+}
+
+problem_set! {
+    /// The readiness probe.
+    ReadyProblems: MalformedRequest, Internal, Overloaded
+}
+
+problem_set! {
+    /// Pages of one problem.
+    PageProblems: MalformedRequest, NotFound, Internal, Overloaded
+}
+
+/// One response for each status, with the problems that have it and an example of each.
+fn responses_of(slugs: &[Slug]) -> BTreeMap<String, RefOr<Response>> {
+    let mut by_status: BTreeMap<String, Vec<Slug>> = BTreeMap::new();
+    for &slug in slugs {
+        by_status.entry(slug.status().as_str().to_owned()).or_default().push(slug);
+    }
+    by_status.into_iter().map(|(status, slugs)| (status, RefOr::T(response_of(&slugs)))).collect()
+}
+
+fn response_of(slugs: &[Slug]) -> Response {
+    let describe = |slug: &Slug| format!("`{}`: {}", slug.as_str(), slug.title());
+    let description = slugs.iter().map(describe).collect::<Vec<_>>().join("; ");
+    let examples = slugs.iter().map(|&slug| (slug.as_str(), problem_example(slug)));
+    let problem = Ref::from_schema_name("Problem");
+    let content = ContentBuilder::new().schema(Some(problem)).examples_from_iter(examples).build();
+    ResponseBuilder::new().description(description).content("application/problem+json", content).build()
+}

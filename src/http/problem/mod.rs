@@ -1,0 +1,325 @@
+//! RFC 9457 problem documents: every answer with status 400 or above.
+
+pub mod slug;
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::numerics::error::{NotDefinite, NumericsError};
+use slug::Slug;
+
+/// Points listed in `point_indices` at most: enough to find the pattern, and bounded.
+const MAX_POINT_INDICES: usize = 1000;
+
+/// When to come back after an allocation failed: factorizations under way have ended by then.
+const RETRY_AFTER_MEMORY_SECONDS: u64 = 60;
+
+/// What went wrong, where, and what to do about it.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    slug: Slug,
+    detail: String,
+    /// Boxed, since every fallible function carries a problem and few have these.
+    members: Box<Members>,
+}
+
+/// The members that only some problems have.
+#[derive(Debug, Clone, Default)]
+struct Members {
+    errors: Vec<FieldError>,
+    minimum_alpha: Option<f64>,
+    point_indices: Vec<usize>,
+    limit: Option<u64>,
+    required: Option<u64>,
+    retry_after_seconds: Option<u64>,
+}
+
+/// One field of the request that was refused.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct FieldError {
+    /// RFC 6901 pointer into the request body, such as `/cloud/points/17/2`; for query parameters, `/<name>`.
+    #[schema(example = "/cloud/points/17/2")]
+    pub pointer: String,
+    /// What is wrong with this field.
+    #[schema(example = "expected a number, found null")]
+    pub detail: String,
+}
+
+/// A problem document (RFC 9457, `application/problem+json`).
+#[derive(Serialize, ToSchema)]
+#[schema(as = Problem)]
+pub struct ProblemDocument<'a> {
+    /// The kind of problem: `/problems/<slug>`, served as a page.
+    #[schema(format = "uri-reference", example = "/problems/invalid-request")]
+    r#type: String,
+    /// The kind of problem in words, the same for every occurrence.
+    title: &'a str,
+    /// The HTTP status, repeated.
+    #[schema(example = 422)]
+    status: u16,
+    /// What happened in this request, where, and the remedy where there is one.
+    detail: &'a str,
+    /// The id of the request, as in `X-Request-Id`.
+    instance: &'a str,
+    /// The fields that were refused.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    #[schema(required = false)]
+    errors: &'a [FieldError],
+    /// An alpha for which the computation succeeds, unit of the values squared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    minimum_alpha: Option<f64>,
+    /// The points in question, by position in the cloud; at most the first 1,000.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    #[schema(required = false)]
+    point_indices: &'a [usize],
+    /// The limit that was exceeded, in the unit that `detail` names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    limit: Option<u64>,
+    /// What the request would have needed, in the same unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    required: Option<u64>,
+}
+
+/// Where the parts of a fit stand in the request: what `geometry` leaves out stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// The points of the cloud, or its id.
+    pub points: &'static str,
+    pub kernel: &'static str,
+    /// `alpha` or `noise_variances`.
+    pub regularization: &'static str,
+    /// The queries, or the points that stand for them.
+    pub queries: &'static str,
+}
+
+impl Place {
+    /// The fields of the request itself, the cloud as points.
+    pub const REQUEST: Place =
+        Place { points: "/cloud/points", kernel: "/kernel", regularization: "/alpha", queries: "/queries" };
+
+    /// One entry of a list; an id has none.
+    fn entry(list: &str, index: usize) -> String {
+        if list.ends_with("/id") { list.to_owned() } else { format!("{list}/{index}") }
+    }
+}
+
+impl Problem {
+    pub fn new(slug: Slug, detail: impl Into<String>) -> Self {
+        Self { slug, detail: detail.into(), members: Box::default() }
+    }
+
+    /// A problem of one field; its detail is the field's.
+    pub fn of_field(slug: Slug, pointer: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::new(slug, detail).at(pointer)
+    }
+
+    pub fn invalid_request(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::of_field(Slug::InvalidRequest, pointer, detail)
+    }
+
+    pub fn length_mismatch(pointer: impl Into<String>, expected: usize, found: usize) -> Self {
+        let detail = format!("expected {expected} entries, one per point of the cloud, found {found}");
+        Self::of_field(Slug::LengthMismatch, pointer, detail)
+    }
+
+    pub fn dimension_mismatch(pointer: impl Into<String>, expected: usize, found: usize) -> Self {
+        let detail = format!("expected points of dimension {expected}, as in the cloud, found {found}");
+        Self::of_field(Slug::DimensionMismatch, pointer, detail)
+    }
+
+    /// 413 for a request whose size in `what` is over a limit.
+    pub fn too_large(slug: Slug, what: &str, limit: usize, required: Option<usize>) -> Self {
+        let needed = required.map(|n| format!(", this request has {n}")).unwrap_or_default();
+        let mut problem = Self::new(slug, format!("at most {limit} {what} are served{needed}"));
+        problem.members.limit = Some(limit as u64);
+        problem.members.required = required.map(|n| n as u64);
+        problem
+    }
+
+    /// 503 for what finds no place, no memory or no thread now.
+    pub fn overloaded(retry_after_seconds: u64) -> Self {
+        let detail =
+            format!("all that can be served at once is being served; try again in {retry_after_seconds} s");
+        let mut problem = Self::new(Slug::Overloaded, detail);
+        problem.members.retry_after_seconds = Some(retry_after_seconds);
+        problem
+    }
+
+    /// 503 for another reason than a full queue.
+    pub fn unavailable(reason: &str, retry_after_seconds: u64) -> Self {
+        let detail = format!("{reason}; try again in {retry_after_seconds} s");
+        let mut problem = Self::new(Slug::Overloaded, detail);
+        problem.members.retry_after_seconds = Some(retry_after_seconds);
+        problem
+    }
+
+    /// Says nothing internal: the log has the cause under the request id.
+    pub fn internal() -> Self {
+        Self::new(Slug::Internal, "an internal error occurred; the request id identifies it in the logs")
+    }
+
+    /// Adds to the detail, also where a field repeats it, what the client can do.
+    pub fn with_remedy(mut self, remedy: &str) -> Self {
+        let detail = format!("{}; {remedy}", self.detail);
+        let repeating = self.members.errors.iter_mut().filter(|error| error.detail == self.detail);
+        repeating.for_each(|error| error.detail.clone_from(&detail));
+        self.detail = detail;
+        self
+    }
+
+    /// Adds a field with this problem's detail.
+    pub fn at(mut self, pointer: impl Into<String>) -> Self {
+        self.members.errors.push(FieldError { pointer: pointer.into(), detail: self.detail.clone() });
+        self
+    }
+
+    pub fn slug(&self) -> Slug {
+        self.slug
+    }
+
+    /// Turns a refusal of the numerics into its problem: status, type, pointer and remedy.
+    pub fn from_numerics(error: NumericsError, place: Place) -> Self {
+        use NumericsError as E;
+        let detail = error.to_string();
+        let at = |slug, pointer: &str| Self::of_field(slug, pointer, detail.clone());
+        match error {
+            E::EmptyCloud | E::ZeroDimension | E::DimensionTooSmall { .. } => {
+                at(Slug::InvalidCloud, place.points)
+            }
+            E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &Place::entry(place.points, point)),
+            E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
+                at(Slug::InvalidCloud, &format!("{}/{coordinate}", Place::entry(place.points, point)))
+            }
+            E::DimensionMismatch { .. } => at(Slug::DimensionMismatch, place.queries),
+            E::LengthMismatch { .. } => at(Slug::LengthMismatch, "/values"),
+            E::InvalidKernelParameter { parameter, .. } => {
+                at(Slug::InvalidRequest, &format!("{}/{parameter}", place.kernel))
+            }
+            E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, place.regularization),
+            E::InvalidRegularization { point: Some(point), .. } => {
+                at(Slug::InvalidRequest, &Place::entry(place.regularization, point))
+            }
+            E::KernelNotPositiveDefinite { .. } => {
+                let remedy = format!("{detail}; choose another family");
+                Self::of_field(Slug::KernelNotPositiveDefinite, format!("{}/family", place.kernel), remedy)
+            }
+            E::KernelNotSmooth { query, .. } => {
+                let remedy = format!(
+                    "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or ask for the \
+                     geometry of surface offset, which needs no gradient"
+                );
+                Self::of_field(Slug::KernelNotSmooth, Place::entry(place.queries, query), remedy)
+            }
+            E::DuplicatePoints { points } => {
+                let remedy = format!(
+                    "{detail}; set alpha (or their noise_variances) above 0, or alpha to 0 and \"duplicates\" to \"merge\" \
+                     to average their values"
+                );
+                let mut problem = Self::new(Slug::DuplicatePoints, remedy);
+                for point in points.iter().take(10) {
+                    let pointer = Place::entry(place.points, *point);
+                    problem
+                        .members
+                        .errors
+                        .push(FieldError { pointer, detail: "coincides with another point".to_owned() });
+                }
+                // A cloud given by its id has one pointer for all its points.
+                problem.members.errors.dedup_by(|a, b| a.pointer == b.pointer);
+                problem.members.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
+                problem
+            }
+            E::NotPositiveDefinite { reason, minimum_alpha } => {
+                // Rounded up: the remedy must work when it is typed in.
+                let enough = 1.01 * minimum_alpha;
+                let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
+                let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.regularization, remedy);
+                problem.members.minimum_alpha = Some(minimum_alpha);
+                if let NotDefinite::NeedsCholesky { point } = reason {
+                    problem.members.point_indices = vec![point];
+                }
+                problem
+            }
+            E::Overflow { .. } => {
+                Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
+            }
+            E::OutOfMemory { .. } => {
+                let mut problem =
+                    Self::new(Slug::Overloaded, format!("{detail}; try again when less is computed"));
+                problem.members.retry_after_seconds = Some(RETRY_AFTER_MEMORY_SECONDS);
+                problem
+            }
+            E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
+            // Whoever cancelled is gone and reads nothing; the deadline has its own answer.
+            E::Cancelled => Self::new(Slug::DeadlineExceeded, detail),
+        }
+    }
+
+    /// The document for one request.
+    pub fn document<'a>(&'a self, request_id: &'a str) -> ProblemDocument<'a> {
+        ProblemDocument {
+            r#type: format!("/problems/{}", self.slug.as_str()),
+            title: self.slug.title(),
+            status: self.slug.status().as_u16(),
+            detail: &self.detail,
+            instance: request_id,
+            errors: &self.members.errors,
+            minimum_alpha: self.members.minimum_alpha,
+            point_indices: &self.members.point_indices,
+            limit: self.members.limit,
+            required: self.members.required,
+        }
+    }
+
+    /// The full response, once the id of the request is known.
+    pub fn to_response(&self, request_id: &str) -> Response {
+        let body = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
+        let mut response = (self.slug.status(), body).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if let Some(seconds) = self.members.retry_after_seconds {
+            headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if self.slug.status() == StatusCode::UNAUTHORIZED {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response
+    }
+}
+
+impl IntoResponse for Problem {
+    /// An empty response that carries the problem: the middleware, which knows the id of the request, writes the document.
+    fn into_response(self) -> Response {
+        let mut response = self.slug.status().into_response();
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pointers_lead_into_the_fit_that_failed() {
+        let error = NumericsError::RaggedPoints { point: 17, expected: 3, found: 2 };
+        let problem = Problem::from_numerics(error.clone(), Place::REQUEST);
+        assert_eq!(problem.members.errors[0].pointer, "/cloud/points/17");
+        let elsewhere = Place { points: "/geometry/cloud/points", ..Place::REQUEST };
+        let problem = Problem::from_numerics(error.clone(), elsewhere);
+        assert_eq!(problem.members.errors[0].pointer, "/geometry/cloud/points/17");
+        let by_id = Place { points: "/cloud/id", ..Place::REQUEST };
+        assert_eq!(Problem::from_numerics(error, by_id).members.errors[0].pointer, "/cloud/id");
+    }
+
+    #[test]
+    fn absent_members_are_left_out_of_the_document() {
+        let document = serde_json::to_value(Problem::internal().document("id-1")).unwrap();
+        let members: Vec<&String> = document.as_object().unwrap().keys().collect();
+        assert_eq!(members, ["type", "title", "status", "detail", "instance"]);
+    }
+}

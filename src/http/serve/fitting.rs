@@ -1,0 +1,260 @@
+//! From plans to factorizations and surfaces: found, or made once for all who ask, in memory that was taken for them.
+
+use std::sync::{Arc, OnceLock};
+
+use super::fitted::{Fits, Fitted};
+use super::plan::{Cost, FactorFailure, FitPlan};
+use super::report::Report;
+use crate::http::compute::{Admission, JobObserver, StageTimes};
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::solver::{GramFactor, Workspace};
+use crate::numerics::surface::Surface;
+use crate::store::budget::{BeyondBudget, Reservation};
+use crate::store::factors::{Missing, StoredFactor};
+use crate::store::key::ValuesKey;
+
+/// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
+const LEAST_BYTES: usize = 16 << 10;
+
+/// Brings the factorizations of one request.
+pub struct Fitting<'a> {
+    pub app: &'a Arc<App>,
+    pub admission: &'a Arc<Admission>,
+    /// Whether the surface is asked for as well.
+    pub has_surface: bool,
+}
+
+/// What a request takes of the memory for work, taken at once: who waits for a part while holding another may wait for ever.
+struct Memory {
+    work: Reservation,
+    main: Option<Reservation>,
+    other: Option<Reservation>,
+    surface: Option<Reservation>,
+}
+
+impl Fitting<'_> {
+    /// The fits with their factorizations, and the memory for the work with them.
+    ///
+    /// # Errors
+    /// 413 if it takes more memory than there is, and what factorizing refuses.
+    pub async fn fits(
+        &self,
+        main: &FitPlan,
+        surface: Option<&FitPlan>,
+        cost: Cost,
+        report: &mut Report,
+    ) -> Result<(Fits, Reservation), Problem> {
+        let mut wanted = Wanted {
+            main,
+            other: surface.filter(|surface| surface.key != main.key),
+            of_main: Extent::Cholesky,
+            of_other: Extent::Cholesky,
+            cost,
+        };
+        loop {
+            if let Some(found) = self.attempt(&mut wanted, report).await? {
+                return Ok(found);
+            }
+            // However often that happens, others have their turn.
+            tokio::task::yield_now().await;
+        }
+    }
+
+    /// `None` if what was there when the memory was counted is gone, or what was missing is there, or the memory was not enough:
+    /// then everything goes back, and is counted again.
+    async fn attempt(
+        &self,
+        wanted: &mut Wanted<'_>,
+        report: &mut Report,
+    ) -> Result<Option<(Fits, Reservation)>, Problem> {
+        let Some(memory) = self.reserve(wanted).await? else { return Ok(None) };
+        let fitted = self.fitted(wanted.main, memory.main, &mut wanted.of_main, report).await?;
+        let Some(main) = fitted else { return Ok(None) };
+        let mut fits = Fits { app: self.app.clone(), main, surface: None, made: None };
+        if let Some(other) = wanted.other {
+            fits.surface = self.fitted(other, memory.other, &mut wanted.of_other, report).await?;
+            if fits.surface.is_none() {
+                return Ok(None);
+            }
+        }
+        if self.has_surface {
+            fits.made = self.surface(fits.surface(), memory.surface, report).await?;
+            if fits.made.is_none() {
+                return Ok(None);
+            }
+        }
+        Ok(Some((fits, memory.work)))
+    }
+
+    /// `None` if what is missing has changed while it waited.
+    async fn reserve(&self, wanted: &Wanted<'_>) -> Result<Option<Memory>, Problem> {
+        let counted = self.count(wanted);
+        let work = LEAST_BYTES.saturating_add(wanted.cost.n_bytes());
+        let total = counted.into_iter().fold(work, usize::saturating_add);
+        let is_wanted = || self.count(wanted) == counted;
+        let reserved = self.app.factors.reserve(self.admission.owner, total, is_wanted).await;
+        let Some(mut work) = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))? else {
+            return Ok(None);
+        };
+        let [main, other, surface] = counted.map(|n_bytes| (n_bytes > 0).then(|| work.split(n_bytes)));
+        Ok(Some(Memory { work, main, other, surface }))
+    }
+
+    /// Bytes for the factorizations and the surface that are missing now.
+    fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
+        let missing = |plan: &FitPlan, extent, with_surface| {
+            let Missing { factor, surface } = self.app.factors.missing(plan.key, with_surface);
+            let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
+            let factor = if factor { n_bytes_of_factor(plan, extent) } else { Some(0) };
+            let surface = if surface { Surface::n_bytes_needed(n, d) } else { 0 };
+            (factor.unwrap_or(usize::MAX), surface)
+        };
+        let of_main = missing(wanted.main, wanted.of_main, self.has_surface && wanted.other.is_none());
+        let of_other = wanted.other.map(|other| missing(other, wanted.of_other, self.has_surface));
+        let of_other = of_other.unwrap_or((0, 0));
+        [of_main.0, of_other.0, of_main.1 + of_other.1]
+    }
+
+    /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
+    async fn fitted(
+        &self,
+        plan: &FitPlan,
+        memory: Option<Reservation>,
+        extent: &mut Extent,
+        report: &mut Report,
+    ) -> Result<Option<Fitted>, Problem> {
+        let begin =
+            |memory: Reservation| factorize(self.app.clone(), self.admission.clone(), plan.clone(), memory);
+        match self.app.factors.get_or_factorize(plan.key, memory, begin).await {
+            Ok(Some((stored, outcome))) => {
+                report.found(&stored, outcome);
+                Ok(Some(Fitted { plan: plan.clone(), stored }))
+            }
+            Ok(None) => Ok(None),
+            Err(FactorFailure::NeedsAll) => {
+                *extent = Extent::Fallback;
+                Ok(None)
+            }
+            Err(failure) => Err(failure.of(plan)),
+        }
+    }
+
+    /// `None` if it is to be made, without memory for it.
+    async fn surface(
+        &self,
+        fitted: &Fitted,
+        memory: Option<Reservation>,
+        report: &mut Report,
+    ) -> Result<Option<Arc<Surface>>, Problem> {
+        let factors = &self.app.factors;
+        let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
+        let begin = |memory: Reservation| {
+            make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone(), memory)
+        };
+        let found = factors.get_or_make_surface(key, &fitted.stored, memory, begin).await;
+        if let Some(&times) = times.get() {
+            report.made_surface(times);
+        }
+        found.map_err(|failure| failure.of(&fitted.plan))
+    }
+}
+
+/// The fits that one request wants, and how much of their matrices they are given memory for.
+struct Wanted<'a> {
+    main: &'a FitPlan,
+    /// That of the surface, where it is another one.
+    other: Option<&'a FitPlan>,
+    of_main: Extent,
+    of_other: Extent,
+    cost: Cost,
+}
+
+/// How much of its matrix a factorization is given memory for.
+#[derive(Clone, Copy)]
+enum Extent {
+    /// Half of it. The fallback takes the other half as well if it is to be had at that moment.
+    Cholesky,
+    /// All of it, from the start: it is known that the fallback is needed.
+    Fallback,
+}
+
+/// The part of the matrix and what lies beside it.
+fn n_bytes_of_factor(plan: &FitPlan, extent: Extent) -> Option<usize> {
+    let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
+    let matrix = match extent {
+        Extent::Cholesky => GramFactor::n_bytes_needed(n),
+        Extent::Fallback => GramFactor::n_bytes_needed_at_most(n),
+    };
+    matrix?.checked_add(n.checked_mul((d + 10) * size_of::<f64>())?)
+}
+
+fn beyond(limit: usize, required: usize) -> Problem {
+    let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, or raise \
+                  GRAMIAN_MEMORY_BYTES";
+    Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(required)).with_remedy(remedy)
+}
+
+async fn factorize(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    plan: FitPlan,
+    mut memory: Reservation,
+) -> Result<StoredFactor, FactorFailure> {
+    let flops = GramFactor::flops_needed(plan.fitted.n_points());
+    let spare = app.factors.spare().clone();
+    let job = move |observer: &JobObserver| {
+        let (n_taken, mut is_short) = (memory.n_bytes(), false);
+        // It never waits for memory: it holds some already.
+        let mut may_take = |n_bytes: usize| {
+            is_short = n_bytes > n_taken && !memory.try_grow(n_bytes - n_taken);
+            !is_short
+        };
+        let workspace = Workspace { spare: &spare, may_take: &mut may_take };
+        let factor =
+            GramFactor::factorize_in(workspace, plan.fitted, plan.kernel, plan.regularization, observer);
+        match factor {
+            // The memory goes with the job: it may run on for a moment when nobody waits any more.
+            Ok(factor) => Ok((factor, memory)),
+            Err(_) if is_short => Err(FactorFailure::NeedsAll),
+            Err(error) => Err(FactorFailure::Refused(error)),
+        }
+    };
+    let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
+    let (factor, memory) = outcome?;
+    Ok(StoredFactor::new(factor, times.gram, times.factor, memory))
+}
+
+/// The surface of the signature function, with the client's normals if there are any.
+fn make_surface(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    fitted: &Fitted,
+    times: Arc<OnceLock<StageTimes>>,
+    memory: Reservation,
+) -> impl Future<Output = Result<(Surface, Reservation), FactorFailure>> + Send + 'static {
+    let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
+    let flops = Surface::flops_needed(plan.fitted.n_points(), plan.fitted.dimension());
+    let shared = app.clone();
+    let job = move |observer: &JobObserver| {
+        let (factor, given) = (stored.factor.clone(), plan.fitted_normals());
+        let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
+        let surface = match shared.factors.solution(plan.key, key) {
+            Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
+            None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
+                shared.factors.keep_solution(plan.key, key, signature.solution.clone());
+                Surface::with_jets(signature, jets, given.as_deref(), observer)
+            }),
+        };
+        // As with a factor, the memory goes with the job.
+        surface.map(|surface| (surface, memory))
+    };
+    async move {
+        let (surface, taken) =
+            app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
+        let _ = times.set(taken);
+        surface.map_err(FactorFailure::Refused)
+    }
+}

@@ -1,0 +1,149 @@
+//! Bodies as they come: within their limit, in memory that was taken for them, and at a rate that ends.
+
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::{HeaderMap, header};
+use http_body_util::BodyExt;
+use tokio::time::{Instant, timeout_at};
+
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::http::wire::negotiation::{Format, announced};
+use crate::http::wire::read::body::RequestBody;
+use crate::http::wire::read::limits::SMALLER_BODY;
+use crate::store::Owner;
+use crate::store::budget::Reservation;
+
+/// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
+/// answer instead of a broken connection.
+const MAX_DRAINED_BYTES: usize = 64 << 20;
+
+/// Bytes that are asked for at first; then the buffer doubles as bytes come, whatever was announced.
+const FIRST_BYTES: usize = 64 << 10;
+
+/// Bytes a second that a body must come at, but for the seconds that it may be late by.
+const LEAST_BYTES_PER_SECOND: f64 = 16384.0;
+
+/// How long a body waits for memory before it is refused: it holds memory that others wait for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A body with the memory that it takes.
+pub struct Intake {
+    pub body: RequestBody,
+    pub memory: Reservation,
+}
+
+/// Reads a body of at most `app.memory.body` bytes, in one of the formats.
+///
+/// # Errors
+/// 415 unless the headers announce one of them, 413 beyond the limit, 400 if the connection breaks off, 408 if it comes too
+/// slowly, 503 if there is no place for the request, or no memory. What the headers tell is answered before a byte is read.
+pub async fn read_body(
+    app: &App,
+    owner: Owner,
+    headers: &HeaderMap,
+    body: Body,
+    formats: &[Format],
+) -> Result<Intake, Problem> {
+    let (format, coding) = announced(headers, formats)?;
+    let limit = app.memory.body;
+    let length = announced_length(headers);
+    if let Some(required) = length.filter(|&length| length > limit) {
+        // Who asks before sending is told; who sends anyway is heard out.
+        if !headers.contains_key(header::EXPECT) {
+            drain(body, app.config.body_timeout()).await;
+        }
+        return Err(too_large(limit, Some(required)));
+    }
+    app.compute.check_room(owner)?;
+    let mut reader = Reader {
+        app,
+        began: Instant::now(),
+        memory: app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?,
+        bytes: Vec::new(),
+        most: length.unwrap_or(limit),
+    };
+    let mut body = body;
+    while let Some(data) = reader.next(&mut body).await? {
+        if reader.bytes.len() + data.len() > limit {
+            drain(body, app.config.body_timeout()).await;
+            return Err(too_large(limit, None));
+        }
+        reader.make_room(data.len()).await?;
+        reader.bytes.extend_from_slice(&data);
+    }
+    let Reader { mut memory, bytes, .. } = reader;
+    let body = RequestBody::new(format, coding, bytes, limit);
+    // All that parsing takes is taken before it begins.
+    if !app.intake.grow(&mut memory, body.n_bytes_to_parse(&app.config), PATIENCE).await {
+        return Err(app.compute.out_of_memory());
+    }
+    Ok(Intake { body, memory })
+}
+
+fn announced_length(headers: &HeaderMap) -> Option<usize> {
+    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+}
+
+fn too_large(limit: usize, required: Option<usize>) -> Problem {
+    Problem::too_large(Slug::BodyTooLarge, "bytes of body", limit, required).with_remedy(SMALLER_BODY)
+}
+
+struct Reader<'a> {
+    app: &'a App,
+    began: Instant,
+    memory: Reservation,
+    bytes: Vec<u8>,
+    /// What the body may have.
+    most: usize,
+}
+
+impl Reader<'_> {
+    /// The next piece of the body, if it comes in time.
+    async fn next(&self, body: &mut Body) -> Result<Option<bytes::Bytes>, Problem> {
+        let in_time = Duration::from_secs_f64(self.bytes.len() as f64 / LEAST_BYTES_PER_SECOND);
+        let until = self.began + in_time + self.app.config.body_timeout();
+        loop {
+            let Ok(frame) = timeout_at(until, body.frame()).await else {
+                let detail = format!(
+                    "the body came too slowly: {} bytes in {:.0} s",
+                    self.bytes.len(),
+                    self.began.elapsed().as_secs_f64()
+                );
+                return Err(Problem::new(Slug::RequestTimeout, detail));
+            };
+            let Some(frame) = frame else { return Ok(None) };
+            let frame = frame.map_err(|_| Problem::new(Slug::MalformedBody, "the body broke off"))?;
+            // What is no data are trailers.
+            if let Ok(data) = frame.into_data() {
+                return Ok(Some(data));
+            }
+        }
+    }
+
+    async fn make_room(&mut self, n_more: usize) -> Result<(), Problem> {
+        let needed = self.bytes.len() + n_more;
+        if needed <= self.bytes.capacity() {
+            return Ok(());
+        }
+        let wanted = (2 * self.bytes.capacity()).max(FIRST_BYTES).min(self.most).max(needed);
+        if !self.app.intake.grow(&mut self.memory, wanted - self.bytes.capacity(), PATIENCE).await {
+            return Err(self.app.compute.out_of_memory());
+        }
+        self.bytes.reserve_exact(wanted - self.bytes.len());
+        Ok(())
+    }
+}
+
+async fn drain(mut body: Body, patience: Duration) {
+    let until = Instant::now() + patience;
+    let mut drained = 0;
+    while let Ok(Some(Ok(frame))) = timeout_at(until, body.frame()).await {
+        drained += frame.into_data().map_or(0, |data| data.len());
+        if drained > MAX_DRAINED_BYTES {
+            break;
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! How requests are served: what they share, and the way of each from its body to its answer.
+
+pub mod app;
+pub mod keys;
+
+pub mod operation;
+
+pub mod fitted;
+pub mod fitting;
+pub mod intake;
+pub mod plan;
+pub mod planner;
+pub mod sampling;
+
+mod report;

@@ -1,0 +1,178 @@
+//! How a compute request is served, the same for every operation: read, admit, parse, plan, look at the cloud, reserve,
+//! factorize or find, compute, encode. An operation only says what its plan and its answer are.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::Request;
+use axum::response::Response;
+use serde::de::DeserializeOwned;
+
+use super::fitted::Fits;
+use super::fitting::Fitting;
+use super::intake::{Intake, read_body};
+use super::plan::{Cost, FitPlan, PlannedFit};
+use super::planner::Planner;
+use super::report::Report;
+use super::sampling::sample;
+use crate::http::compute::{Admission, JobObserver};
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::wire::negotiation::{Format, Wanted};
+use crate::http::wire::read::limits::ParseContext;
+use crate::http::wire::write::answer::Answer;
+use crate::http::wire::write::encode::Encoded;
+use crate::numerics::solver::GramFactor;
+use crate::numerics::surface::Surface;
+use crate::store::Owner;
+use crate::store::budget::Reservation;
+
+/// A request that needs a factorization.
+pub trait Operation: DeserializeOwned + Send + 'static {
+    /// What is left of the request once it is checked.
+    type Work: Send + 'static;
+    type Answer: Answer;
+
+    /// What answers may be written as, the preferred one first; npy where there is one matrix.
+    const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
+
+    /// Whether it asks about a surface: that of the plan's surface, or of its main fit.
+    const HAS_SURFACE: bool;
+
+    /// Checks everything that can be checked without computing, the cost included.
+    ///
+    /// # Errors
+    /// The [`Problem`] that the client is told.
+    fn plan(self, planner: &Planner<'_>) -> Result<Plan<Self::Work>, Problem>;
+
+    /// Computes the answer on the pool, with the factorizations at hand.
+    ///
+    /// # Errors
+    /// The [`Problem`] that the client is told.
+    fn compute(work: Self::Work, fits: &Fits, observer: &JobObserver) -> Result<Self::Answer, Problem>;
+}
+
+/// What requests that compute may be written as.
+pub const REQUEST_FORMATS: [Format; 2] = [Format::Json, Format::Safetensors];
+
+/// The factorizations that an operation needs, what it does with them, and what that costs.
+pub struct Plan<W> {
+    /// The fit of the values, or of the surface where there are no values.
+    pub main: PlannedFit,
+    /// The fit of the surface, if values and surface both play a part.
+    pub surface: Option<PlannedFit>,
+    pub work: W,
+    pub cost: Cost,
+}
+
+/// A plan with nothing left out of its fits.
+pub struct Resolved<W> {
+    pub main: FitPlan,
+    pub surface: Option<FitPlan>,
+    work: W,
+    pub cost: Cost,
+    /// The memory of the request, for as long as it is held.
+    intake: Reservation,
+}
+
+impl<W> Resolved<W> {
+    /// Flops of what this request will compute by itself, as far as can be seen beforehand.
+    fn expected_flops(&self, app: &App, has_surface: bool) -> f64 {
+        let other = self.surface.as_ref().filter(|surface| surface.key != self.main.key);
+        let fits = [(Some(&self.main), has_surface && other.is_none()), (other, has_surface)];
+        let of_fit = |(fit, with_surface): (Option<&FitPlan>, bool)| {
+            let Some(fit) = fit else { return 0.0 };
+            let (n, d) = (fit.fitted.n_points(), fit.fitted.dimension());
+            let missing = app.factors.missing(fit.key, with_surface);
+            let factor = if missing.factor { GramFactor::flops_expected(n) } else { 0.0 };
+            factor + if missing.surface { Surface::flops_needed(n, d) } else { 0.0 }
+        };
+        self.cost.flops + fits.into_iter().map(of_fit).sum::<f64>()
+    }
+}
+
+/// Serves one request.
+///
+/// # Errors
+/// The [`Problem`] that the client is told.
+pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    let wanted = Wanted::of(&parts.headers, O::FORMATS)?;
+    let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
+    let admission = app.compute.admit(owner)?;
+
+    let began = Instant::now();
+    let plan = prepare::<O>(&app, &admission, intake).await?;
+    let mut report = Report::parsed_in(began.elapsed());
+
+    admission.set_flops(plan.expected_flops(&app, O::HAS_SURFACE));
+    let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
+    let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
+    let Resolved { work, cost, intake, .. } = plan;
+    let job = move |observer: &JobObserver| {
+        let answer = O::compute(work, &fits, observer)?;
+        drop(intake);
+        let times = observer.times();
+        let began = Instant::now();
+        let encoded = Encoded::of(answer, wanted)?;
+        Ok::<_, Problem>((encoded, memory, times, began.elapsed()))
+    };
+    let (encoded, memory, times, encode) = app.compute.run(&admission, cost.flops, job).await?.0?;
+    admission.finish();
+    report.computed(times, (!encoded.is_streamed()).then_some(encode));
+    Ok(report.head(encoded.into_response(&app.compute, memory)))
+}
+
+/// Parses and plans, and looks at the clouds if something was left out that follows from them.
+async fn prepare<O: Operation>(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    intake: Intake,
+) -> Result<Resolved<O::Work>, Problem> {
+    let (shared, owner) = (app.clone(), admission.owner);
+    let flops = intake.body.flops_to_parse();
+    let parse = move |observer: &JobObserver| {
+        let Intake { body, mut memory } = intake;
+        let request: O = body.parse(&ParseContext::new(&shared.config, observer))?;
+        let plan = request.plan(&Planner { app: &shared, owner })?;
+        memory.shrink_to(n_bytes_held(&plan));
+        if lacking(&plan).is_some() {
+            Ok(Prepared::Lacking(plan, memory))
+        } else {
+            resolve(plan, memory).map(Prepared::Ready)
+        }
+    };
+    let (plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
+        Prepared::Ready(resolved) => return Ok(resolved),
+        Prepared::Lacking(plan, memory) => (plan, memory),
+    };
+    while let Some(fit) = lacking(&plan) {
+        sample(app, admission, fit).await?;
+    }
+    app.compute.run(admission, 0.0, move |_| resolve(plan, memory)).await?.0
+}
+
+enum Prepared<W> {
+    Ready(Resolved<W>),
+    /// Its fits need to know more of their clouds.
+    Lacking(Plan<W>, Reservation),
+}
+
+/// A fit that needs to know more of its cloud.
+fn lacking<W>(plan: &Plan<W>) -> Option<&PlannedFit> {
+    let mut fits = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
+    fits.find(|fit| fit.lacks_scales() || fit.lacks_noise())
+}
+
+fn resolve<W>(plan: Plan<W>, intake: Reservation) -> Result<Resolved<W>, Problem> {
+    let main = plan.main.resolve()?;
+    let surface = plan.surface.map(PlannedFit::resolve).transpose()?;
+    Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake })
+}
+
+/// Bytes that a request holds until it is answered: values, queries, and clouds that may not be kept.
+fn n_bytes_held<W>(plan: &Plan<W>) -> usize {
+    let clouds = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
+    let n_bytes = clouds.map(|fit| fit.stored.n_bytes() + 2 * size_of::<f64>() * fit.n_points());
+    n_bytes.sum::<usize>() + plan.cost.n_held * size_of::<f64>()
+}

@@ -1,0 +1,165 @@
+//! The fit of a request: checked as far as the request goes, and then with everything that follows from the cloud.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use crate::http::fields::DuplicatePolicy;
+use crate::http::fields::kernel::PlannedKernel;
+use crate::http::problem::{Place, Problem};
+use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
+use crate::numerics::error::{NotDefinite, NumericsError};
+use crate::numerics::kernel::Kernel as NumericalKernel;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::duplicates::Merge;
+use crate::numerics::sums::regularization::Regularization;
+use crate::store::Owner;
+use crate::store::clouds::StoredCloud;
+use crate::store::key::FactorKey;
+
+/// A fit that is checked as far as the request goes; what is left out follows from the cloud.
+pub struct PlannedFit {
+    pub owner: Owner,
+    pub stored: Arc<StoredCloud>,
+    pub place: Place,
+    pub(super) kernel: Option<PlannedKernel>,
+    pub(super) regularization: Option<Regularization>,
+    pub(super) duplicates: DuplicatePolicy,
+    pub(super) purpose: Purpose,
+}
+
+impl PlannedFit {
+    /// Points that are factorized at most: without the duplicates that may be merged.
+    pub fn n_points(&self) -> usize {
+        self.stored.cloud.n_points()
+    }
+
+    /// Whether the noise is given for each point.
+    pub fn has_noise_variances(&self) -> bool {
+        matches!(self.regularization, Some(Regularization::PerPoint(_)))
+    }
+
+    /// Whether the lengths of the cloud decide, and are not known yet.
+    pub fn lacks_scales(&self) -> bool {
+        !matches!(self.kernel, Some(PlannedKernel::Given(_))) && self.stored.scales().is_none()
+    }
+
+    /// Whether the noise of the points decides, and is not known yet.
+    pub fn lacks_noise(&self) -> bool {
+        self.needs_noise() && self.stored.noise().is_none()
+    }
+
+    fn needs_noise(&self) -> bool {
+        self.kernel.is_none() && self.regularization.is_none() && self.purpose != Purpose::Values
+    }
+
+    /// Fills in what is left out, once the cloud has what it lacks.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn resolve(self) -> Result<FitPlan, Problem> {
+        let Self { owner, stored, place, .. } = self;
+        let refuse = |error| Problem::from_numerics(error, place);
+        let (kernel, default_alpha) = match &self.kernel {
+            Some(kernel) => (kernel.resolve(stored.scales(), place)?, DEFAULT_ALPHA),
+            None => {
+                let scales = stored.scales().ok_or_else(Problem::internal)?;
+                // With a regularization given, nothing follows from it.
+                let noise = || stored.noise().unwrap_or_default();
+                default_fit(scales, self.purpose, noise).map_err(refuse)?
+            }
+        };
+        let regularization = match self.regularization {
+            Some(given) => given,
+            None => Regularization::uniform(default_alpha).map_err(refuse)?,
+        };
+        kernel.check_dimension(stored.cloud.dimension()).map_err(refuse)?;
+        let merges =
+            self.duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
+        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
+        let key = FactorKey::of_dense(owner, stored.id, &kernel, &regularization, merged.is_some());
+        let (fitted, merge) = match merged {
+            None => (stored.cloud.clone(), None),
+            Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
+        };
+        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, place })
+    }
+}
+
+/// A fit whose inputs are checked and whose cost is known and admitted.
+#[derive(Clone)]
+pub struct FitPlan {
+    pub stored: Arc<StoredCloud>,
+    /// The cloud that is factorized: without the merged duplicates.
+    pub fitted: Arc<Cloud>,
+    pub merge: Option<Arc<Merge>>,
+    pub kernel: NumericalKernel,
+    pub regularization: Regularization,
+    pub key: FactorKey,
+    pub place: Place,
+}
+
+impl FitPlan {
+    /// The client's normals at the points that are factorized: means over merged duplicates.
+    pub fn fitted_normals(&self) -> Option<Cow<'_, Cloud>> {
+        let normals = self.stored.normals.as_ref()?;
+        let Some(merge) = &self.merge else { return Some(Cow::Borrowed(normals)) };
+        let d = normals.dimension();
+        let component = |c: usize| normals.points().map(|normal| normal[c]).collect::<Vec<f64>>();
+        let means: Vec<Vec<f64>> = (0..d).map(|c| merge.mean(&component(c))).collect();
+        let interleaved = (0..self.fitted.n_points()).flat_map(|point| means.iter().map(move |m| m[point]));
+        Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
+    }
+
+    /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
+    pub fn refused(&self, mut error: NumericsError) -> Problem {
+        use NumericsError::{KernelNotSmooth, NotPositiveDefinite};
+        if let Some(merge) = &self.merge
+            && let KernelNotSmooth { point, .. }
+            | NotPositiveDefinite { reason: NotDefinite::NeedsCholesky { point }, .. } = &mut error
+        {
+            *point = merge.first_point(*point);
+        }
+        Problem::from_numerics(error, self.place)
+    }
+}
+
+/// What the work of an operation costs beside its factorizations.
+#[derive(Debug, Clone, Copy)]
+pub struct Cost {
+    pub flops: f64,
+    /// Numbers of the answer.
+    pub n_numbers: usize,
+    /// Numbers that are needed on the way to it.
+    pub n_scratch: usize,
+    /// Numbers of the request beside its clouds: values and queries.
+    pub n_held: usize,
+}
+
+impl Cost {
+    /// Bytes of the answer as numbers, once more while it is put together, and of what leads to it.
+    pub fn n_bytes(&self) -> usize {
+        let n_numbers = self.n_numbers.saturating_mul(2).saturating_add(self.n_scratch);
+        n_numbers.saturating_mul(size_of::<f64>())
+    }
+}
+
+/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
+#[derive(Debug, Clone)]
+pub enum FactorFailure {
+    Refused(NumericsError),
+    Broken(Problem),
+    /// Cholesky has failed, and there was no memory for the fallback at that moment.
+    NeedsAll,
+}
+
+impl FactorFailure {
+    /// The refusal, with pointers into the request that has this fit.
+    pub fn of(self, plan: &FitPlan) -> Problem {
+        match self {
+            Self::Refused(error) => plan.refused(error),
+            Self::Broken(problem) => problem,
+            // Whoever is told so tries again with all of the memory.
+            Self::NeedsAll => Problem::internal(),
+        }
+    }
+}

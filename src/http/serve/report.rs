@@ -1,0 +1,77 @@
+//! What the headers say of how an answer came about.
+
+use std::time::Duration;
+
+use axum::http::HeaderValue;
+use axum::response::Response;
+
+use crate::http::compute::StageTimes;
+use crate::store::factors::{CacheOutcome, StoredFactor};
+
+/// Times and cache, as `Server-Timing` and `Cache-Status`.
+#[derive(Default)]
+pub struct Report {
+    parse: Duration,
+    stages: StageTimes,
+    /// Absent if encoding goes on while the answer is sent.
+    encode: Option<Duration>,
+    cache: Option<CacheOutcome>,
+}
+
+impl Report {
+    /// Parsing and planning took so long, the wait for a turn included.
+    pub fn parsed_in(parse: Duration) -> Self {
+        Self { parse, ..Self::default() }
+    }
+
+    /// Adds a factor. With two of them the answer is a hit only if both are: the outcomes are ordered by cost.
+    pub fn found(&mut self, stored: &StoredFactor, outcome: CacheOutcome) {
+        self.cache = self.cache.max(Some(outcome));
+        if outcome != CacheOutcome::Hit {
+            self.stages.gram += stored.gram_time;
+            self.stages.factor += stored.factor_time;
+        }
+    }
+
+    /// Adds the stages of the surface.
+    pub fn made_surface(&mut self, times: StageTimes) {
+        self.stages.solve += times.solve;
+        self.stages.evaluate += times.evaluate;
+    }
+
+    pub fn computed(&mut self, times: StageTimes, encode: Option<Duration>) {
+        self.made_surface(times);
+        self.encode = encode;
+    }
+
+    /// Adds the headers.
+    pub fn head(&self, mut response: Response) -> Response {
+        let headers = response.headers_mut();
+        let cache = match self.cache {
+            None | Some(CacheOutcome::Hit) => "gramian; hit",
+            Some(CacheOutcome::Collapsed) => "gramian; fwd=miss; collapsed",
+            Some(CacheOutcome::Stored) => "gramian; fwd=miss; stored",
+            Some(CacheOutcome::NotStored) => "gramian; fwd=miss",
+        };
+        headers.insert("cache-status", HeaderValue::from_static(cache));
+        if let Ok(timing) = HeaderValue::from_str(&self.server_timing()) {
+            headers.insert("server-timing", timing);
+        }
+        response
+    }
+
+    fn server_timing(&self) -> String {
+        let stages = [
+            ("parse", Some(self.parse)),
+            ("gram", Some(self.stages.gram)),
+            ("factor", Some(self.stages.factor)),
+            ("solve", Some(self.stages.solve)),
+            ("evaluate", Some(self.stages.evaluate)),
+            ("encode", self.encode),
+        ];
+        let entry = |(name, time): (&str, Option<Duration>)| {
+            time.map(|time| format!("{name};dur={:.3}", time.as_secs_f64() * 1e3))
+        };
+        stages.into_iter().filter_map(entry).collect::<Vec<_>>().join(", ")
+    }
+}

@@ -1,0 +1,195 @@
+//! What a request may hold, known while it is parsed: parsing stops where a list is longer than any request may have, so that
+//! no body takes more memory than what is served from it.
+
+use crate::config::Config;
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::numerics::observer::{Observer, Unobserved};
+
+/// What to do about a body that is too large.
+pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
+     or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
+
+/// What parsing knows beside the bytes.
+#[derive(Clone, Copy)]
+pub struct ParseContext<'a> {
+    /// Points of a cloud, and with them its normals, values and variances.
+    pub max_points: usize,
+    pub max_queries: usize,
+    /// Coordinates of a point.
+    pub max_dimension: usize,
+    /// Says when nobody waits for the request any more.
+    pub observer: &'a dyn Observer,
+}
+
+impl<'a> ParseContext<'a> {
+    /// The limits of a server, for a request that `observer` watches.
+    pub fn new(config: &Config, observer: &'a dyn Observer) -> Self {
+        let &Config { max_points, max_queries, max_dimension, .. } = config;
+        Self { max_points, max_queries, max_dimension, observer }
+    }
+
+    /// Without limits, unobserved: for bodies that are known.
+    pub const UNLIMITED: ParseContext<'static> = ParseContext {
+        max_points: usize::MAX,
+        max_queries: usize::MAX,
+        max_dimension: usize::MAX,
+        observer: &Unobserved,
+    };
+
+    /// Entries that a list may have.
+    pub(super) fn max_entries(&self, list: List) -> usize {
+        match list {
+            List::Points | List::Numbers => self.max_points,
+            List::Queries => self.max_queries,
+            List::Coordinates => self.max_dimension,
+            List::Other => usize::MAX,
+        }
+    }
+
+    /// 413 for a list that has more.
+    pub(super) fn too_large(&self, excess: Excess, pointer: &str) -> Problem {
+        let Excess { list, length, width } = excess;
+        let limit = self.max_entries(list);
+        let problem = match (list, width) {
+            (_, Some(width)) if length <= limit => too_many_coordinates(self.max_dimension, width, length),
+            (List::Queries, _) => too_many_queries(limit, length),
+            (List::Numbers, _) => too_many_numbers(limit, length),
+            (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
+        };
+        problem.at(pointer)
+    }
+}
+
+/// The lists of a request that hold numbers, by their names; a test holds the names to the document.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum List {
+    /// Rows of a cloud.
+    Points,
+    /// Rows where answers are wanted.
+    Queries,
+    /// One number for each point.
+    Numbers,
+    /// One row.
+    Coordinates,
+    /// Words, or no list at all.
+    Other,
+}
+
+impl List {
+    pub(super) fn named(name: &str) -> Self {
+        match name {
+            "points" | "normals" => Self::Points,
+            "queries" => Self::Queries,
+            "values" | "noise_variances" => Self::Numbers,
+            _ => Self::Other,
+        }
+    }
+
+    /// What the entries of this list are.
+    pub(super) fn of_entries(self) -> Self {
+        match self {
+            Self::Points | Self::Queries => Self::Coordinates,
+            Self::Numbers | Self::Coordinates | Self::Other => Self::Other,
+        }
+    }
+}
+
+/// A list that is too long, or one of its rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Excess {
+    pub(super) list: List,
+    /// Entries of the list.
+    pub(super) length: usize,
+    /// Entries of the first row that has too many.
+    pub(super) width: Option<usize>,
+}
+
+/// 413 for a cloud of too many points.
+pub fn too_many_points(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "points", limit, Some(required)).with_remedy(
+        "thin the cloud, or register fewer points: the dense solver, the only one there is, takes 4 n² bytes and n³/3 flops \
+         (operators raise the limit by GRAMIAN_MAX_POINTS)",
+    )
+}
+
+/// 413 for too many queries.
+pub fn too_many_queries(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "queries", limit, Some(required)).with_remedy(
+        "split them over several requests: the factorization is kept for the next one, so that this costs nothing (operators \
+         raise the limit by GRAMIAN_MAX_QUERIES)",
+    )
+}
+
+/// 413 for points of too many coordinates, with a hint if they are the columns of `n_rows` rows.
+pub fn too_many_coordinates(limit: usize, required: usize, n_rows: usize) -> Problem {
+    let remedy = if n_rows <= limit {
+        transposed(n_rows, required)
+    } else {
+        "project the points to fewer dimensions (operators raise the limit by GRAMIAN_MAX_DIMENSION)"
+            .to_owned()
+    };
+    Problem::too_large(Slug::ProblemTooLarge, "coordinates a point", limit, Some(required))
+        .with_remedy(&remedy)
+}
+
+fn too_many_numbers(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "entries", limit, Some(required))
+        .with_remedy("send one per point of the cloud (operators raise the limit by GRAMIAN_MAX_POINTS)")
+}
+
+/// What to tell a client whose rows are columns.
+pub fn transposed(n_rows: usize, n_columns: usize) -> String {
+    let rows = if n_rows == 1 { "row" } else { "rows" };
+    format!("rows are points: {n_rows} {rows} of {n_columns} coordinates; transpose the array")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::Value;
+
+    use super::*;
+
+    /// Names of the members that are lists of numbers, and how deep the lists are, in a schema and all that it refers to.
+    fn lists<'a>(document: &'a Value, schema: &'a Value, found: &mut BTreeSet<(&'a str, usize)>) {
+        if let Some(reference) = schema["$ref"].as_str() {
+            let schema = document.pointer(&reference[1..]).unwrap();
+            return lists(document, schema, found);
+        }
+        for (name, member) in schema["properties"].as_object().into_iter().flatten() {
+            let (mut inner, mut depth) = (member, 0);
+            while inner["type"] == "array" {
+                (inner, depth) = (&inner["items"], depth + 1);
+            }
+            if inner["type"] == "number" && depth > 0 {
+                found.insert((name, depth));
+            }
+            lists(document, member, found);
+        }
+        for part in schema["oneOf"].as_array().into_iter().chain(schema["allOf"].as_array()).flatten() {
+            lists(document, part, found);
+        }
+    }
+
+    #[test]
+    fn every_list_of_numbers_of_a_request_has_a_limit() {
+        let document: Value = serde_json::from_str(&crate::http::openapi_json()).unwrap();
+        let mut found = BTreeSet::new();
+        for path in document["paths"].as_object().unwrap().values() {
+            lists(
+                &document,
+                &path["post"]["requestBody"]["content"]["application/json"]["schema"],
+                &mut found,
+            );
+        }
+        let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, ["noise_variances", "normals", "points", "queries", "values"]);
+        for (name, depth) in found {
+            let list = List::named(name);
+            let rows = if depth == 2 { List::Coordinates } else { List::Other };
+            assert!(list != List::Other && list.of_entries() == rows, "{name}");
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Bodies in: JSON, safetensors and npy, read by the same types within the same limits.
+
+pub mod body;
+pub mod limits;
+pub mod members;
+pub mod parse;
+pub mod points;
+
+mod guarded;
+mod plain_json;
+mod tensors;

@@ -1,0 +1,6 @@
+//! Bodies out: named members, as JSON, safetensors or npy, at once or while they are sent.
+
+pub mod answer;
+pub mod array;
+pub mod chunk;
+pub mod encode;

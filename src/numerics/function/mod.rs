@@ -1,0 +1,4 @@
+//! What a solved system says as a function on space: its values, and how sure they are.
+
+pub mod interpolant;
+pub mod posterior;

@@ -1,0 +1,10 @@
+//! What the machine offers: registers, memory, and the small vectors and matrices that fit into them.
+
+pub mod heap;
+pub mod instruction_set;
+pub mod pages;
+
+pub(crate) mod eigen;
+pub(crate) mod exp;
+pub(crate) mod registers;
+pub(crate) mod vector;

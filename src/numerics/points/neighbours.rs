@@ -1,0 +1,273 @@
+//! Nearest neighbours in a cloud, by a k-d tree.
+
+use rayon::prelude::*;
+
+use super::cloud::{Cloud, squared_distance};
+use crate::numerics::machine::heap::vec_bytes;
+
+/// Points per leaf: scanning 12 points costs about what two more levels of descent do.
+const LEAF_SIZE: usize = 12;
+
+/// A k-d tree over the points of a cloud (Bentley 1975), any dimension.
+///
+/// Built in O(n log n) by median splits of the widest coordinate; it stores indices only and is asked together with the
+/// cloud it was built from. Ties of distance are broken by the smaller index, so answers do not depend on the tree.
+#[derive(Debug, Clone)]
+pub struct Neighbours {
+    order: Vec<u32>,
+    nodes: Vec<Node>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Node {
+    Leaf {
+        start: u32,
+        end: u32,
+    },
+    /// The left child follows its parent, `right` is the index of the other.
+    Split {
+        axis: u32,
+        at: f64,
+        right: u32,
+    },
+}
+
+/// A neighbour and its squared distance (unit L²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    pub point: usize,
+    pub squared_distance: f64,
+}
+
+impl Neighbours {
+    /// Builds the tree. Clouds beyond 2³² points are out of reach of every solver and of the service's limits.
+    pub fn of(cloud: &Cloud) -> Self {
+        let mut tree = Self { order: (0..cloud.n_points() as u32).collect(), nodes: Vec::new() };
+        let mut order = std::mem::take(&mut tree.order);
+        tree.build(cloud, &mut order, 0);
+        tree.order = order;
+        tree
+    }
+
+    fn build(&mut self, cloud: &Cloud, order: &mut [u32], start: usize) {
+        let (axis, extent) = widest_axis(cloud, order);
+        if order.len() <= LEAF_SIZE || extent == 0.0 {
+            self.nodes.push(Node::Leaf { start: start as u32, end: (start + order.len()) as u32 });
+            return;
+        }
+        let coordinate = |point: u32| cloud.point(point as usize)[axis];
+        let middle = order.len() / 2;
+        let (_, &mut median, _) =
+            order.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)));
+        let at = coordinate(median);
+        let this = self.nodes.len();
+        self.nodes.push(Node::Split { axis: axis as u32, at, right: 0 });
+        let (left, right) = order.split_at_mut(middle);
+        self.build(cloud, left, start);
+        let right_child = self.nodes.len() as u32;
+        self.nodes[this] = Node::Split { axis: axis as u32, at, right: right_child };
+        self.build(cloud, right, start + middle);
+    }
+
+    /// The `count` nearest points to `x`, nearest first; fewer if the cloud has fewer.
+    pub fn nearest(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
+        self.search(cloud, x, count, 0.0)
+    }
+
+    /// The `count` nearest points that do not coincide with `x`, nearest first.
+    pub fn nearest_elsewhere(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
+        self.search(cloud, x, count, f64::from_bits(1))
+    }
+
+    /// The `count` nearest positions, each by its first point, nearest first: repeated observations count once.
+    pub fn nearest_positions(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
+        self.positions(cloud, x, count, 0.0)
+    }
+
+    fn positions(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64) -> Vec<Neighbour> {
+        let mut n_asked = count;
+        loop {
+            let found = self.search(cloud, x, n_asked, at_least);
+            let n_found = found.len();
+            let mut distinct: Vec<Neighbour> = Vec::with_capacity(count);
+            for next in found {
+                // Coinciding points are equally far.
+                let peers = distinct.iter().rev().take_while(|d| d.squared_distance == next.squared_distance);
+                let is_known = peers.into_iter().any(|d| cloud.point(d.point) == cloud.point(next.point));
+                if !is_known && distinct.len() < count {
+                    distinct.push(next);
+                }
+            }
+            if distinct.len() == count || n_found < n_asked {
+                return distinct;
+            }
+            n_asked *= 2;
+        }
+    }
+
+    /// The least and the mean distance from a point to its `count` nearest positions elsewhere, unit L; `None` if there are
+    /// none.
+    pub fn nearest_and_mean(&self, cloud: &Cloud, point: usize, count: usize) -> Option<(f64, f64)> {
+        let found = self.positions(cloud, cloud.point(point), count, f64::from_bits(1));
+        let distances = found.iter().map(|n| n.squared_distance.sqrt());
+        Some((distances.clone().next()?, distances.sum::<f64>() / found.len() as f64))
+    }
+
+    /// Distance from every point to the nearest point elsewhere, unit L; empty if all points coincide.
+    pub fn spacings(&self, cloud: &Cloud) -> Vec<f64> {
+        let nearest = |point: usize| self.nearest_elsewhere(cloud, cloud.point(point), 1).first().copied();
+        (0..cloud.n_points())
+            .into_par_iter()
+            .filter_map(|p| Some(nearest(p)?.squared_distance.sqrt()))
+            .collect()
+    }
+
+    fn search(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64) -> Vec<Neighbour> {
+        let mut found = Vec::with_capacity(count + 1);
+        if count > 0 {
+            self.visit(cloud, x, 0, &mut Search { count, at_least, found: &mut found });
+        }
+        found
+    }
+
+    fn visit(&self, cloud: &Cloud, x: &[f64], node: usize, search: &mut Search<'_>) {
+        match self.nodes[node] {
+            Node::Leaf { start, end } => {
+                for &point in &self.order[start as usize..end as usize] {
+                    let point = point as usize;
+                    search.offer(Neighbour {
+                        point,
+                        squared_distance: squared_distance(x, cloud.point(point)),
+                    });
+                }
+            }
+            Node::Split { axis, at, right } => {
+                let offset = x[axis as usize] - at;
+                let (near, far) =
+                    if offset < 0.0 { (node + 1, right as usize) } else { (right as usize, node + 1) };
+                self.visit(cloud, x, near, search);
+                if offset * offset <= search.reach() {
+                    self.visit(cloud, x, far, search);
+                }
+            }
+        }
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        vec_bytes(&self.order) + vec_bytes(&self.nodes)
+    }
+}
+
+struct Search<'a> {
+    count: usize,
+    at_least: f64,
+    found: &'a mut Vec<Neighbour>,
+}
+
+impl Search<'_> {
+    /// Squared distance beyond which nothing can be among the nearest any more.
+    fn reach(&self) -> f64 {
+        if self.found.len() < self.count {
+            f64::INFINITY
+        } else {
+            self.found[self.count - 1].squared_distance
+        }
+    }
+
+    fn offer(&mut self, candidate: Neighbour) {
+        let key = |n: &Neighbour| (n.squared_distance, n.point);
+        if candidate.squared_distance < self.at_least || candidate.squared_distance > self.reach() {
+            return;
+        }
+        let place = self.found.partition_point(|n| key(n) < key(&candidate));
+        if place < self.count {
+            self.found.insert(place, candidate);
+            self.found.truncate(self.count);
+        }
+    }
+}
+
+fn widest_axis(cloud: &Cloud, order: &[u32]) -> (usize, f64) {
+    let mut widest = (0, 0.0);
+    for axis in 0..cloud.dimension() {
+        let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &point in order {
+            let x = cloud.point(point as usize)[axis];
+            min = min.min(x);
+            max = max.max(x);
+        }
+        if max - min > widest.1 {
+            widest = (axis, max - min);
+        }
+    }
+    widest
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn brute_force(cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
+        let mut all: Vec<Neighbour> = cloud
+            .points()
+            .enumerate()
+            .map(|(point, y)| Neighbour { point, squared_distance: squared_distance(x, y) })
+            .collect();
+        all.sort_by(|a, b| {
+            (a.squared_distance, a.point).partial_cmp(&(b.squared_distance, b.point)).unwrap()
+        });
+        all.truncate(count);
+        all
+    }
+
+    proptest! {
+        #[test]
+        fn nearest_agrees_with_a_scan(
+            d in 1usize..5,
+            cells in prop::collection::vec(0i8..6, 12..400),
+            query in prop::collection::vec(-1.0f64..7.0, 5),
+            count in 1usize..9,
+        ) {
+            // Small integer coordinates make ties and duplicates common.
+            let n = cells.len() / d;
+            let cloud = Cloud::new(cells[..n * d].iter().map(|&c| f64::from(c)).collect(), d).unwrap();
+            let tree = Neighbours::of(&cloud);
+            prop_assert_eq!(tree.nearest(&cloud, &query[..d], count), brute_force(&cloud, &query[..d], count));
+            let grid: Vec<f64> = query[..d].iter().map(|x| x.round()).collect();
+            prop_assert_eq!(tree.nearest(&cloud, &grid, count), brute_force(&cloud, &grid, count));
+        }
+    }
+
+    #[test]
+    fn coinciding_points_are_not_neighbours_elsewhere() {
+        let cloud = Cloud::new(vec![0.0, 0.0, 3.0], 1).unwrap();
+        let tree = Neighbours::of(&cloud);
+        assert_eq!(
+            tree.nearest_elsewhere(&cloud, &[0.0], 4),
+            [Neighbour { point: 2, squared_distance: 9.0 }]
+        );
+        assert_eq!(tree.spacings(&cloud), [3.0, 3.0, 3.0]);
+        assert_eq!(tree.nearest_and_mean(&cloud, 2, 4), Some((3.0, 3.0)));
+    }
+
+    #[test]
+    fn repeated_observations_count_once() {
+        let cloud = Cloud::new(vec![0.0, 1.0, 1.0, -1.0, 1.0, 0.0, 5.0], 1).unwrap();
+        let tree = Neighbours::of(&cloud);
+        let points = |count| -> Vec<usize> {
+            tree.nearest_positions(&cloud, &[0.0], count).iter().map(|found| found.point).collect()
+        };
+        assert_eq!(points(3), [0, 1, 3]);
+        assert_eq!(points(9), [0, 1, 3, 6]);
+        assert_eq!(tree.nearest_and_mean(&cloud, 0, 2), Some((1.0, 1.0)));
+    }
+
+    #[test]
+    fn a_single_point_has_no_spacing() {
+        let cloud = Cloud::new(vec![1.0, 2.0], 2).unwrap();
+        assert_eq!(Neighbours::of(&cloud).nearest_and_mean(&cloud, 0, 4), None);
+    }
+}

@@ -1,0 +1,186 @@
+//! Value, gradient and Hessian of a kernel expansion at many queries, in one fused pass over the points per query.
+
+mod pass;
+mod tiles;
+
+use rayon::prelude::*;
+
+use super::nodes::{Nodes, blocked};
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::Kernel;
+use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::duplicates::Positions;
+use pass::{Expansion, Pass};
+
+/// Queries per task; a task of one query at n = 2,000 is about 5 µs of work.
+const QUERIES_PER_TASK: usize = 8;
+
+/// `u(x) = Σ_j λ_j k(x, x_j)` with its derivatives up to an order, at m queries.
+#[derive(Clone)]
+pub struct Jets {
+    packed: Vec<f64>,
+    layout: Layout,
+}
+
+/// Which derivatives a pass computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JetOrder {
+    Value,
+    Gradient,
+    Hessian,
+    /// The Hessian, and the sums of absolute values that bound the rounding errors of value and gradient.
+    HessianWithMagnitudes,
+}
+
+/// One query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two magnitudes.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    order: JetOrder,
+    dimension: usize,
+}
+
+impl Layout {
+    fn gradient(self) -> usize {
+        1
+    }
+
+    fn hessian(self) -> usize {
+        1 + self.dimension
+    }
+
+    fn magnitudes(self) -> usize {
+        self.hessian() + self.dimension * (self.dimension + 1) / 2
+    }
+
+    fn width(self) -> usize {
+        match self.order {
+            JetOrder::Value => 1,
+            JetOrder::Gradient => self.hessian(),
+            JetOrder::Hessian => self.magnitudes(),
+            JetOrder::HessianWithMagnitudes => self.magnitudes() + 2,
+        }
+    }
+}
+
+impl Jets {
+    /// Evaluates the expansion with `weights` (one per point of `cloud`) at the queries.
+    ///
+    /// Each query is summed in the order of the points, whatever the number of threads. The caller has checked that the
+    /// kernel has the derivatives asked for ([`check_smooth_at`]).
+    ///
+    /// # Errors
+    /// [`NumericsError::Overflow`] where a result leaves float64, [`NumericsError::Cancelled`].
+    pub fn evaluate(
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        Self::over(&Nodes::of(cloud), kernel, weights, queries, order, observer)
+    }
+
+    /// The same over points that are laid out already.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn over(
+        nodes: &Nodes,
+        kernel: &Kernel,
+        weights: &[f64],
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        debug_assert_eq!(nodes.dimension(), queries.dimension());
+        let layout = Layout { order, dimension: nodes.dimension() };
+        let (weights, width) = (blocked(weights), layout.width());
+        let expansion = Expansion { nodes, kernel, weights: &weights };
+        let mut packed = vec![0.0; queries.n_points() * width];
+        packed.par_chunks_mut(width * QUERIES_PER_TASK).enumerate().try_for_each(|(task, jets)| {
+            observer.checkpoint()?;
+            let first = task * QUERIES_PER_TASK;
+            nodes.dispatch(Pass { expansion, queries, first, jets, layout });
+            match jets.iter().position(|x| !x.is_finite()) {
+                Some(at) => Err(NumericsError::Overflow { query: first + at / width }),
+                None => Ok(()),
+            }
+        })?;
+        Ok(Self { packed, layout })
+    }
+
+    pub fn n_queries(&self) -> usize {
+        self.packed.len() / self.layout.width()
+    }
+
+    pub fn dimension(&self) -> usize {
+        self.layout.dimension
+    }
+
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.packed)
+    }
+
+    fn jet(&self, query: usize) -> &[f64] {
+        let width = self.layout.width();
+        &self.packed[query * width..][..width]
+    }
+
+    /// u at a query, unit of the values.
+    pub fn value(&self, query: usize) -> f64 {
+        self.jet(query)[0]
+    }
+
+    /// u at every query, `[m]`.
+    pub fn values(&self) -> Vec<f64> {
+        (0..self.n_queries()).map(|query| self.value(query)).collect()
+    }
+
+    /// ∇u at a query, `[d]`.
+    pub fn gradient(&self, query: usize) -> &[f64] {
+        &self.jet(query)[self.layout.gradient()..][..self.layout.dimension]
+    }
+
+    /// D²u at a query, symmetric `[d, d]`.
+    pub fn hessian(&self, query: usize) -> Vec<f64> {
+        let d = self.layout.dimension;
+        let mut packed = self.jet(query)[self.layout.hessian()..].iter();
+        let mut full = vec![0.0; d * d];
+        for a in 0..d {
+            for (b, &entry) in (a..d).zip(&mut packed) {
+                full[a * d + b] = entry;
+                full[b * d + a] = entry;
+            }
+        }
+        full
+    }
+
+    /// `Σ|λ_j||k_j|` and `Σ|λ_j||∇k_j|` at a query; order [`JetOrder::HessianWithMagnitudes`] only.
+    pub(crate) fn magnitudes(&self, query: usize) -> (f64, f64) {
+        let jet = self.jet(query);
+        let at = self.layout.magnitudes();
+        (jet[at], jet[at + 1])
+    }
+}
+
+/// Refuses queries at which a kernel with a kink has no gradient.
+///
+/// # Errors
+/// [`NumericsError::KernelNotSmooth`] with the first query that is a point of the cloud.
+pub fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<(), NumericsError> {
+    if !kernel.has_kink() {
+        return Ok(());
+    }
+    let positions = Positions::of(cloud);
+    match queries.points().enumerate().find_map(|(query, x)| Some((query, positions.find(x)?))) {
+        Some((query, point)) => Err(NumericsError::KernelNotSmooth { query, point }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

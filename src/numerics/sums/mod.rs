@@ -1,0 +1,6 @@
+//! Loops over pairs of points: Gram matrices, and sums of kernels with their derivatives.
+
+pub mod gram;
+pub mod jets;
+pub mod nodes;
+pub mod regularization;

@@ -1,0 +1,86 @@
+//! Where geometry has no meaning, or less accuracy than it seems: the criteria of docs/numerics.md, Geometry.
+
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::kernel::{Family, Kernel};
+use crate::numerics::machine::vector::norm;
+use crate::numerics::sums::jets::Jets;
+
+/// What is wrong at a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DegeneracyReason {
+    /// |∇u| is rounding (T1), too small against the Hessian at the scale of the sampling (T2), or oblique to the surface,
+    /// and the offset model is of no help: there is no answer.
+    VanishingGradient,
+    /// The offset model might help, but not within the work that was admitted: there is no answer.
+    UnaffordableRescue,
+    /// The cusp of the kernel is seen: curvatures are served, and wrong by factors.
+    KernelTooRough,
+    /// The query is far from every point of the cloud: the level surface through it is not the one that was sampled.
+    FarFromCloud,
+    /// The curvatures differ from those that the neighbours suggest (T4): the sampling does not resolve the surface.
+    UnderResolved,
+}
+
+impl DegeneracyReason {
+    /// Whether there is no answer at all.
+    pub fn is_null(self) -> bool {
+        match self {
+            Self::VanishingGradient | Self::UnaffordableRescue => true,
+            Self::KernelTooRough | Self::FarFromCloud | Self::UnderResolved => false,
+        }
+    }
+}
+
+/// A query at which geometry has no or less meaning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Degeneracy {
+    pub query: usize,
+    pub reason: DegeneracyReason,
+    /// |∇| of the function that was used, 1/L for the signature function.
+    pub gradient_norm: f64,
+}
+
+/// T1: multiple of the rounding bound under which a gradient is rounding.
+const ROUNDING_FACTOR: f64 = 64.0;
+
+/// T2: fraction of `h_q ‖D²u‖_F` under which the direction of ∇u turns within the sampling distance.
+const SCALE_FACTOR: f64 = 0.05;
+
+/// The same fraction below which a gradient is weak: the error that the sampling leaves in it shows in the curvatures.
+const WEAK_FACTOR: f64 = 0.25;
+
+/// Spacings from the nearest point beyond which a query is far from the cloud.
+const FAR_SPACINGS: f64 = 3.0;
+
+/// T1: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
+pub(crate) fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) -> bool {
+    let length_scale = signature.factor.kernel().length_scale();
+    let (value, slope) = jets.magnitudes(query);
+    let rounding = f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
+    length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding
+}
+
+/// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`.
+pub(crate) fn turns_within_spacing(jets: &Jets, query: usize, spacing: f64) -> bool {
+    norm(jets.gradient(query)) < SCALE_FACTOR * spacing * norm(&jets.hessian(query))
+}
+
+/// Whether curvatures had better come from the offset model, if it has an answer: `|∇u| < 0.25 h_q ‖D²u‖_F`.
+pub(crate) fn is_weak(jets: &Jets, query: usize, spacing: f64) -> bool {
+    norm(jets.gradient(query)) < WEAK_FACTOR * spacing * norm(&jets.hessian(query))
+}
+
+/// Whether the nearest point is too far away for a query to lie on the surface.
+pub(crate) fn is_far(squared_distance: f64, spacing: f64) -> bool {
+    squared_distance > (FAR_SPACINGS * spacing).powi(2)
+}
+
+/// Whether second derivatives at the points see a cusp: the rounding √ε ℓ of a Laplace kernel is below the median distance
+/// `spacing` to the nearest point.
+pub(crate) fn is_too_rough(kernel: &Kernel, spacing: f64) -> bool {
+    match kernel.family() {
+        Family::Laplace { epsilon } => epsilon.sqrt() * kernel.length_scale() < spacing,
+        Family::Matern { order } => order == 0,
+        Family::Gauss | Family::Wendland { .. } | Family::InverseMultiquadric => false,
+    }
+}

@@ -1,0 +1,300 @@
+//! Normals, shape operator and curvatures of a surface at queries.
+
+use rayon::prelude::*;
+
+use super::Surface;
+use super::curvature::principal_curvatures;
+use super::degeneracy::{Degeneracy, DegeneracyReason};
+use super::serving::Examination;
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+
+/// Which way normals point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Orientation {
+    /// Out of closed surfaces: ν = −∇u/|∇u| (errata.md, 2), with signs repaired where neighbours contradict it.
+    Outward,
+    /// ν = +∇u/|∇u|, whatever its sign.
+    Gradient,
+}
+
+/// Which function's level surface is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SurfaceModel {
+    /// The signature function, and the offset model where its gradient vanishes.
+    Auto,
+    Signature,
+    Offset,
+}
+
+/// What is asked of a geometry.
+#[derive(Debug, Clone, Copy)]
+pub struct GeometryRequest {
+    pub orientation: Orientation,
+    pub model: SurfaceModel,
+    /// Whether second derivatives are served: they are checked against the neighbours and the cusp of the kernel.
+    pub checks_curvatures: bool,
+    /// Queries at which the offset model may be asked where the signature function has no answer; beyond them the answer is
+    /// null. With more queries than that it confirms no curvatures either.
+    pub max_offsets: usize,
+}
+
+impl GeometryRequest {
+    /// Everything on: outward curvatures, checked, with all the work that they take.
+    pub const CURVATURES: Self = Self {
+        orientation: Orientation::Outward,
+        model: SurfaceModel::Auto,
+        checks_curvatures: true,
+        max_offsets: usize::MAX,
+    };
+}
+
+/// What is known of the surface at one query.
+pub(crate) struct Answer {
+    /// ∇u of the function that serves the query, `[d]`.
+    pub gradient: Vec<f64>,
+    /// Its Hessian, `[d, d]`.
+    pub hessian: Vec<f64>,
+    /// ν against ∇u: +1 or −1.
+    pub sign: f64,
+    pub is_offset: bool,
+    pub reason: Option<DegeneracyReason>,
+}
+
+impl Answer {
+    fn is_null(&self) -> bool {
+        self.reason.is_some_and(DegeneracyReason::is_null)
+    }
+}
+
+/// First and second order geometry of the surface at m queries, d ≥ 2.
+///
+/// Where a query has no answer its normal is zero and meaningless: ask [`Geometry::is_null`] first.
+pub struct Geometry {
+    answers: Vec<Answer>,
+    levels: Vec<f64>,
+    gradient_norms: Vec<f64>,
+    /// `[m, d]`, norm 1.
+    normals: Vec<f64>,
+    is_null: Vec<bool>,
+    degenerate: Vec<Degeneracy>,
+}
+
+/// Curvatures at m queries, in the order of the queries; entries of null queries are zero and meaningless.
+pub struct Curvatures {
+    /// `[m, d−1]`, ascending by value, 1/L.
+    pub principal: Vec<f64>,
+    /// `[m, d−1, d]`, orthonormal and tangent, the component of largest magnitude positive.
+    pub directions: Vec<f64>,
+    /// `[m]`, their average, 1/L.
+    pub mean: Vec<f64>,
+    /// `[m]`, their product, 1/L^{d−1}.
+    pub gaussian: Vec<f64>,
+}
+
+impl Geometry {
+    /// The geometry of a surface at queries: that of the level surface of its function through each query.
+    ///
+    /// # Errors
+    /// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
+    pub fn of(
+        surface: &Surface,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let d = queries.dimension();
+        let examination = Examination::of(surface, queries, request, observer)?;
+        let answers = examination.answers(observer)?;
+        let gradient_norms: Vec<f64> = answers.iter().map(|answer| norm(&answer.gradient)).collect();
+        let mut normals = vec![0.0; answers.len() * d];
+        let mut degenerate = Vec::new();
+        for (query, (answer, normal)) in answers.iter().zip(normals.chunks_exact_mut(d)).enumerate() {
+            let gradient_norm = gradient_norms[query];
+            if let Some(reason) = answer.reason {
+                degenerate.push(Degeneracy { query, reason, gradient_norm });
+            }
+            if !answer.is_null() {
+                // Adding 0 turns −0 into 0.
+                let unit = answer.gradient.iter().map(|g| answer.sign * g / gradient_norm + 0.0);
+                normal.iter_mut().zip(unit).for_each(|(slot, c)| *slot = c);
+            }
+        }
+        let is_null = answers.iter().map(Answer::is_null).collect();
+        let levels = examination.into_levels();
+        Ok(Self { answers, levels, gradient_norms, normals, is_null, degenerate })
+    }
+
+    pub fn n_queries(&self) -> usize {
+        self.answers.len()
+    }
+
+    pub fn dimension(&self) -> usize {
+        self.normals.len() / self.answers.len()
+    }
+
+    /// Whether each query has no answer, `[m]`.
+    pub fn is_null(&self) -> &[bool] {
+        &self.is_null
+    }
+
+    /// The queries without answer or with a flag, ascending.
+    pub fn degenerate(&self) -> &[Degeneracy] {
+        &self.degenerate
+    }
+
+    /// Whether a query is served by the offset model.
+    pub fn is_offset(&self, query: usize) -> bool {
+        self.answers[query].is_offset
+    }
+
+    /// u at the queries, `[m]`: 1 on the surface at α = 0.
+    pub fn levels(&self) -> &[f64] {
+        &self.levels
+    }
+
+    /// |∇u| of the function that serves each query, `[m]`: 1/L for the signature function, about 1 for the offset model.
+    pub fn gradient_norms(&self) -> &[f64] {
+        &self.gradient_norms
+    }
+
+    /// ν, `[m, d]`.
+    pub fn normals(&self) -> &[f64] {
+        &self.normals
+    }
+
+    /// ν at one query.
+    pub fn normal(&self, query: usize) -> &[f64] {
+        let d = self.dimension();
+        &self.normals[query * d..][..d]
+    }
+
+    /// `tr(Dν) = σ(tr D²u − νᵀD²uν)/|∇u|` at a query: the sum of the principal curvatures, 1/L.
+    pub fn trace_of_shape_operator(&self, query: usize) -> f64 {
+        let answer = &self.answers[query];
+        answer.sign * tangential_trace(&answer.hessian, self.normal(query)) / self.gradient_norms[query]
+    }
+
+    /// Eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space (errata.md, 3).
+    ///
+    /// Sphere of radius r, outward: all +1/r.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn curvatures(&self, observer: &dyn Observer) -> Result<Curvatures, NumericsError> {
+        let (d, m) = (self.dimension(), self.n_queries());
+        let k = d - 1;
+        let mut curvatures = Curvatures {
+            principal: vec![0.0; m * k],
+            directions: vec![0.0; m * k * d],
+            mean: vec![0.0; m],
+            gaussian: vec![0.0; m],
+        };
+        curvatures
+            .principal
+            .par_chunks_mut(k)
+            .zip(curvatures.directions.par_chunks_mut(k * d))
+            .zip(curvatures.mean.par_iter_mut().zip(&mut curvatures.gaussian))
+            .enumerate()
+            .filter(|(query, _)| !self.is_null[*query])
+            .try_for_each(|(query, ((principal, directions), (mean, gaussian)))| {
+                observer.checkpoint()?;
+                let answer = &self.answers[query];
+                let (values, vectors) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
+                principal.copy_from_slice(&values);
+                directions.chunks_exact_mut(d).zip(&vectors).for_each(|(slot, v)| slot.copy_from_slice(v));
+                *mean = values.iter().sum::<f64>() / k as f64;
+                *gaussian = values.iter().product();
+                Ok(())
+            })?;
+        Ok(curvatures)
+    }
+}
+
+/// `tr H − νᵀHν`: the trace over the tangent space.
+pub(crate) fn tangential_trace(hessian: &[f64], normal: &[f64]) -> f64 {
+    let d = normal.len();
+    let trace: f64 = (0..d).map(|i| hessian[i * d + i]).sum();
+    let normal_part: f64 = (0..d).map(|i| normal[i] * dot(&hessian[i * d..][..d], normal)).sum();
+    trace - normal_part
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::numerics::function::interpolant::Interpolant;
+    use crate::numerics::kernel::{Family, Kernel};
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::solver::GramFactor;
+    use crate::numerics::sums::regularization::Regularization;
+    use crate::numerics::testing::{circle, fibonacci_sphere};
+
+    fn geometry(cloud: &Cloud, length_scale: f64, queries: &Cloud, orientation: Orientation) -> Geometry {
+        let kernel = Kernel::new(Family::Laplace { epsilon: 1.0 }, length_scale, 1.0).unwrap();
+        let cloud = Arc::new(cloud.clone());
+        let alpha = Regularization::Uniform(0.0);
+        let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
+        let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
+        let surface = Surface::of(signature, None, &Unobserved).unwrap();
+        let request = GeometryRequest { orientation, ..GeometryRequest::CURVATURES };
+        Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
+    }
+
+    #[test]
+    fn normals_of_a_sphere_are_radial_and_its_curvatures_one() {
+        // The interpolation error of Laplace ε = 1 on 256 points is about 1e-5 in the curvatures (errata.md).
+        let cloud = fibonacci_sphere(256);
+        let geometry = geometry(&cloud, 1.0, &cloud, Orientation::Outward);
+        let curvatures = geometry.curvatures(&Unobserved).unwrap();
+        assert!(geometry.degenerate().is_empty());
+        for query in 0..256 {
+            assert!(dot(geometry.normal(query), cloud.point(query)) > 1.0 - 1e-6);
+            assert!((geometry.trace_of_shape_operator(query) - 2.0 * curvatures.mean[query]).abs() < 1e-12);
+            assert!((curvatures.mean[query] - 1.0).abs() < 1e-3, "{}", curvatures.mean[query]);
+            assert!((curvatures.gaussian[query] - 1.0).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn directions_are_tangent_orthonormal_and_normalised_in_sign() {
+        let cloud = fibonacci_sphere(200);
+        let stretched: Vec<f64> = cloud.points().flat_map(|x| [2.0 * x[0], x[1], 0.7 * x[2]]).collect();
+        let cloud = Cloud::new(stretched, 3).unwrap();
+        let geometry = geometry(&cloud, 1.0, &cloud, Orientation::Outward);
+        let curvatures = geometry.curvatures(&Unobserved).unwrap();
+        for query in 0..200 {
+            let directions: Vec<&[f64]> = curvatures.directions[query * 6..][..6].chunks(3).collect();
+            assert!(dot(directions[0], directions[1]).abs() < 1e-14);
+            for direction in directions {
+                assert!((norm(direction) - 1.0).abs() < 1e-14);
+                assert!(dot(direction, geometry.normal(query)).abs() < 1e-14);
+                assert!(direction.iter().fold(0.0f64, |a, &b| if b.abs() > a.abs() { b } else { a }) > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn the_gradient_orientation_is_the_opposite_of_outward() {
+        let cloud = circle(40);
+        let outward = geometry(&cloud, 1.0, &cloud, Orientation::Outward).curvatures(&Unobserved).unwrap();
+        let gradient = geometry(&cloud, 1.0, &cloud, Orientation::Gradient).curvatures(&Unobserved).unwrap();
+        for query in 0..40 {
+            assert!((outward.principal[query] - 1.0).abs() < 1e-6);
+            assert_eq!(outward.principal[query], -gradient.principal[query]);
+        }
+    }
+
+    #[test]
+    fn the_gradient_vanishes_at_the_centre_of_a_sphere() {
+        let cloud = fibonacci_sphere(100);
+        let queries = Cloud::new(vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3).unwrap();
+        let geometry = geometry(&cloud, 1.0, &queries, Orientation::Outward);
+        assert_eq!(geometry.is_null(), [true, false]);
+        assert_eq!(geometry.degenerate()[0].query, 0);
+        assert_eq!(geometry.degenerate()[0].gradient_norm, geometry.gradient_norms()[0]);
+    }
+}

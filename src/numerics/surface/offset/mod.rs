@@ -1,0 +1,47 @@
+//! The offset model at a query of a surface: which points it is fitted to, and whether its answer can be believed.
+
+mod layers;
+
+use super::Surface;
+use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::points::patch::{Patch, n_coefficients};
+use layers::{OffsetJet, n_patch_points, offset_jet};
+
+/// Spacings from the nearest point up to which the offset model is asked.
+const REACH_SPACINGS: f64 = 2.0;
+
+/// Cosine to the normal of the nearest point above which a point belongs to the same side of the same sheet.
+const SAME_SHEET: f64 = 0.4;
+
+/// Points per coefficient of a quadric that a patch needs at least.
+const MIN_PER_COEFFICIENT: usize = 2;
+
+/// A signed distance has |∇F| = 1; so far from it the patch was not fitted.
+const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
+
+/// Gradient and Hessian of the offset model at x, the gradient pointing outward.
+///
+/// `None` where the cloud does not support it: x far from all points, too few points on one sheet around it, or an
+/// interpolant that is no distance.
+pub(crate) fn rescue(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
+    let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
+    let mut points: Vec<usize> = Vec::with_capacity(n_patch_points(d));
+    let nearest = surface.neighbours().nearest_positions(cloud, x, n_patch_points(d));
+    let first = nearest.first()?;
+    if first.squared_distance > (REACH_SPACINGS * surface.spacing(first.point)).powi(2) {
+        return None;
+    }
+    let normal = surface.normal(first.point);
+    points.extend(
+        nearest.iter().map(|found| found.point).filter(|&p| dot(surface.normal(p), normal) > SAME_SHEET),
+    );
+    if points.len() < MIN_PER_COEFFICIENT * n_coefficients(d) {
+        return None;
+    }
+    let patch = Patch::of(cloud, x, points)?;
+    let normals: Vec<f64> = patch.points.iter().flat_map(|&point| surface.normal(point)).copied().collect();
+    let jet = offset_jet(&patch, &normals).ok()?;
+    let length = norm(&jet.gradient);
+    let is_distance = GRADIENT_NORMS.contains(&length) && dot(&jet.gradient, normal) > 0.5 * length;
+    is_distance.then_some(jet)
+}

@@ -1,0 +1,274 @@
+//! Surface gradient and Laplace–Beltrami operator, applied to values and as matrices.
+//!
+//! The surface comes as a [`Geometry`], the values as an [`Interpolant`]: both may live on different clouds and kernels (the
+//! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
+//! to each kernel translate, by a solve with m right-hand sides.
+
+use std::sync::Arc;
+
+use faer::MatMut;
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::geometry::{Geometry, tangential_trace};
+use crate::numerics::error::NumericsError;
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::kernel::{Kernel, Pairs};
+use crate::numerics::machine::registers::{BLOCK, Block, Pack};
+use crate::numerics::machine::vector::dot;
+use crate::numerics::observer::{Observer, Stage};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::GramFactor;
+use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
+use crate::numerics::sums::nodes::Nodes;
+
+/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn surface_gradient(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
+    let d = queries.dimension();
+    let mut gradients = vec![0.0; queries.n_points() * d];
+    for query in regular(geometry) {
+        let (gradient, normal) = (jets.gradient(query), geometry.normal(query));
+        let along = dot(gradient, normal);
+        for (c, slot) in gradients[query * d..][..d].iter_mut().enumerate() {
+            *slot = gradient[c] - along * normal[c];
+        }
+    }
+    Ok(gradients)
+}
+
+/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at null queries.
+///
+/// Minus before the last term: errata.md, 1. On the unit circle Δ cos θ = −cos θ. Independent of the orientation of ν.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn laplace_beltrami(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+    let mut values = vec![0.0; queries.n_points()];
+    for query in regular(geometry) {
+        let normal = geometry.normal(query);
+        let along = dot(jets.gradient(query), normal);
+        values[query] =
+            tangential_trace(&jets.hessian(query), normal) - geometry.trace_of_shape_operator(query) * along;
+    }
+    Ok(values)
+}
+
+/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of null queries are zero.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
+pub fn surface_gradient_matrices(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    operator_matrix(geometry, factor, queries, Operator::SurfaceGradient, observer)
+}
+
+/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
+pub fn laplace_beltrami_matrix(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    operator_matrix(geometry, factor, queries, Operator::LaplaceBeltrami, observer)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Operator {
+    SurfaceGradient,
+    LaplaceBeltrami,
+}
+
+impl Operator {
+    /// Rows per query.
+    fn n_components(self, dimension: usize) -> usize {
+        match self {
+            Self::SurfaceGradient => dimension,
+            Self::LaplaceBeltrami => 1,
+        }
+    }
+}
+
+/// Fills B, `[components, m, n]` row-major, and solves `Wᵀ` for its rows in place: that buffer is the answer.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
+fn operator_matrix(
+    geometry: &Geometry,
+    factor: &Arc<GramFactor>,
+    queries: &Cloud,
+    operator: Operator,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let (cloud, kernel) = (factor.cloud(), factor.kernel());
+    cloud.check_same_dimension(queries)?;
+    check_smooth_at(cloud, kernel, queries)?;
+    observer.enter(Stage::Evaluate);
+    let (n, m) = (cloud.n_points(), queries.n_points());
+    let n_rows = operator.n_components(cloud.dimension()) * m;
+    let nodes = Nodes::of(cloud);
+    let mut matrix = vec![0.0; n_rows * n];
+    matrix.par_chunks_mut(n).enumerate().try_for_each(|(index, row)| {
+        observer.checkpoint()?;
+        let (component, query) = (index / m, index % m);
+        if !geometry.is_null()[query] {
+            let x = queries.point(query);
+            nodes.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
+        }
+        Ok(())
+    })?;
+    observer.enter(Stage::Solve);
+    for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {
+        observer.checkpoint()?;
+        let count = rows.len() / n;
+        factor.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
+    }
+    // Without branches, so that it is vectorised.
+    let is_finite = |row: &[f64]| row.iter().fold(true, |all, x| all & x.is_finite());
+    match matrix.par_chunks(n).position_first(|row| !is_finite(row)) {
+        Some(index) => Err(NumericsError::Overflow { query: index % m }),
+        None => Ok(matrix),
+    }
+}
+
+/// Right-hand sides per solve: enough for the solve to run at the speed of matrix products, few enough to notice a
+/// cancellation within a fraction of a second.
+const ROWS_PER_SOLVE: usize = 1024;
+
+fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
+    (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query])
+}
+
+/// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:
+/// `P∇k = 2vφ′/ℓ² (D − aν)` and `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+struct Row<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    geometry: &'a Geometry,
+    operator: Operator,
+    component: usize,
+    query: usize,
+    x: &'a [f64],
+    row: &'a mut [f64],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut out = Block::ZERO;
+        for block in 0..self.row.len().div_ceil(BLOCK) {
+            let pairs = RowPairs { simd, row: &self, block, out: &mut out };
+            match self.operator {
+                Operator::SurfaceGradient => self.kernel.profiles(SurfaceGradientPairs(pairs)),
+                Operator::LaplaceBeltrami => self.kernel.profiles(LaplaceBeltramiPairs(pairs)),
+            }
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(self.row.len());
+            self.row[start..end].copy_from_slice(&out.0[..end - start]);
+        }
+    }
+}
+
+/// A block of a row.
+struct RowPairs<'a, S> {
+    simd: S,
+    row: &'a Row<'a>,
+    block: usize,
+    out: &'a mut Block,
+}
+
+impl<S: Simd> RowPairs<'_, S> {
+    /// q and a = ν·D of a pack; `each` sees the differences.
+    #[inline(always)]
+    fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
+        let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
+        let normal = geometry.normal(query);
+        let mut along = Pack::splat(self.simd, 0.0);
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+            along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
+            each(c, difference);
+        });
+        (q, along)
+    }
+}
+
+struct SurfaceGradientPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for SurfaceGradientPairs<'_, S> {
+    type Others = Pack<S>;
+
+    /// Hands on component c of D − aν.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
+        let Self(pairs) = self;
+        let Row { component, geometry, query, .. } = *pairs.row;
+        let mut own = Pack::splat(pairs.simd, 0.0);
+        let (q, along) = pairs.along(at, |c, difference| {
+            if c == component {
+                own = difference;
+            }
+        });
+        (q, own - along * geometry.normal(query)[component])
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, tangential: Pack<S>, [_, slope, _]: [Pack<S>; 3]) {
+        let kernel = self.0.row.kernel;
+        let factor = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        (factor * slope * tangential).store(self.0.out, at);
+    }
+}
+
+struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
+    type Others = (Pack<S>, Pack<S>);
+
+    /// Hands on q and a.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
+        let (q, along) = self.0.along(at, |_, _| ());
+        (q, (q, along))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (q, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
+        let Row { kernel, geometry, query, x, .. } = *self.0.row;
+        let inverse_square = kernel.inverse_square_length();
+        let first = 2.0 * kernel.variance() * inverse_square;
+        let tangent_dimension = (x.len() - 1) as f64;
+        // (|D|² − a²)/ℓ², with |D|²/ℓ² = q.
+        let tangential = q - along * along * inverse_square;
+        let turned = tangent_dimension - along * geometry.trace_of_shape_operator(query);
+        (2.0 * first * bend).mul_add(tangential, first * slope * turned).store(self.0.out, at);
+    }
+}
+
+#[cfg(test)]
+mod tests;
