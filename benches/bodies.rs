@@ -5,6 +5,8 @@
 
 #![allow(clippy::disallowed_methods)]
 
+mod support;
+
 use std::hint::black_box;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -25,6 +27,7 @@ use gramian::http::wire::write::answer::{Answer, Member, Parts};
 use gramian::http::wire::write::array::Array;
 use gramian::http::wire::write::encode::Encoded;
 use gramian::store::Owner;
+use support::random;
 
 const N_POINTS: usize = 1_000_000;
 const MATRIX_ROWS: usize = 4_000;
@@ -32,7 +35,7 @@ const ROUNDS: usize = 9;
 const REQUEST: &[u8] = b"GET / HTTP/1.1\r\nHost: bench\r\nConnection: close\r\n\r\n";
 
 fn main() {
-    let numbers = random(3 * N_POINTS);
+    let numbers = random(3 * N_POINTS, 1);
     let json = write(&Array::new(numbers.clone(), &[N_POINTS, 3]));
     let megabytes = json.len() as f64 / 1e6;
     println!(
@@ -67,7 +70,7 @@ struct Request {
 
 /// Over loopback: the matrix as npy by the service's encoder, against a copy of its memory and a plain write.
 fn send_matrix() {
-    let matrix = random(MATRIX_ROWS * MATRIX_ROWS);
+    let matrix = random(MATRIX_ROWS * MATRIX_ROWS, 1);
     let (reference, service) = (plain_server(matrix.clone()), service(matrix));
     let mut received = vec![0; 1 << 20];
     let [of_reference, of_service] =
@@ -181,14 +184,4 @@ fn best<T>(mut work: impl FnMut() -> T) -> f64 {
 fn cpu_seconds() -> f64 {
     let counters = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
     counters.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
-}
-
-/// Numbers from 0 to 1 with 53 random bits, 17 digits most of them.
-fn random(n: usize) -> Vec<f64> {
-    let mut state = 1u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..n).map(|_| next()).collect()
 }

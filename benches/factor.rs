@@ -16,7 +16,8 @@ use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::{Observer, Stage};
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::sums::regularization::Regularization;
-use support::{ROUNDS, measure, size_argument, sphere, timed};
+use support::common::clouds::fibonacci_sphere;
+use support::{ROUNDS, measure, size_argument, timed};
 
 /// Time spent in each stage.
 #[derive(Default)]
@@ -43,7 +44,7 @@ impl Stopwatch {
 fn main() {
     let n = size_argument(4000);
     let n_threads = rayon::current_num_threads();
-    let cloud = Arc::new(sphere(n, 0.0));
+    let cloud = Arc::new(fibonacci_sphere(n));
     let (a, mut c) = (Mat::from_fn(n, n, |i, j| ((i * 7 + j) % 13) as f64), Mat::zeros(n, n));
     let bests = measure(|| {
         let mut multiply =

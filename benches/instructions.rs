@@ -3,6 +3,8 @@
 //! `cargo bench --bench instructions -- PART` runs one part once; without a name all of them, and lists their names. Only
 //! what happens inside [`measured`] is counted. Everything runs on one thread, the calling one, so that callgrind sees it.
 
+mod support;
+
 use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,12 +13,10 @@ use gramian::http::wire::read::limits::ParseContext;
 use gramian::http::wire::read::parse::parse_json;
 use gramian::http::wire::read::points::Points;
 use gramian::http::wire::write::array::Array;
-use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::function::posterior;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::machine::instruction_set::InstructionSet;
 use gramian::numerics::observer::{Observer, Stage, Unobserved};
-use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::neighbours::Neighbours;
 use gramian::numerics::solver::{GramFactor, Solution};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
@@ -24,6 +24,9 @@ use gramian::numerics::sums::nodes::Nodes;
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::store::key::CloudId;
+use support::common::clouds::fibonacci_sphere;
+use support::common::fits;
+use support::scattered;
 
 const GAUSS: Family = Family::Gauss;
 const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
@@ -85,7 +88,7 @@ impl Observer for UpToGram {
 }
 
 fn gram(family: Family) {
-    let (cloud, kernel) = (Arc::new(scattered(1024, 1)), kernel(family));
+    let (cloud, kernel) = (Arc::new(scattered(1024, 3, 1)), kernel(family));
     let observer = UpToGram::default();
     let outcome =
         measured(|| GramFactor::factorize(cloud, kernel, Regularization::Uniform(1e-6), &observer).map(drop));
@@ -93,21 +96,21 @@ fn gram(family: Family) {
 }
 
 fn jets(family: Family, order: JetOrder) {
-    let (cloud, queries, kernel) = (scattered(1024, 1), scattered(256, 2), kernel(family));
+    let (cloud, queries, kernel) = (scattered(1024, 3, 1), scattered(256, 3, 2), kernel(family));
     let weights = vec![1.0; 1024];
     measured(|| Jets::evaluate(&cloud, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
 }
 
 /// On the instruction set of every machine of this architecture.
 fn portable_jets(order: JetOrder) {
-    let (cloud, queries, kernel) = (scattered(1024, 1), scattered(256, 2), kernel(GAUSS));
+    let (cloud, queries, kernel) = (scattered(1024, 3, 1), scattered(256, 3, 2), kernel(GAUSS));
     let portable = InstructionSet::available().into_iter().find(|set| set.name() == "portable");
     let (nodes, weights) = (Nodes::on(portable.unwrap(), &cloud), vec![1.0; 1024]);
     measured(|| Jets::over(&nodes, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
 }
 
 fn factorized(n: usize) -> GramFactor {
-    let cloud = Arc::new(scattered(n, 1));
+    let cloud = Arc::new(scattered(n, 3, 1));
     GramFactor::factorize(cloud, kernel(MATERN), Regularization::Uniform(1e-6), &Unobserved).unwrap()
 }
 
@@ -122,26 +125,24 @@ fn weights() {
 }
 
 fn variances() {
-    let (factor, queries) = (factorized(1024), scattered(64, 2));
+    let (factor, queries) = (factorized(1024), scattered(64, 3, 2));
     measured(|| posterior::variances(&factor, &queries, &Unobserved)).unwrap();
 }
 
 /// The k-d tree and a search for every point.
 fn neighbours() {
-    let cloud = scattered(2000, 1);
+    let cloud = scattered(2000, 3, 1);
     measured(|| Neighbours::of(&cloud).spacings(&cloud));
 }
 
 /// Tree, local fits, jets with magnitudes and orientation.
 fn surface() {
-    let cloud = Arc::new(sphere(600));
-    let factor = GramFactor::factorize(cloud, kernel(MATERN), Regularization::Uniform(1e-6), &Unobserved);
-    let signature = Interpolant::signature(Arc::new(factor.unwrap()), &Unobserved).unwrap();
+    let signature = fits::signature(&fits::factorize(&fibonacci_sphere(600), kernel(MATERN), 1e-6));
     measured(|| Surface::of(signature, None, &Unobserved)).unwrap();
 }
 
 fn json_points() {
-    let cloud = scattered(5000, 3);
+    let cloud = scattered(5000, 3, 3);
     let rows: Vec<&[f64]> = cloud.points().collect();
     let text = serde_json::to_vec(&serde_json::json!({ "points": rows })).unwrap();
     let request = measured(|| parse_json::<Request>(&text, &ParseContext::UNLIMITED)).unwrap();
@@ -154,37 +155,16 @@ struct Request {
 }
 
 fn json_array() {
-    let array = Array::new(scattered(5000, 3).coordinates().to_vec(), &[5000, 3]);
+    let array = Array::new(scattered(5000, 3, 3).coordinates().to_vec(), &[5000, 3]);
     let mut text = Vec::new();
     measured(|| array.write_json(0..15_000, &mut text));
 }
 
 fn cloud_id() {
-    let cloud = scattered(20_000, 3);
+    let cloud = scattered(20_000, 3, 3);
     measured(|| CloudId::of(&cloud, None));
 }
 
 fn kernel(family: Family) -> Kernel {
     Kernel::new(family, 0.5, 1.0).unwrap()
-}
-
-/// n points in the unit cube.
-fn scattered(n: usize, seed: u64) -> Cloud {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    Cloud::new((0..3 * n).map(|_| next()).collect(), 3).unwrap()
-}
-
-/// n points on the unit sphere.
-fn sphere(n: usize) -> Cloud {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
-        [r * t.cos(), r * t.sin(), z]
-    };
-    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
 }

@@ -5,6 +5,8 @@
 
 #![allow(clippy::disallowed_methods)]
 
+mod support;
+
 use std::time::Instant;
 
 use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
@@ -14,6 +16,7 @@ use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::sums::gram::fill_cross_gram;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::nodes::Nodes;
+use support::scattered;
 
 const N_POINTS: usize = 4096;
 const N_QUERIES: usize = 500;
@@ -107,14 +110,4 @@ fn rate(set: InstructionSet, family: Family, work: Work, d: usize) -> f64 {
         best = best.min(began.elapsed().as_secs_f64() / (n_queries * N_POINTS) as f64);
     }
     1e-9 / best
-}
-
-/// n points in the unit cube.
-fn scattered(n: usize, d: usize, seed: u64) -> Cloud {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    Cloud::new((0..d * n).map(|_| next()).collect(), d).unwrap()
 }

@@ -13,7 +13,6 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, Par};
-use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
@@ -21,17 +20,18 @@ use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian::numerics::surface::operators::laplace_beltrami_matrix;
-use support::{ROUNDS, Times, measure, size_argument, sphere, timed};
+use support::common::clouds::{fibonacci_sphere, turned_fibonacci_sphere};
+use support::common::fits;
+use support::{ROUNDS, Times, measure, size_argument, timed};
 
 const LENGTH_SCALE: f64 = 0.2;
 const ALPHA: f64 = 1e-6;
 
 fn main() {
     let n = size_argument(2000);
-    let (cloud, queries) = (Arc::new(sphere(n, 0.0)), sphere(n / 2, 1.0));
+    let (cloud, queries) = (Arc::new(fibonacci_sphere(n)), turned_fibonacci_sphere(n / 2, 1.0));
     let mut reference = Reference::of(&cloud);
     let bests = measure(|| {
         let (factor, factorize) = timed(|| Arc::new(factorize(&cloud)));
@@ -71,10 +71,8 @@ fn factorize(cloud: &Arc<Cloud>) -> GramFactor {
 
 /// Weights, surface, geometry at the points and the matrix there.
 fn laplace_beltrami(factor: &Arc<GramFactor>) -> Vec<f64> {
-    let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
-    let surface = Surface::of(signature, None, &Unobserved).unwrap();
     let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
-    let geometry = Geometry::of(&surface, factor.cloud(), &request, &Unobserved).unwrap();
+    let geometry = Geometry::of(&fits::surface(factor), factor.cloud(), &request, &Unobserved).unwrap();
     laplace_beltrami_matrix(&geometry, factor, factor.cloud(), &Unobserved).unwrap()
 }
 

@@ -5,22 +5,20 @@
 //! Left: the exact points, the median angle against ℓ, one curve per √ε ℓ. Right: the same against α, one curve per noise
 //! of the points. Rings mark what the service chooses by itself.
 
+#[path = "../tests/common/mod.rs"]
+mod common;
+
 use std::error::Error;
-use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::sync::Arc;
 
-use gramian::numerics::defaults::{Purpose, Scales, default_fit};
-use gramian::numerics::function::interpolant::Interpolant;
+use common::clouds::noisy;
+use common::fits;
+use common::random::Random;
+use gramian::numerics::defaults::Purpose;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::points::neighbours::Neighbours;
-use gramian::numerics::points::noise::estimate_noise;
-use gramian::numerics::solver::GramFactor;
-use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -35,7 +33,7 @@ const COLOURS: [&str; 4] = ["#1b6ca8", "#c2571a", "#3a8f4d", "#7b4ea3"];
 
 fn main() -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let points = read(&root.join("tests/data/bunny.xyz"))?;
+    let bunny = Cloud::new(read(&root.join("tests/data/bunny.xyz"))?, 3)?;
     let truth = read(&root.join("tests/data/bunny.normals"))?;
     let mut svg = String::new();
     writeln!(
@@ -44,15 +42,15 @@ fn main() -> Result<()> {
          <rect width=\"900\" height=\"380\" fill=\"white\"/>"
     )?;
 
-    let bunny = Scan::new(points.clone(), &truth)?;
-    let (kernel, alpha) = bunny.rule()?;
+    let exact = Scan { cloud: bunny.clone(), truth: &truth };
+    let (kernel, alpha) = exact.rule();
     let (length, smoothing) = (kernel.length_scale(), smoothing_length(&kernel)?);
     let left = Panel { x: 60.0, title: "exact points: ℓ over the rule's", log_x: (0.22, 3.7), max_y: 6.0 };
     left.frame(&mut svg, &LENGTHS)?;
     for (curve, factor) in SMOOTHINGS.iter().enumerate() {
         let mut line = Vec::new();
         for multiple in LENGTHS {
-            line.push((multiple, bunny.median_angle(multiple * length, factor * smoothing, alpha)?));
+            line.push((multiple, exact.median_angle(multiple * length, factor * smoothing, alpha)?));
         }
         report(&format!("√ε ℓ of {factor} rules"), &line);
         left.curve(&mut svg, curve, &line, &format!("√ε ℓ: {factor} ×"))?;
@@ -64,8 +62,8 @@ fn main() -> Result<()> {
     let right = Panel { x: 500.0, title: "α, for points with noise", log_x: (6e-5, 5.0), max_y: 18.0 };
     right.frame(&mut svg, &ALPHAS)?;
     for (curve, noise) in NOISES.iter().enumerate() {
-        let scan = Scan::new(noisy(&points, noise * bunny.cloud.radius()), &truth)?;
-        let (kernel, alpha) = scan.rule()?;
+        let scan = Scan { cloud: noisy(&bunny, noise * bunny.radius(), &mut Random(1)), truth: &truth };
+        let (kernel, alpha) = scan.rule();
         let (length, smoothing) = (kernel.length_scale(), smoothing_length(&kernel)?);
         let mut line = Vec::new();
         for alpha in ALPHAS {
@@ -82,30 +80,19 @@ fn main() -> Result<()> {
 
 /// A cloud with the normals to compare with.
 struct Scan<'a> {
-    cloud: Arc<Cloud>,
-    neighbours: Neighbours,
+    cloud: Cloud,
     truth: &'a [f64],
 }
 
-impl<'a> Scan<'a> {
-    fn new(points: Vec<f64>, truth: &'a [f64]) -> Result<Self> {
-        let cloud = Arc::new(Cloud::new(points, 3)?);
-        Ok(Self { neighbours: Neighbours::of(&cloud), cloud, truth })
-    }
-
-    fn rule(&self) -> Result<(Kernel, f64)> {
-        let scales = Scales::of(&self.cloud, &self.neighbours, &Unobserved)?;
-        let noise = estimate_noise(&self.cloud, &self.neighbours, &Unobserved)?;
-        Ok(default_fit(&scales, Purpose::Normals, || noise)?)
+impl Scan<'_> {
+    fn rule(&self) -> (Kernel, f64) {
+        fits::default_kernel_and_alpha(&self.cloud, Purpose::Normals)
     }
 
     /// Median angle between lines, in degrees: signs are another matter.
     fn median_angle(&self, length: f64, smoothing: f64, alpha: f64) -> Result<f64> {
-        let kernel = Kernel::new(Family::Laplace { epsilon: (smoothing / length).powi(2) }, length, 1.0)?;
-        let alpha = Regularization::uniform(alpha)?;
-        let factor = GramFactor::factorize(self.cloud.clone(), kernel, alpha, &Unobserved)?;
-        let signature = Interpolant::signature(Arc::new(factor), &Unobserved)?;
-        let surface = Surface::of(signature, None, &Unobserved)?;
+        let kernel = fits::kernel(Family::Laplace { epsilon: (smoothing / length).powi(2) }, length);
+        let surface = fits::surface(&fits::factorize(&self.cloud, kernel, alpha));
         let model = SurfaceModel::Signature;
         let request = GeometryRequest { model, checks_curvatures: false, ..GeometryRequest::CURVATURES };
         let geometry = Geometry::of(&surface, &self.cloud, &request, &Unobserved)?;
@@ -132,22 +119,6 @@ fn smoothing_length(kernel: &Kernel) -> Result<f64> {
 fn read(path: &Path) -> Result<Vec<f64>> {
     let text = std::fs::read_to_string(path)?;
     Ok(text.split_whitespace().map(str::parse).collect::<std::result::Result<_, _>>()?)
-}
-
-/// Adds Gaussian noise, the same on every machine (SplitMix64, Box and Muller).
-fn noisy(points: &[f64], deviation: f64) -> Vec<f64> {
-    let mut state = 1u64;
-    let mut uniform = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    points
-        .iter()
-        .map(|x| x + deviation * (-2.0 * (1.0 - uniform()).ln()).sqrt() * (TAU * uniform()).cos())
-        .collect()
 }
 
 fn report(name: &str, line: &[(f64, f64)]) {

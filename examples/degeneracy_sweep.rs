@@ -1,7 +1,7 @@
 //! Prints how many wrong curvatures are flagged, and how many right ones: the tables of docs/degeneracy.md.
 
-#[path = "../tests/common/random.rs"]
-mod random;
+#[path = "../tests/common/mod.rs"]
+mod common;
 #[path = "../tests/degeneracy/shapes.rs"]
 mod shapes;
 #[path = "../tests/degeneracy/sweep.rs"]

@@ -7,6 +7,10 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable))]
 
+// The clouds of all tests name this crate as they do.
+#[cfg(test)]
+extern crate self as gramian;
+
 pub mod numerics;
 pub mod store;
 

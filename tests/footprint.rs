@@ -2,16 +2,16 @@
 //!
 //! One test alone in its process: the resident set is everybody's.
 
+mod common;
+
 use std::sync::Arc;
 use std::time::Duration;
 
-use gramian::numerics::defaults::Scales;
 use gramian::numerics::error::NumericsError;
-use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::points::neighbours::Neighbours;
+use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::solver::{GramFactor, Solution};
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
@@ -20,6 +20,9 @@ use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::factors::{FactorBytes, FactorStore, StoredFactor};
 use gramian::store::key::{CloudId, FactorKey, ValuesKey};
+
+use crate::common::clouds::fibonacci_sphere;
+use crate::common::fits;
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -90,7 +93,7 @@ async fn growth<S>(
 }
 
 async fn keep_weights(store: &Factors, k: usize) {
-    let cloud = sphere(2);
+    let cloud = fibonacci_sphere(2);
     let key = key(&cloud, &kernel(0), &Regularization::Uniform(1.0));
     let solution = Solution {
         weights: vec![1.0; 64 + k * 7919 % 936],
@@ -111,13 +114,13 @@ async fn keep_cloud(store: &Clouds, n: usize, k: usize) {
     assert!(is_new);
     if k.is_multiple_of(20) {
         let cloud = stored.cloud.clone();
-        let look = || async move { Scales::of(&cloud, &Neighbours::of(&cloud), &Unobserved) };
-        store.scales(OWNER, &stored, look).await.unwrap();
+        let look = || async move { Sampling::of(&cloud, &Unobserved) };
+        store.sampling(OWNER, &stored, look).await.unwrap();
     }
 }
 
 async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
-    let (cloud, kernel, alpha) = (sphere(n), kernel(k), Regularization::Uniform(1e-6));
+    let (cloud, kernel, alpha) = (fibonacci_sphere(n), kernel(k), Regularization::Uniform(1e-6));
     let key = key(&cloud, &kernel, &alpha);
     let factorize = move |memory| async move {
         let factor = GramFactor::factorize(Arc::new(cloud), kernel, alpha, &Unobserved).unwrap();
@@ -128,10 +131,7 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
     let (stored, _) = store.get_or_factorize(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
         let factor = stored.factor.clone();
-        let make = |memory| async move {
-            let signature = Interpolant::signature(factor, &Unobserved).unwrap();
-            Ok((Surface::of(signature, None, &Unobserved).unwrap(), memory))
-        };
+        let make = |memory| async move { Ok((fits::surface(&factor), memory)) };
         let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3), || true).await.unwrap().unwrap();
         let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();
         Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
@@ -156,15 +156,4 @@ fn resident_bytes() -> f64 {
 fn huge_pages_are_off() -> bool {
     let setting = std::fs::read_to_string("/sys/kernel/mm/transparent_hugepage/enabled");
     setting.map_or(true, |setting| setting.contains("[never]"))
-}
-
-/// n points on the unit sphere.
-fn sphere(n: usize) -> Cloud {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
-        [r * t.cos(), r * t.sin(), z]
-    };
-    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
 }

@@ -1,5 +1,10 @@
 //! What the benchmarks share: rounds and clouds.
 
+#![allow(dead_code, reason = "each benchmark takes what it needs")]
+
+#[path = "../../tests/common/mod.rs"]
+pub mod common;
+
 use std::io::{BufRead, Write};
 use std::time::{Duration, Instant};
 
@@ -16,7 +21,6 @@ pub struct Bests(Vec<(&'static str, f64)>);
 
 impl Bests {
     /// The best time of a part that was measured.
-    #[allow(dead_code, reason = "not every benchmark derives figures")]
     pub fn seconds(&self, part: &str) -> f64 {
         self.0.iter().find(|entry| entry.0 == part).unwrap().1
     }
@@ -76,13 +80,19 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     (result, began.elapsed())
 }
 
-/// n points on the unit sphere: a Fibonacci spiral, turned by an angle.
-pub fn sphere(n: usize, angle: f64) -> Cloud {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64 + angle);
-        [r * t.cos(), r * t.sin(), z]
+/// n points in the unit cube of R^d.
+pub fn scattered(n: usize, d: usize, seed: u64) -> Cloud {
+    Cloud::new(random(n * d, seed), d).unwrap()
+}
+
+/// n numbers from 0 to 1 with 53 random bits, 17 digits most of them.
+///
+/// Not those of the tests: the counts of benches/instructions.tsv belong to these.
+pub fn random(n: usize, seed: u64) -> Vec<f64> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
+    (0..n).map(|_| next()).collect()
 }

@@ -7,15 +7,14 @@ use super::Owner;
 use super::fair_cache::FairCache;
 use super::key::CloudId;
 use super::single_flight::SingleFlight;
-use crate::numerics::defaults::Scales;
 use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::count_duplicates;
+use crate::numerics::points::sampling::{Sampling, Scales};
 
-/// A cloud with the lengths that are derived from it once, on demand; not with the tree that they come from, which would
-/// weigh as much again and is built in a small part of their time.
+/// A cloud with what its positions say, once that was asked for.
 ///
-/// The cells are only ever read and set: what they hold is computed elsewhere, by [`CloudStore::scales`] and
+/// The cells are only ever read and set: what they hold is computed elsewhere, by [`CloudStore::sampling`] and
 /// [`CloudStore::noise`].
 pub struct StoredCloud {
     pub id: CloudId,
@@ -27,7 +26,7 @@ pub struct StoredCloud {
     pub n_duplicates: usize,
     /// The least and the greatest value of each coordinate.
     pub bounding_box: (Vec<f64>, Vec<f64>),
-    scales: OnceLock<Scales>,
+    sampling: OnceLock<Arc<Sampling>>,
     noise: OnceLock<f64>,
 }
 
@@ -42,14 +41,19 @@ impl StoredCloud {
             cloud,
             normals,
             created_at: SystemTime::now(),
-            scales: OnceLock::new(),
+            sampling: OnceLock::new(),
             noise: OnceLock::new(),
         }
     }
 
-    /// The lengths that kernels are chosen by, once they were asked for.
+    /// How it is sampled, once that was asked for.
+    pub fn sampling(&self) -> Option<&Arc<Sampling>> {
+        self.sampling.get()
+    }
+
+    /// The lengths that kernels are chosen by, likewise.
     pub fn scales(&self) -> Option<&Scales> {
-        self.scales.get()
+        self.sampling().map(|sampling| sampling.scales())
     }
 
     /// Standard deviation of the points across the surface that they sample, unit L, once it was asked for.
@@ -62,20 +66,21 @@ impl StoredCloud {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Cloud>());
         let (min, max) = &self.bounding_box;
         let bounding_box = vec_bytes(min) + vec_bytes(max);
-        own + bounding_box + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
+        let sampling = self.sampling().map_or(0, |s| block_bytes(arc_payload::<Sampling>()) + s.n_bytes());
+        own + bounding_box + sampling + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
     }
 }
 
 /// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
 pub struct CloudStore<E> {
     clouds: FairCache<CloudId, Arc<StoredCloud>>,
-    scales: SingleFlight<(Owner, CloudId), Scales, E>,
+    samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub fn new(max_bytes: usize) -> Self {
-        Self { clouds: FairCache::new(max_bytes), scales: SingleFlight::new(), noise: SingleFlight::new() }
+        Self { clouds: FairCache::new(max_bytes), samplings: SingleFlight::new(), noise: SingleFlight::new() }
     }
 
     /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered, not kept.
@@ -92,23 +97,31 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         self.clouds.get(owner, &id)
     }
 
-    /// Sees to it that the cloud has its scales, which `compute` makes at most once however many ask.
+    /// How the cloud is sampled, which `compute` finds at most once however many ask.
     ///
     /// # Errors
     /// Those of `compute`; they are not kept.
-    pub async fn scales<F>(
+    pub async fn sampling<F>(
         &self,
         owner: Owner,
         stored: &StoredCloud,
         compute: impl FnOnce() -> F,
-    ) -> Result<(), E>
+    ) -> Result<Arc<Sampling>, E>
     where
-        F: Future<Output = Result<Scales, E>> + Send + 'static,
+        F: Future<Output = Result<Sampling, E>> + Send + 'static,
     {
-        fill(&stored.scales, &self.scales, (owner, stored.id), compute).await
+        let begin = || {
+            let found = compute();
+            async move { found.await.map(Arc::new) }
+        };
+        let (sampling, is_new) = fill(&stored.sampling, &self.samplings, (owner, stored.id), begin).await?;
+        if is_new {
+            self.clouds.reweigh(owner, stored.id, stored.n_bytes());
+        }
+        Ok(sampling)
     }
 
-    /// Sees to it that the noise of the cloud is known, as [`CloudStore::scales`] does.
+    /// Sees to it that the noise of the cloud is known, as [`CloudStore::sampling`] does.
     ///
     /// # Errors
     /// Those of `compute`; they are not kept.
@@ -121,7 +134,8 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     where
         F: Future<Output = Result<f64, E>> + Send + 'static,
     {
-        fill(&stored.noise, &self.noise, (owner, stored.id), compute).await
+        fill(&stored.noise, &self.noise, (owner, stored.id), compute).await?;
+        Ok(())
     }
 
     /// Forgets a cloud; says whether it was there.
@@ -142,24 +156,25 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 }
 
-/// Fills an empty cell with what a flight brings.
+/// What is in a cell, or what a flight brings, which is put in; and whether this one put it in.
 async fn fill<T, E, F>(
     cell: &OnceLock<T>,
     flights: &SingleFlight<(Owner, CloudId), T, E>,
     key: (Owner, CloudId),
     compute: impl FnOnce() -> F,
-) -> Result<(), E>
+) -> Result<(T, bool), E>
 where
     T: Clone + Send + Sync + 'static,
     E: Clone + Send + Sync + 'static,
     F: Future<Output = Result<T, E>> + Send + 'static,
 {
-    if cell.get().is_none() {
-        let found = flights.join(key, compute).await.1?;
-        // Of many who bring the same, the first one puts it in.
-        let _ = cell.set(found);
+    if let Some(known) = cell.get() {
+        return Ok((known.clone(), false));
     }
-    Ok(())
+    let found = flights.join(key, compute).await.1?;
+    // Of many who bring the same, the first one puts it in.
+    let is_new = cell.set(found.clone()).is_ok();
+    Ok((found, is_new))
 }
 
 #[cfg(test)]
@@ -167,7 +182,6 @@ mod tests {
     use super::*;
     use crate::numerics::error::NumericsError;
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::points::neighbours::Neighbours;
 
     fn line(n: usize, offset: f64) -> Cloud {
         Cloud::new((0..n).map(|i| i as f64 + offset).collect(), 1).unwrap()
@@ -203,12 +217,13 @@ mod tests {
         let (stored, _) = store.register(Owner(0), cloud, None);
         assert!(stored.n_duplicates == 1 && stored.scales().is_none());
         let cloud = stored.cloud.clone();
-        let compute = || async move { Scales::of(&cloud, &Neighbours::of(&cloud), &Unobserved) };
-        store.scales(Owner(0), &stored, compute).await.unwrap();
+        let compute = || async move { Sampling::of(&cloud, &Unobserved) };
+        store.sampling(Owner(0), &stored, compute).await.unwrap();
         let range = stored.scales().and_then(Scales::nearest_range).unwrap();
         assert_eq!((range.min, range.median, range.max), (1.0, 1.0, 4.0));
         // What is known is not computed again.
-        let again = store.scales(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
-        assert_eq!(again, Ok(()));
+        let before = store.n_bytes();
+        let again = store.sampling(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
+        assert!(again.is_ok() && store.n_bytes() == before && before >= stored.n_bytes());
     }
 }

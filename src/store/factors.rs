@@ -149,6 +149,16 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         self.budget.reserve(owner, n_bytes, look).await
     }
 
+    /// So many bytes of memory for work, if they are to be had without waiting and without letting go of anything.
+    pub fn try_reserve(&self, owner: Owner, n_bytes: usize) -> Option<Reservation> {
+        self.budget.try_reserve(owner, n_bytes)
+    }
+
+    /// The factor of `key`, if it is kept.
+    pub fn get(&self, key: FactorKey) -> Option<Arc<StoredFactor>> {
+        self.factors.get(key.owner, &key)
+    }
+
     /// Lets go of the least recently used: first of the owner's own, where the owner is over the share, then of whoever has most.
     fn make_room(&self, shortage: Shortage) {
         let let_go = |owner: Option<Owner>, mut n_bytes: usize| {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::Owner;
-use crate::numerics::kernel::{Family, Kernel, WendlandSmoothness};
+use crate::numerics::kernel::Kernel;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::sums::regularization::Regularization;
 
@@ -65,15 +65,7 @@ impl FactorKey {
         regularization: &Regularization,
         merged: bool,
     ) -> Self {
-        let (family, parameter) = match kernel.family() {
-            Family::Gauss => (0, 0.0),
-            Family::Laplace { epsilon } => (1, epsilon),
-            Family::Matern { order } => (2, f64::from(order)),
-            Family::Wendland { smoothness: WendlandSmoothness::C2 } => (3, 2.0),
-            Family::Wendland { smoothness: WendlandSmoothness::C4 } => (3, 4.0),
-            Family::Wendland { smoothness: WendlandSmoothness::C6 } => (3, 6.0),
-            Family::InverseMultiquadric => (4, 0.0),
-        };
+        let (family, parameter) = kernel.family().canonical();
         let mut hasher = blake3::Hasher::new();
         hasher.update(&[family, u8::from(merged)]);
         update_with_floats(&mut hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
@@ -117,6 +109,7 @@ fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::kernel::Family;
 
     #[test]
     fn the_cloud_id_is_the_hash_of_the_documented_bytes() {

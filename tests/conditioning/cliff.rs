@@ -57,19 +57,14 @@ impl Walk {
     }
 }
 
-fn on_sphere(n: usize, seed: u64) -> Cloud {
-    let mut random = Random(seed);
-    cloud(&(0..n).map(|_| random.on_sphere()).collect::<Vec<_>>())
-}
-
 #[test]
 fn a_function_that_the_kernel_can_just_follow() {
-    let points = sphere(512);
+    let points = fibonacci_sphere(512);
     Walk {
-        values: points.iter().map(|x| (PI * (1.0 + 2.0 * x[2])).sin()).collect(),
-        points: cloud(&points),
+        values: points.points().map(|x| (PI * (1.0 + 2.0 * x[2])).sin()).collect(),
+        points,
         kernel: kernel(Family::Gauss, 1.0),
-        queries: on_sphere(24, 1),
+        queries: random_sphere(24, &mut Random(1)),
         floor: 5e-6,
     }
     .check();
@@ -80,9 +75,9 @@ fn analytic_kernels_on_a_sphere() {
     for (family, length_scale) in
         [(Family::Gauss, 2.0), (Family::InverseMultiquadric, 3.0), (Family::Laplace { epsilon: 1.0 }, 4.0)]
     {
-        let points = cloud(&sphere(400));
+        let points = fibonacci_sphere(400);
         let kernel = kernel(family, length_scale);
-        let (values, queries) = (waves(&points), on_sphere(20, 2));
+        let (values, queries) = (waves(&points), random_sphere(20, &mut Random(2)));
         Walk { points, kernel, values, queries, floor: 1e-6 }.check();
     }
 }
@@ -90,11 +85,9 @@ fn analytic_kernels_on_a_sphere() {
 #[test]
 fn a_filled_cube() {
     let mut random = Random(3);
-    let mut cube = |n: usize, half: f64| -> Vec<[f64; 3]> {
-        (0..n).map(|_| std::array::from_fn(|_| half * (2.0 * random.uniform() - 1.0))).collect()
-    };
+    let points = random_cube(400, 3, &mut random);
     // Not in the corners, where no point may be near: extrapolation multiplies every rounding by hundreds.
-    let (points, queries) = (cloud(&cube(400, 1.0)), cloud(&cube(20, 0.8)));
+    let queries = stretched(&random_cube(20, 3, &mut random), &[0.8; 3]);
     let (values, kernel) = (waves(&points), kernel(Family::Gauss, 2.5));
     Walk { points, kernel, values, queries, floor: 1e-5 }.check();
 }
@@ -106,12 +99,12 @@ fn rough_kernels_where_two_points_nearly_coincide() {
         (Family::Matern { order: 2 }, 0.7),
         (Family::Matern { order: 4 }, 0.7),
     ] {
-        let mut points = sphere(200);
+        let mut points = rows::<3>(&fibonacci_sphere(200));
         let [x, y, z] = points[20];
         points.push([x - 1e-9 * y, y + 1e-9 * x, z]);
         let points = cloud(&points);
         let kernel = kernel(family, length_scale);
-        let (values, queries) = (vec![1.0; 201], on_sphere(20, 4));
+        let (values, queries) = (vec![1.0; 201], random_sphere(20, &mut Random(4)));
         Walk { points, kernel, values, queries, floor: 1e-9 }.check();
     }
 }

@@ -88,7 +88,7 @@ impl<'a> Case<'a> {
 
     fn check_fits(&mut self) -> Interpolant {
         let (expected, reached) = (self.expected, self.reached);
-        let signature = Interpolant::signature(self.factor.clone(), &Unobserved).unwrap();
+        let signature = signature(&self.factor);
         let jets = signature.at(&self.queries, JetOrder::Hessian, &Unobserved).unwrap();
         let m = self.queries.n_points();
         let gradients: Vec<f64> = (0..m).flat_map(|query| jets.gradient(query).to_vec()).collect();
@@ -120,7 +120,7 @@ impl<'a> Case<'a> {
 
     fn check_geometry(&mut self, u: &Interpolant) {
         let (expected, reached) = (self.expected, self.reached);
-        let (_, geometry) = geometry(&self.factor, &self.queries);
+        let geometry = geometry(&self.factor, &self.queries);
         assert!(geometry.is_null().iter().all(|is_null| !is_null), "{}", reached.case);
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
         self.check("gradient norm", geometry.gradient_norms(), &expected["gradient_norm"], reached.gradient);

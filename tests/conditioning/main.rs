@@ -3,8 +3,8 @@
 //! Through the public API of the numerics alone. Clouds and random numbers are seeded; every tolerance says where it comes
 //! from.
 
-#[path = "../common/random.rs"]
-mod random;
+#[path = "../common/mod.rs"]
+mod common;
 
 mod cliff;
 mod hard;

@@ -12,7 +12,7 @@ use crate::support::*;
 
 /// Every third point has noise; the others are known exactly, and more of them than the kernel can tell apart.
 fn mixed(variance: f64) -> Interpolant {
-    let points = cloud(&sphere(512));
+    let points = fibonacci_sphere(512);
     let variances = (0..512).map(|i: usize| if i.is_multiple_of(3) { variance } else { 0.0 }).collect();
     let noise = Regularization::per_point(variances).unwrap();
     let factor =
@@ -28,13 +28,12 @@ fn mixed(variance: f64) -> Interpolant {
 #[test]
 fn exact_points_are_met_and_noisy_ones_smoothed() {
     // On the sphere: beside it even exact values determine u only as far as its norm does.
-    let mut random = Random(3);
-    let queries: Vec<[f64; 3]> = (0..40).map(|_| random.on_sphere()).collect();
-    let expected: Vec<f64> = queries.iter().map(|x| wave(x)).collect();
+    let queries = random_sphere(40, &mut Random(3));
+    let expected = waves(&queries);
     for variance in [1e-10, 1e-4, 1.0, 1e6] {
         let u = mixed(variance);
         // 341 exact points determine the wave to 1e-7 of its size, as they would alone; noise has no say beside them.
-        let error = relative_distance(&jets(&u, &cloud(&queries))[0], &expected);
+        let error = relative_distance(&jets(&u, &queries)[0], &expected);
         println!("variance {variance:e}: error {error:.1e}, residual {:.1e}", u.solution.relative_residual);
         assert!(error < 1e-6, "variance {variance:e}: {error:e}");
         assert!(u.solution.relative_residual < 1e-9);

@@ -20,7 +20,7 @@ fn answers(
 ) -> [(Vec<f64>, i32); 9] {
     let factor = factorize(points, kernel, alpha);
     let u = fit(&factor, values);
-    let (_, geometry) = geometry(&factor, queries);
+    let geometry = geometry(&factor, queries);
     let curvatures = geometry.curvatures(&Unobserved).unwrap();
     let [value, gradient, laplacian] = jets(&u, queries);
     [
@@ -52,7 +52,7 @@ fn cases() -> impl Iterator<Item = (Family, f64, f64)> {
 fn a_cloud_at_a_million_is_answered_as_at_the_origin() {
     // Rounding moves coordinates near 1e6 by up to 6e-11. Both clouds are made of the rounded coordinates, whose differences
     // are exact in float64 (all are multiples of 2^-33 below 2^21), and so the answers agree in every bit.
-    let (points, queries) = (cloud(&sphere(N)), cloud(&around_sphere(15, 5)));
+    let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 5));
     let values = waves(&points);
     let far = [&points, &queries].map(|cloud| mapped(cloud, |x| x + 1e6));
     let near = [&far[0], &far[1]].map(|cloud| mapped(cloud, |x| x - 1e6));
@@ -70,7 +70,7 @@ fn a_cloud_at_a_million_is_answered_as_at_the_origin() {
 #[test]
 fn powers_of_two_as_unit_change_nothing() {
     // Scaling by a power of two is exact in float64, and so is everything computed from it.
-    let (points, queries) = (cloud(&sphere(N)), cloud(&around_sphere(15, 6)));
+    let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 6));
     let values = waves(&points);
     for (family, length_scale, alpha) in cases() {
         let expected = answers(&points, &queries, kernel(family, length_scale), alpha, &values);
@@ -88,7 +88,7 @@ fn powers_of_two_as_unit_change_nothing() {
 
 #[test]
 fn any_unit_from_a_millionth_to_a_million_changes_rounding_alone() {
-    let (points, queries) = (cloud(&sphere(N)), cloud(&around_sphere(15, 7)));
+    let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 7));
     let values = waves(&points);
     // α = 1e-6: the condition is at most ‖K‖₁/α = 1e8. Rounding of the coordinates moves entries of K by a few ε, weights by
     // n ε times the condition, and what is summed from them by no more; the two derivatives lose two digits.

@@ -38,7 +38,7 @@ fn where_all_points_are_one_to_the_kernel() {
     for n in [2, 3, 4, 10, 100, 400] {
         for variance in [1e-6, 1.0, 1e6] {
             let kernel = Kernel::new(Family::Gauss, 1e9, variance).unwrap();
-            check_remedy(&cloud(&sphere(n)), kernel, &format!("{n} points, variance {variance}"));
+            check_remedy(&fibonacci_sphere(n), kernel, &format!("{n} points, variance {variance}"));
         }
     }
 }
@@ -47,7 +47,7 @@ fn where_all_points_are_one_to_the_kernel() {
 fn where_two_points_are_one_to_the_kernel() {
     for n in [2, 3, 4, 10, 100, 400] {
         for length_scale in [0.01, 0.5] {
-            let mut points = sphere(n - 1);
+            let mut points = rows::<3>(&fibonacci_sphere(n - 1));
             points.push(points[0].map(|x| x + 1e-10));
             let kernel = kernel(Family::Matern { order: 2 }, length_scale);
             check_remedy(&cloud(&points), kernel, &format!("{n} points, ℓ = {length_scale}"));

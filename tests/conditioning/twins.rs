@@ -18,8 +18,8 @@ const TWINS: [usize; 2] = [70, N];
 
 /// The sphere, and the sphere with a second point 1e-9 beside point 70, along the surface.
 fn clouds() -> (Cloud, Cloud) {
-    let mut points = sphere(N);
-    let alone = cloud(&points);
+    let alone = fibonacci_sphere(N);
+    let mut points = rows::<3>(&alone);
     let [x, y, z] = points[TWINS[0]];
     let r = x.hypot(y);
     points.push([x - 1e-9 * y / r, y + 1e-9 * x / r, z]);
@@ -37,7 +37,7 @@ fn has_kink(family: Family) -> bool {
 #[test]
 fn values_of_a_smooth_function_give_the_answer_of_one_point() {
     let (alone, twins) = clouds();
-    let queries = cloud(&around_sphere(20, 4));
+    let queries = around_sphere(20, 4);
     for family in FAMILIES {
         let kernel = kernel(family, length_scale(family));
         let expected = jets(&fit(&factorize(&alone, kernel, 0.0), &vec![1.0; N]), &queries);
@@ -99,7 +99,7 @@ fn at_points(u: &Interpolant) -> Vec<f64> {
 
 #[test]
 fn a_whole_cloud_twice_has_the_rank_of_one() {
-    let points = sphere(100);
+    let points = rows::<3>(&fibonacci_sphere(100));
     let mut random = Random(8);
     let moved = points.iter().map(|x| x.map(|c| c + 1e-9 * (2.0 * random.uniform() - 1.0)));
     let twice: Vec<[f64; 3]> = points.iter().copied().chain(moved).collect();

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::random::Random;
+use super::common::clouds::{closed_curve_point, random_cube, rows, square_grid};
+use super::common::random::Random;
 
 /// A cloud with its outward unit normals.
 pub struct Oriented {
@@ -23,14 +24,9 @@ impl Oriented {
     }
 }
 
-/// The paper's closed curve `(sin t, sin³t + ½ cos t)` at equidistant parameters; clockwise, so outward is left of the tangent.
+/// The paper's closed curve at equidistant parameters.
 pub fn closed_curve(n: usize) -> Oriented {
-    Oriented::new((0..n).map(|i| {
-        let t = 2.0 * PI * i as f64 / n as f64;
-        let (s, c) = t.sin_cos();
-        let tangent = [c, 3.0 * s * s * c - 0.5 * s];
-        ([s, s.powi(3) + 0.5 * c], [-tangent[1], tangent[0]])
-    }))
+    Oriented::new((0..n).map(|i| closed_curve_point(2.0 * PI * i as f64 / n as f64)))
 }
 
 /// Two balls joined by a neck: the surface of revolution of `r(z)² = 4(1 − z²)(z² + 0.1)` about z.
@@ -59,10 +55,8 @@ pub fn dumbbell(n: usize) -> Oriented {
 
 /// Points of a graph over [−1, 1]², on a grid of side², with upward normals.
 pub fn graph(side: usize, height: impl Fn(f64, f64) -> f64) -> Oriented {
-    let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
     let step = 1e-5;
-    Oriented::new((0..side * side).map(|i| {
-        let (x, y) = (at(i % side), at(i / side));
+    Oriented::new(rows::<2>(&square_grid(side)).into_iter().map(|[x, y]| {
         let slope_x = (height(x + step, y) - height(x - step, y)) / (2.0 * step);
         let slope_y = (height(x, y + step) - height(x, y - step)) / (2.0 * step);
         ([x, y, height(x, y)], [-slope_x, -slope_y, 1.0])
@@ -91,10 +85,8 @@ pub fn half_sphere(n: usize) -> Oriented {
 
 /// A closed plate `[−1, 1]² × [0, thickness]` without its rim: two grids of side² points, normals away from one another.
 pub fn plate(side: usize, thickness: f64) -> Oriented {
-    let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
-    let layer = |z: f64, normal: f64| {
-        (0..side * side).map(move |i| ([at(i % side), at(i / side), z], [0.0, 0.0, normal]))
-    };
+    let square = rows::<2>(&square_grid(side));
+    let layer = |z: f64, normal: f64| square.iter().map(move |&[x, y]| ([x, y, z], [0.0, 0.0, normal]));
     Oriented::new(layer(0.0, -1.0).chain(layer(thickness, 1.0)))
 }
 
@@ -102,12 +94,10 @@ pub fn plate(side: usize, thickness: f64) -> Oriented {
 pub fn flat_square(side: usize, random: Option<&mut Random>) -> Oriented {
     let (u, v) = ([0.36, 0.48, -0.8], [-0.8, 0.6, 0.0]);
     let normal = [0.48, 0.64, 0.6];
-    let grid = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
-    let mut coordinates: Vec<[f64; 2]> = (0..side * side).map(|i| [grid(i % side), grid(i / side)]).collect();
-    if let Some(random) = random {
-        coordinates.fill_with(|| [2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0]);
-    }
-    Oriented::new(
-        coordinates.into_iter().map(|[a, b]| ([0, 1, 2].map(|c| a * u[c] + b * v[c] + 0.3), normal)),
-    )
+    let square = match random {
+        None => square_grid(side),
+        Some(random) => random_cube(side * side, 2, random),
+    };
+    let point = |[a, b]: [f64; 2]| [0, 1, 2].map(|c| a * u[c] + b * v[c] + 0.3);
+    Oriented::new(rows(&square).into_iter().map(|x| (point(x), normal)))
 }

@@ -7,7 +7,7 @@ use gramian::numerics::surface::degeneracy::DegeneracyReason;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 
 use super::clouds::{Oriented, cylinder, flat_square, graph, half_sphere};
-use super::random::Random;
+use super::common::random::Random;
 use super::support::{cosines, geometry, n_wrong, surface, surface_of};
 
 const CURVATURES: GeometryRequest = GeometryRequest::CURVATURES;

@@ -1,7 +1,7 @@
 //! Where geometry is doubtful: right, or flagged.
 
-#[path = "../common/random.rs"]
-mod random;
+#[path = "../common/mod.rs"]
+mod common;
 
 mod clouds;
 mod flat;

@@ -2,7 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::random::Random;
+use gramian::numerics::points::cloud::Cloud;
+
+use super::common::clouds::{fibonacci_sphere, random_cube, random_sphere, rows, square_grid, stretched};
+use super::common::random::Random;
 
 /// A surface given by its implicit function, positive outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,39 +29,11 @@ const TUBE: f64 = 0.4;
 impl Shape {
     /// n points, at random or regular: Fibonacci lattices, and a grid of the next smaller square number.
     pub fn sample(self, n: usize, random: Option<&mut Random>) -> Vec<[f64; 3]> {
-        match (self, random) {
-            (Self::Saddle | Self::Plane, None) => {
-                let side = n.isqrt();
-                let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
-                (0..side * side).map(|i| self.over(at(i % side), at(i / side))).collect()
-            }
-            (Self::Saddle | Self::Plane, Some(random)) => (0..n)
-                .map(|_| self.over(2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0))
-                .collect(),
-            (Self::Torus, None) => (0..n)
-                .map(|i| {
-                    let share = (i as f64 + 0.5) / n as f64;
-                    on_torus((i as f64 * (5f64.sqrt() - 1.0) / 2.0).fract(), angle_of_share(share))
-                })
-                .collect(),
-            (Self::Torus, Some(random)) => {
-                (0..n).map(|_| on_torus(random.uniform(), angle_of_share(random.uniform()))).collect()
-            }
-            (Self::Sphere | Self::Ellipsoid, random) => {
-                let mut random = random;
-                (0..n)
-                    .map(|i| match &mut random {
-                        None => (1.0 - (2 * i + 1) as f64 / n as f64, PI * (1.0 + 5f64.sqrt()) * i as f64),
-                        Some(random) => (2.0 * random.uniform() - 1.0, 2.0 * PI * random.uniform()),
-                    })
-                    .map(|(z, t)| {
-                        let r = (1.0 - z * z).sqrt();
-                        let unit = [r * t.cos(), r * t.sin(), z];
-                        let axes = if self == Self::Sphere { [1.0; 3] } else { AXES };
-                        [0, 1, 2].map(|c| axes[c] * unit[c])
-                    })
-                    .collect()
-            }
+        match self {
+            Self::Sphere => rows(&sphere(n, random)),
+            Self::Ellipsoid => rows(&stretched(&sphere(n, random), &AXES)),
+            Self::Torus => torus(n, random),
+            Self::Saddle | Self::Plane => square(n, random).points().map(|x| self.over(x[0], x[1])).collect(),
         }
     }
 
@@ -115,6 +90,33 @@ impl Shape {
         let gaussian = adjugate / (square * square);
         let root = (mean * mean - gaussian).max(0.0).sqrt();
         [mean - root, mean + root]
+    }
+}
+
+fn sphere(n: usize, random: Option<&mut Random>) -> Cloud {
+    match random {
+        None => fibonacci_sphere(n),
+        Some(random) => random_sphere(n, random),
+    }
+}
+
+fn square(n: usize, random: Option<&mut Random>) -> Cloud {
+    match random {
+        None => square_grid(n.isqrt()),
+        Some(random) => random_cube(n, 2, random),
+    }
+}
+
+fn torus(n: usize, random: Option<&mut Random>) -> Vec<[f64; 3]> {
+    let regular = |i: usize| {
+        let share = (i as f64 + 0.5) / n as f64;
+        on_torus((i as f64 * (5f64.sqrt() - 1.0) / 2.0).fract(), angle_of_share(share))
+    };
+    match random {
+        None => (0..n).map(regular).collect(),
+        Some(random) => {
+            (0..n).map(|_| on_torus(random.uniform(), angle_of_share(random.uniform()))).collect()
+        }
     }
 }
 

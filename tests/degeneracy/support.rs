@@ -1,25 +1,17 @@
 //! The library's answers for a cloud.
 
-use std::sync::Arc;
-
-use gramian::numerics::function::interpolant::Interpolant;
-use gramian::numerics::kernel::{Family, Kernel};
+use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
-use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use super::clouds::Oriented;
+use super::common::fits;
 
 pub fn surface(points: &[f64], dimension: usize, family: Family, length_scale: f64, alpha: f64) -> Surface {
-    let cloud = Arc::new(Cloud::new(points.to_vec(), dimension).unwrap());
-    let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
-    let alpha = Regularization::uniform(alpha).unwrap();
-    let factor = GramFactor::factorize(cloud, kernel, alpha, &Unobserved).unwrap();
-    let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
-    Surface::of(signature, None, &Unobserved).unwrap()
+    let cloud = Cloud::new(points.to_vec(), dimension).unwrap();
+    fits::surface(&fits::factorize(&cloud, fits::kernel(family, length_scale), alpha))
 }
 
 pub fn surface_of(cloud: &Oriented, family: Family, length_scale: f64) -> Surface {

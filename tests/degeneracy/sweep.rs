@@ -1,18 +1,15 @@
 //! Curvatures of every shape, kernel, size and sampling against the exact ones, and how many of the wrong ones are flagged.
 
-use std::sync::Arc;
-
 use gramian::numerics::function::interpolant::Interpolant;
-use gramian::numerics::kernel::{Family, Kernel, WendlandSmoothness};
+use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
-use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::degeneracy::DegeneracyReason;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
-use super::random::Random;
+use super::common::clouds::cloud;
+use super::common::fits::{factorize, kernel};
+use super::common::random::Random;
 use super::shapes::Shape;
 
 /// Seven kernels, each with the length scale at which it is about as wide as the Gauss kernel at 1.
@@ -93,12 +90,8 @@ impl Case {
     pub fn run(&self, model: SurfaceModel, scale: f64) -> Tally {
         let mut random = Random(1000 + self.n_points as u64);
         let points = self.shape.sample(self.n_points, self.is_random.then_some(&mut random));
-        let cloud = Arc::new(Cloud::new(points.concat(), 3).unwrap());
-        let kernel = Kernel::new(self.kernel.1, self.kernel.2 * scale, 1.0).unwrap();
-        let factor =
-            GramFactor::factorize(cloud.clone(), kernel, Regularization::Uniform(1e-10), &Unobserved)
-                .unwrap();
-        let Ok(signature) = Interpolant::signature(Arc::new(factor), &Unobserved) else {
+        let factor = factorize(&cloud(&points), kernel(self.kernel.1, self.kernel.2 * scale), 1e-10);
+        let Ok(signature) = Interpolant::signature(factor, &Unobserved) else {
             return Tally::default();
         };
         let surface = Surface::of(signature, None, &Unobserved).unwrap();
@@ -106,10 +99,9 @@ impl Case {
         let mut queries: Vec<[f64; 3]> = points.iter().copied().step_by(step).collect();
         queries.extend(self.shape.sample(60, Some(&mut random)));
         let request = GeometryRequest { model, ..GeometryRequest::CURVATURES };
-        let at = Cloud::new(queries.concat(), 3).unwrap();
-        let geometry = Geometry::of(&surface, &at, &request, &Unobserved).unwrap();
+        let geometry = Geometry::of(&surface, &cloud(&queries), &request, &Unobserved).unwrap();
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
-        let radius = cloud.radius();
+        let radius = surface.cloud().radius();
         let mut tally = Tally { queries: queries.len(), ..Tally::default() };
         let mut flags = vec![None; queries.len()];
         geometry.degenerate().iter().for_each(|entry| flags[entry.query] = Some(entry.reason));

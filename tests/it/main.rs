@@ -3,6 +3,9 @@
 // These threads are no pool's.
 #![allow(clippy::disallowed_methods)]
 
+#[path = "../common/mod.rs"]
+mod common;
+
 mod access;
 mod bodies;
 mod cache;

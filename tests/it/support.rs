@@ -11,6 +11,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 
+use crate::common::clouds;
 use crate::contract::{self, Received};
 
 /// A server on a port of its own, in this process; it drains when dropped.
@@ -134,16 +135,9 @@ pub async fn receive(request: reqwest::RequestBuilder) -> Received {
     received
 }
 
-/// n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i.
+/// n points on the unit sphere as JSON has them.
 pub fn fibonacci_sphere(n: usize) -> Vec<[f64; 3]> {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    (0..n)
-        .map(|i| {
-            let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-            let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
-            [r * t.cos(), r * t.sin(), z]
-        })
-        .collect()
+    clouds::rows(&clouds::fibonacci_sphere(n))
 }
 
 /// All numbers of nested arrays, in order; nulls are passed over.

@@ -3,10 +3,10 @@
 //! Errors at 32 random points (uniform on the sphere, then stretched), averaged over 20 draws. The paper does not define its
 //! relative error; both `max|K − K*|/max|K*|` and the mean of `|K − K*|/K*` stand beside it.
 
+use super::common::clouds::{fibonacci_sphere, stretched};
 use super::errors::{mean, means, relative_max};
-use super::random::Random;
-use super::shapes::{sphere, stretched};
-use super::support::{Cloud, LAPLACE, Orientation, Surface, cloud};
+use super::shapes::directions;
+use super::support::{Cloud, LAPLACE, Orientation, Surface};
 use super::table::{Row, Table};
 
 const AXES: [f64; 3] = [2.0, 0.5, 1.0];
@@ -24,14 +24,12 @@ pub fn table() -> Table {
 }
 
 fn errors(m: usize) -> [f64; 2] {
-    let surface = Surface::of(&cloud(&stretched(&sphere(m), AXES)), LAPLACE, 0.0);
+    let surface = Surface::of(&stretched(&fibonacci_sphere(m), &AXES), LAPLACE, 0.0);
     means(&(0..20).map(|seed| errors_at(&surface, seed)).collect::<Vec<_>>())
 }
 
 fn errors_at(surface: &Surface, seed: u64) -> [f64; 2] {
-    let mut random = Random::of_seed(500 + seed);
-    let directions: Vec<[f64; 3]> = (0..32).map(|_| random.direction()).collect();
-    let queries = cloud(&stretched(&directions, AXES));
+    let queries = stretched(&directions(32, 500 + seed), &AXES);
     let gauss = |k: Option<Vec<f64>>| k.map_or(f64::NAN, |k| k[0] * k[1]);
     let found: Vec<f64> = surface.curvatures(&queries, Orientation::Outward).into_iter().map(gauss).collect();
     let exact = exact(&queries);

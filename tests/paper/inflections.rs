@@ -7,6 +7,7 @@
 
 use std::f64::consts::TAU;
 
+use super::common::clouds::closed_curve_point;
 use super::curves::{Station, angles, angles_on_curve, crossings, lengths, points};
 use super::errors::{largest, median};
 use super::support::{LAPLACE, Surface};
@@ -17,10 +18,9 @@ fn parameter(i: f64) -> f64 {
     TAU * i / 64.0
 }
 
-/// The curve runs clockwise: its outward normal is to the left.
 fn curve(t: f64) -> Station {
-    let (sin, cos) = t.sin_cos();
-    Station::new([sin, sin.powi(3) + 0.5 * cos], [-(3.0 * sin * sin * cos - 0.5 * sin), cos])
+    let (point, outward) = closed_curve_point(t);
+    Station::new(point, outward)
 }
 
 /// Curvature times |γ′|³, positive where the curve is convex.

@@ -3,8 +3,8 @@
 //! Patrick Guidotti, "Geometric Kernel Interpolation and Regression", section "Numerical Experiments", with the corrected
 //! formulas of docs/errata.md. Seeds are fixed; what the paper draws at random once is drawn 20 times here.
 
-#[path = "../common/random.rs"]
-mod uniform;
+#[path = "../common/mod.rs"]
+mod common;
 
 pub mod ellipsoid;
 pub mod half_ellipse;

@@ -5,10 +5,10 @@
 
 use std::f64::consts::PI;
 
+use super::common::clouds::fibonacci_sphere;
 use super::errors::{largest, means, norm, relative_max};
-use super::random::Random;
-use super::shapes::sphere;
-use super::support::{Cloud, LAPLACE, Surface, cloud};
+use super::shapes::directions;
+use super::support::{Cloud, LAPLACE, Surface};
 use super::table::{Row, Table};
 
 const PAPER: [(usize, [f64; 3]); 4] = [
@@ -30,13 +30,8 @@ pub fn table() -> Table {
 }
 
 fn errors(m: usize) -> [f64; 3] {
-    let surface = Surface::of(&cloud(&sphere(m)), LAPLACE, 0.0);
-    means(&(0..DRAWS).map(|seed| errors_at(&surface, &queries(seed))).collect::<Vec<_>>())
-}
-
-fn queries(seed: u64) -> Cloud {
-    let mut random = Random::of_seed(seed);
-    cloud(&(0..32).map(|_| random.direction()).collect::<Vec<_>>())
+    let surface = Surface::of(&fibonacci_sphere(m), LAPLACE, 0.0);
+    means(&(0..DRAWS).map(|seed| errors_at(&surface, &directions(32, seed))).collect::<Vec<_>>())
 }
 
 fn errors_at(surface: &Surface, queries: &Cloud) -> [f64; 3] {

@@ -4,11 +4,11 @@
 //! 4,000 random points, the same for every m (Fibonacci points come close to the cloud where m is close to their number).
 //! The paper's theorem bounds orders from below; smooth data converge about twice as fast (errata.md, 11).
 
+use super::common::clouds::fibonacci_sphere;
 use super::errors::relative_l2;
-use super::random::Random;
-use super::shapes::sphere;
+use super::shapes::directions;
 use super::sphere::{at, laplacian, value};
-use super::support::{Cloud, Family, Surface, cloud};
+use super::support::{Family, Surface};
 use super::table::{Paper, Row, Table};
 
 const COUNTS: [usize; 4] = [128, 256, 512, 1024];
@@ -34,8 +34,8 @@ fn rows(order: u8) -> Vec<Row> {
 }
 
 fn errors(m: usize, family: Family) -> [f64; 3] {
-    let surface = Surface::of(&cloud(&sphere(m)), family, 0.0);
-    let queries = random_directions(4000);
+    let surface = Surface::of(&fibonacci_sphere(m), family, 0.0);
+    let queries = directions(4000, 5000);
     let smooth = surface.function(&at(surface.cloud(), value));
     let rough = surface.function(&at(surface.cloud(), rough_value));
     let (_, laplacians) = smooth.surface_derivatives(&queries);
@@ -44,11 +44,6 @@ fn errors(m: usize, family: Family) -> [f64; 3] {
         relative_l2(&laplacians, &at(&queries, laplacian)),
         relative_l2(&rough.values(&queries), &at(&queries, rough_value)),
     ]
-}
-
-fn random_directions(n: usize) -> Cloud {
-    let mut random = Random::of_seed(5000);
-    cloud(&(0..n).map(|_| random.direction()).collect::<Vec<_>>())
 }
 
 /// `|x₃ − 0.1|^{3/2}`: two weak derivatives short of ε in L², hence order 2 whatever the kernel.

@@ -1,38 +1,26 @@
 //! Every call of the experiments into the library.
 
-use std::sync::Arc;
-
 use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::function::posterior;
 pub use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 pub use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
-use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 pub use gramian::numerics::surface::geometry::{Orientation, SurfaceModel};
 use gramian::numerics::surface::operators;
+
+pub use super::common::clouds::cloud;
+use super::common::fits::{self, factorize, fit};
 
 /// The regularised Laplace kernel of the paper's tables.
 pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
 /// exp(−|x|²).
 pub const GAUSS: Family = Family::Gauss;
 
-/// The paper's kernels: length scale 1, variance 1.
-pub fn kernel(family: Family) -> Kernel {
-    Kernel::new(family, 1.0, 1.0).unwrap()
-}
-
-/// Points as a cloud.
-pub fn cloud<const D: usize>(points: &[[f64; D]]) -> Cloud {
-    Cloud::new(points.concat(), D).unwrap()
-}
-
 /// A cloud with its signature function u_X.
 pub struct Surface {
-    signature: Interpolant,
     surface: surface::Surface,
     model: SurfaceModel,
 }
@@ -45,15 +33,14 @@ impl Surface {
 
     /// The same, answered by another model.
     pub fn with_model(cloud: &Cloud, family: Family, alpha: f64, model: SurfaceModel) -> Self {
-        let factor = factorize(cloud, kernel(family), alpha);
-        let signature = Interpolant::signature(factor, &Unobserved).unwrap();
-        let surface = surface::Surface::of(signature.clone(), None, &Unobserved).unwrap();
-        Self { signature, surface, model }
+        // The paper's kernels have length scale 1 and variance 1.
+        let factor = factorize(cloud, fits::kernel(family, 1.0), alpha);
+        Self { surface: fits::surface(&factor), model }
     }
 
     /// The points.
     pub fn cloud(&self) -> &Cloud {
-        self.signature.factor.cloud()
+        self.surface.cloud()
     }
 
     /// u at the queries.
@@ -93,12 +80,11 @@ impl Surface {
 
     /// Values sampled at the points of the cloud.
     pub fn function(&self, values: &[f64]) -> Function<'_> {
-        let interpolant = Interpolant::fit(self.signature.factor.clone(), values, &Unobserved).unwrap();
-        Function { surface: self, interpolant }
+        Function { surface: self, interpolant: fit(&self.surface.signature().factor, values) }
     }
 
     fn jets(&self, queries: &Cloud, order: JetOrder) -> Jets {
-        self.signature.at(queries, order, &Unobserved).unwrap()
+        self.surface.signature().at(queries, order, &Unobserved).unwrap()
     }
 
     fn geometry(&self, queries: &Cloud, orientation: Orientation) -> Geometry {
@@ -144,11 +130,6 @@ pub fn posterior(
 ) -> (Vec<f64>, Vec<f64>) {
     let factor = factorize(cloud, kernel, noise_variance);
     let variances = posterior::variances(&factor, queries, &Unobserved).unwrap().latent;
-    let mean = Interpolant::fit(factor, values, &Unobserved).unwrap();
+    let mean = fit(&factor, values);
     (mean.at(queries, JetOrder::Value, &Unobserved).unwrap().values(), variances)
-}
-
-fn factorize(cloud: &Cloud, kernel: Kernel, alpha: f64) -> Arc<GramFactor> {
-    let alpha = Regularization::uniform(alpha).unwrap();
-    Arc::new(GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap())
 }

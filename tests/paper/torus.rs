@@ -7,9 +7,9 @@
 
 use std::f64::consts::TAU;
 
+use super::common::clouds::{TORUS, cloud, torus_point};
 use super::errors::{relative_l2, relative_max};
-use super::shapes::{TORUS, torus_point};
-use super::support::{Orientation, Surface, cloud};
+use super::support::{Orientation, Surface};
 
 /// The columns of one kernel.
 pub const COLUMNS: [&str; 4] = ["Linf, cos v/(..)", "Linf, 1/R2", "L2, cos v/(..)", "L2, 1/R2"];

@@ -3,7 +3,7 @@
 use super::errors::medians;
 use super::random::Random;
 use super::shapes::fibonacci_torus;
-use super::support::{Family, GAUSS, LAPLACE, Surface, cloud};
+use super::support::{Family, GAUSS, LAPLACE, Surface};
 use super::table::{Row, Table};
 use super::torus::{ALPHA, COLUMNS, errors};
 
@@ -40,7 +40,7 @@ pub fn table_laplace() -> Table {
 
 fn table(title: &'static str, family: Family, paper: &Paper) -> Table {
     let row = |&(m, paper): &(usize, [f64; 4])| {
-        let surface = Surface::of(&cloud(&fibonacci_torus(m)), family, ALPHA);
+        let surface = Surface::of(&fibonacci_torus(m), family, ALPHA);
         let run = |seed| errors(&surface, Random::of_seed(seed).angle());
         Row::beside(format!("m = {m}"), &paper, &medians(&(0..20).map(run).collect::<Vec<_>>()))
     };

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::common::clouds::random_torus;
 use super::errors::medians;
 use super::random::Random;
-use super::shapes::random_torus;
-use super::support::{Family, GAUSS, LAPLACE, Surface, cloud};
+use super::support::{Family, GAUSS, LAPLACE, Surface};
 use super::table::{Row, Table};
 use super::torus::{ALPHA, COLUMNS, errors};
 
@@ -50,7 +50,7 @@ fn table(title: &'static str, family: Family, paper: &Paper) -> Table {
 
 fn run(m: usize, family: Family, seed: u64) -> [f64; 4] {
     let mut random = Random::of_seed(1000 + seed);
-    let surface = Surface::of(&cloud(&random_torus(m, &mut random)), family, ALPHA);
+    let surface = Surface::of(&random_torus(m, &mut random), family, ALPHA);
     errors(&surface, random.angle())
 }
 

@@ -7,9 +7,11 @@ use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::{GramFactor, Method};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 
+use crate::common::clouds::{fibonacci_sphere, random_cube, waves};
+use crate::common::fits::{factorize, fit};
+use crate::common::random::Random;
 use crate::support::{
-    EPS, cholesky, cross_gram, distance, dot, factorize, families, fit, forward_solve, kernel, largest,
-    rounding, scattered, shifted, sphere, waves,
+    EPS, cholesky, cross_gram, distance, dot, families, forward_solve, kernel, largest, rounding, shifted,
 };
 
 fn jets(u: &Interpolant, queries: &Cloud, order: JetOrder) -> Jets {
@@ -24,10 +26,13 @@ fn absolute_sum(weights: &[f64]) -> f64 {
 fn without_regularization_the_fit_interpolates() {
     // The scattered points on a line drive the smooth kernels into the fallback, those in R⁴ leave Wendland
     // out.
-    let line = (scattered(20, 1, 2), 0.7);
-    for (cloud, length_scale) in
-        [(sphere(150), 1.0), (scattered(80, 2, 1), 0.7), line, (scattered(60, 4, 3), 1.2)]
-    {
+    let line = (random_cube(20, 1, &mut Random(2)), 0.7);
+    for (cloud, length_scale) in [
+        (fibonacci_sphere(150), 1.0),
+        (random_cube(80, 2, &mut Random(1)), 0.7),
+        line,
+        (random_cube(60, 4, &mut Random(3)), 1.2),
+    ] {
         let values = waves(&cloud);
         for kernel in families().into_iter().map(|family| kernel(family, length_scale)) {
             if kernel.check_dimension(cloud.dimension()).is_err() {
@@ -54,7 +59,7 @@ fn without_regularization_the_fit_interpolates() {
 
 #[test]
 fn a_growing_alpha_lowers_the_norm_and_raises_the_misfit() {
-    let cloud = sphere(40);
+    let cloud = fibonacci_sphere(40);
     let values = waves(&cloud);
     for family in families() {
         let norms_and_misfits: Vec<(f64, f64)> = (-6..4)
@@ -71,7 +76,7 @@ fn a_growing_alpha_lowers_the_norm_and_raises_the_misfit() {
 #[test]
 fn the_loss_of_norm_is_the_distance_plus_twice_the_misfit_over_alpha() {
     // errata.md, 10: ‖u⁰‖² − ‖u^α‖² = ‖u⁰ − u^α‖² + (2/α)|u^α(X) − Y|².
-    let cloud = sphere(40);
+    let cloud = fibonacci_sphere(40);
     let values = waves(&cloud);
     for family in families() {
         let kernel = kernel(family, 1.0);
@@ -96,7 +101,7 @@ fn the_loss_of_norm_is_the_distance_plus_twice_the_misfit_over_alpha() {
 #[test]
 fn derivatives_agree_with_central_differences_off_the_cloud() {
     // Off the cloud also the kernels with a kink are smooth.
-    let (cloud, queries, h) = (sphere(60), scattered(15, 3, 4), 1e-5);
+    let (cloud, queries, h) = (fibonacci_sphere(60), random_cube(15, 3, &mut Random(4)), 1e-5);
     let values = waves(&cloud);
     for family in families() {
         let u = fit(&factorize(&cloud, kernel(family, 1.1), 1e-4), &values);
@@ -122,7 +127,7 @@ fn derivatives_agree_with_central_differences_off_the_cloud() {
 
 #[test]
 fn the_posterior_and_its_likelihood_are_those_of_a_direct_computation() {
-    let (cloud, queries) = (scattered(12, 2, 5), scattered(9, 2, 6));
+    let (cloud, queries) = (random_cube(12, 2, &mut Random(5)), random_cube(9, 2, &mut Random(6)));
     let values = waves(&cloud);
     for (family, alpha) in families().into_iter().flat_map(|family| [(family, 0.0), (family, 1e-2)]) {
         let factor = factorize(&cloud, kernel(family, 0.5), alpha);
@@ -154,7 +159,7 @@ fn the_posterior_and_its_likelihood_are_those_of_a_direct_computation() {
 
 #[test]
 fn covariances_are_symmetric_and_positive_semidefinite_with_the_variances_on_the_diagonal() {
-    let (cloud, queries) = (sphere(50), scattered(20, 3, 7));
+    let (cloud, queries) = (fibonacci_sphere(50), random_cube(20, 3, &mut Random(7)));
     for family in families() {
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
         let found = covariance(&factor, &queries, &Unobserved).unwrap().latent;
@@ -172,7 +177,7 @@ fn covariances_are_symmetric_and_positive_semidefinite_with_the_variances_on_the
 
 #[test]
 fn variances_lie_between_zero_and_the_prior_and_fall_with_every_point() {
-    let (all, queries) = (scattered(24, 2, 8), scattered(30, 2, 9));
+    let (all, queries) = (random_cube(24, 2, &mut Random(8)), random_cube(30, 2, &mut Random(9)));
     for family in families() {
         let kernel = kernel(family, 0.8);
         let mut before = vec![kernel.at_zero(); 30];

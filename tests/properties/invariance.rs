@@ -10,9 +10,9 @@ use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 
-use crate::support::{
-    circle, distance, factorize, families, fit, geometry, largest, rounding, sphere, stretched, waves, width,
-};
+use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle, waves};
+use crate::common::fits::{factorize, fit, geometry};
+use crate::support::{distance, families, largest, rounding, width};
 
 /// `x ↦ s R x + t` together with a new order of the points: point i of the image is the image of point
 /// `order[i]`.
@@ -138,8 +138,8 @@ fn carried(name: &str, field: &[f64], by: &Similarity) -> Vec<f64> {
 fn settings() -> [(Cloud, Cloud); 2] {
     let (axes, plane_axes) = ([1.3, 1.0, 0.8], [1.4, 0.9]);
     [
-        (stretched(&sphere(60), &axes), stretched(&sphere(17), &axes)),
-        (stretched(&circle(30, 0.0), &plane_axes), stretched(&circle(11, 0.37), &plane_axes)),
+        (stretched(&fibonacci_sphere(60), &axes), stretched(&fibonacci_sphere(17), &axes)),
+        (stretched(&circle(30), &plane_axes), stretched(&turned_circle(11, 0.37), &plane_axes)),
     ]
 }
 

@@ -4,6 +4,9 @@
 //! random numbers are seeded, tolerances are bounds from rounding (n ε cond) or from the order of
 //! convergence.
 
+#[path = "../common/mod.rs"]
+mod common;
+
 mod fit;
 mod invariance;
 mod operators;

@@ -9,13 +9,13 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::sums::jets::JetOrder;
-use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 
+use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle};
+use crate::common::fits::{factorize, fit, geometry, surface};
 use crate::support::{
-    EPS, circle, distance, dot, factorize, families, families_without_kink, fit, geometry, kernel, largest,
-    norm, rounding, shifted, sphere, stretched, width,
+    EPS, distance, dot, families, families_without_kink, kernel, largest, norm, rounding, shifted, width,
 };
 
 const C4: Family = Family::Wendland { smoothness: WendlandSmoothness::C4 };
@@ -48,7 +48,7 @@ fn laplacian(geometry: &Geometry, u: &Interpolant, queries: &Cloud) -> Vec<f64> 
 /// An ellipsoid and queries on it that are none of its points, where all kernels are smooth.
 fn ellipsoid() -> (Cloud, Cloud) {
     let axes = [1.3, 1.0, 0.8];
-    (stretched(&sphere(100), &axes), stretched(&sphere(23), &axes))
+    (stretched(&fibonacci_sphere(100), &axes), stretched(&fibonacci_sphere(23), &axes))
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn with_two_kernels_the_laplacian_of_a_constant_tends_to_zero() {
     ];
     for (surface, data) in pairs {
         let errors = [64, 128, 256, 512].map(|n| {
-            let cloud = sphere(n);
+            let cloud = fibonacci_sphere(n);
             let constant = fit(&exact_factor(&cloud, data, 1.0), &vec![1.0; n]);
             let geometry = geometry(&exact_factor(&cloud, surface, 1.0), &cloud);
             largest(laplacian(&geometry, &constant, &cloud))
@@ -141,14 +141,15 @@ fn check_coordinates(clouds: [Cloud; 2], spacings: [f64; 2], queries: &Cloud, le
 #[test]
 fn the_laplacian_of_the_coordinates_of_the_sphere_is_minus_twice_them() {
     let spacing = |n: f64| (4.0 * std::f64::consts::PI / n).sqrt();
-    check_coordinates([sphere(128), sphere(512)], [spacing(128.0), spacing(512.0)], &sphere(37), 2.0);
+    let clouds = [fibonacci_sphere(128), fibonacci_sphere(512)];
+    check_coordinates(clouds, [spacing(128.0), spacing(512.0)], &fibonacci_sphere(37), 2.0);
 }
 
 #[test]
 fn the_laplacian_of_the_coordinates_of_the_circle_is_minus_them() {
     let spacing = |n: f64| 2.0 * std::f64::consts::PI / n;
-    let clouds = [circle(40, 0.0), circle(80, 0.0)];
-    check_coordinates(clouds, [spacing(40.0), spacing(80.0)], &circle(17, 0.37), 1.0);
+    let clouds = [circle(40), circle(80)];
+    check_coordinates(clouds, [spacing(40.0), spacing(80.0)], &turned_circle(17, 0.37), 1.0);
 }
 
 #[test]
@@ -194,9 +195,8 @@ fn turning_the_normals_around_negates_curvatures_and_keeps_the_laplacian() {
     let values: Vec<f64> = cloud.points().map(|x| x[0] * x[1]).collect();
     for family in families() {
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
-        let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
+        let surface = surface(&factor);
         let [outward, inward] = [Orientation::Outward, Orientation::Gradient].map(|orientation| {
-            let surface = Surface::of(signature.clone(), None, &Unobserved).unwrap();
             let model = SurfaceModel::Signature;
             let request = GeometryRequest { orientation, model, ..GeometryRequest::CURVATURES };
             Geometry::of(&surface, &queries, &request, &Unobserved).unwrap()

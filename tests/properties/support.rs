@@ -1,16 +1,10 @@
-//! Clouds, kernels and small dense algebra shared by the properties.
+//! Kernels and small dense algebra shared by the properties.
 
-use std::sync::Arc;
-
-use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::GramFactor;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
-use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
-use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 
 pub const EPS: f64 = f64::EPSILON;
 
@@ -44,23 +38,6 @@ pub fn kernel(family: Family, length_scale: f64) -> Kernel {
 /// The length scale at which a family is as wide as Matérn's at 1: Wendland's is the radius of a support.
 pub fn width(family: Family) -> f64 {
     if matches!(family, Family::Wendland { .. }) { 3.0 } else { 1.0 }
-}
-
-pub fn factorize(cloud: &Cloud, kernel: Kernel, alpha: f64) -> Arc<GramFactor> {
-    let alpha = Regularization::uniform(alpha).unwrap();
-    Arc::new(GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap())
-}
-
-pub fn fit(factor: &Arc<GramFactor>, values: &[f64]) -> Interpolant {
-    Interpolant::fit(factor.clone(), values, &Unobserved).unwrap()
-}
-
-/// Geometry of the signature function of the factor's cloud alone, outward normals.
-pub fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> Geometry {
-    let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
-    let surface = Surface::of(signature, None, &Unobserved).unwrap();
-    let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
-    Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
 }
 
 /// `k(q_i, x_j)`, `[m, n]`, by evaluating each kernel translate at the queries.
@@ -108,54 +85,11 @@ pub fn rounding(factor: &GramFactor) -> f64 {
     factor.n_points() as f64 * EPS / factor.reciprocal_condition()
 }
 
-/// n points on the unit sphere of R³, z_i = 1 − (2i+1)/n, angle π(1+√5)i.
-pub fn sphere(n: usize) -> Cloud {
-    let golden = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (r, t) = ((1.0 - z * z).sqrt(), golden * i as f64);
-        [r * t.cos(), r * t.sin(), z]
-    };
-    Cloud::new((0..n).flat_map(point).collect(), 3).unwrap()
-}
-
-/// n equidistant points on the unit circle, the first at `phase` steps.
-pub fn circle(n: usize, phase: f64) -> Cloud {
-    let angle = |i: usize| 2.0 * std::f64::consts::PI * (i as f64 + phase) / n as f64;
-    Cloud::new((0..n).flat_map(|i| [angle(i).cos(), angle(i).sin()]).collect(), 2).unwrap()
-}
-
-/// Multiplies the coordinates of every point by one factor each.
-pub fn stretched(cloud: &Cloud, factors: &[f64]) -> Cloud {
-    let stretch = |(x, f): (&f64, &f64)| x * f;
-    let coordinates = cloud.coordinates().iter().zip(factors.iter().cycle()).map(stretch).collect();
-    Cloud::new(coordinates, cloud.dimension()).unwrap()
-}
-
-/// n points in the cube [−1, 1]^d, the same for the same seed (SplitMix64, Steele et al. 2014).
-pub fn scattered(n: usize, d: usize, seed: u64) -> Cloud {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    Cloud::new((0..n * d).map(|_| next()).collect(), d).unwrap()
-}
-
 /// The cloud moved along one axis.
 pub fn shifted(cloud: &Cloud, axis: usize, h: f64) -> Cloud {
     let d = cloud.dimension();
     let moved = |(i, x): (usize, &f64)| if i % d == axis { x + h } else { *x };
     Cloud::new(cloud.coordinates().iter().enumerate().map(moved).collect(), d).unwrap()
-}
-
-/// Smooth values of size 1 at the points, different in every coordinate.
-pub fn waves(cloud: &Cloud) -> Vec<f64> {
-    let phase = |x: &[f64]| x.iter().enumerate().map(|(c, x)| (1.0 + 0.4 * c as f64) * x).sum::<f64>();
-    cloud.points().map(|x| (0.3 + phase(x)).sin()).collect()
 }
 
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,7 +1,7 @@
 //! Clouds that nobody prepared, with no parameters: kernel, length scale, epsilon and alpha are the service's choice.
 
-#[path = "../common/random.rs"]
-mod random;
+#[path = "../common/mod.rs"]
+mod common;
 
 mod bunny;
 mod curvatures;

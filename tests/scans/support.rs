@@ -2,45 +2,25 @@
 
 use std::sync::Arc;
 
-use gramian::numerics::defaults::{Purpose, Scales, default_fit};
-use gramian::numerics::function::interpolant::Interpolant;
+use gramian::numerics::defaults::Purpose;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::points::neighbours::Neighbours;
-use gramian::numerics::points::noise::estimate_noise;
 use gramian::numerics::solver::GramFactor;
-use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 
-pub use crate::random::Random;
+use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
 
 /// The factorization for a purpose with nothing chosen by the client.
-pub fn factor(cloud: &Arc<Cloud>, purpose: Purpose) -> Arc<GramFactor> {
-    let neighbours = Neighbours::of(cloud);
-    let noise = || estimate_noise(cloud, &neighbours, &Unobserved).unwrap();
-    let (kernel, alpha) =
-        default_fit(&Scales::of(cloud, &neighbours, &Unobserved).unwrap(), purpose, noise).unwrap();
-    let alpha = Regularization::uniform(alpha).unwrap();
-    Arc::new(GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap())
+pub fn factor(cloud: &Cloud, purpose: Purpose) -> Arc<GramFactor> {
+    let (kernel, alpha) = default_kernel_and_alpha(cloud, purpose);
+    factorize(cloud, kernel, alpha)
 }
 
 /// The geometry at the points of a cloud, by default.
-pub fn geometry(cloud: &Arc<Cloud>, purpose: Purpose) -> (Surface, Geometry) {
-    let signature = Interpolant::signature(factor(cloud, purpose), &Unobserved).unwrap();
-    let surface = Surface::of(signature, None, &Unobserved).unwrap();
+pub fn geometry(cloud: &Cloud, purpose: Purpose) -> Geometry {
     let checks_curvatures = purpose == Purpose::Curvatures;
     let request = GeometryRequest { checks_curvatures, ..GeometryRequest::CURVATURES };
-    let geometry = Geometry::of(&surface, cloud, &request, &Unobserved).unwrap();
-    (surface, geometry)
-}
-
-impl Random {
-    /// Standard normal (Box and Muller 1958).
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
-    }
+    Geometry::of(&surface(&factor(cloud, purpose)), cloud, &request, &Unobserved).unwrap()
 }
 
 /// The value below which this share of a list lies.

@@ -146,12 +146,17 @@ impl Compute {
     fn lane(&self, flops: f64) -> &Lane {
         if flops > EXCLUSIVE_FLOPS {
             &self.exclusive
-        } else if flops > LIGHT_FLOPS {
+        } else if !is_light(flops) {
             &self.shared
         } else {
             &self.light
         }
     }
+}
+
+/// Whether a job of so many flops goes to the lane of the smallest.
+pub fn is_light(flops: f64) -> bool {
+    flops <= LIGHT_FLOPS
 }
 
 fn panicked() -> Problem {

@@ -2,8 +2,8 @@
 
 use crate::http::fields::{Kernel, KernelFamily, KernelUsed};
 use crate::http::problem::{Place, Problem};
-use crate::numerics::defaults::{Scales, length_scale_for};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
+use crate::numerics::points::sampling::Scales;
 
 /// A kernel that is checked but for a length scale that the cloud has yet to give.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +22,7 @@ impl PlannedKernel {
             Self::Given(kernel) => Ok(kernel),
             Self::OfCloud { family, variance } => {
                 let scales = scales.ok_or_else(Problem::internal)?;
-                NumericalKernel::new(family, length_scale_for(scales, family), variance)
+                NumericalKernel::new(family, family.default_length_scale(scales), variance)
                     .map_err(|error| Problem::from_numerics(error, place))
             }
         }

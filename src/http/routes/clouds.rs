@@ -18,12 +18,12 @@ use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::serve::intake::{Intake, read_body};
 use crate::http::serve::planner::{Planner, unknown_cloud};
-use crate::http::serve::sampling::find_scales;
+use crate::http::serve::sampling::find_sampling;
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
-use crate::numerics::defaults::{NearestRange, Scales};
+use crate::numerics::points::sampling::{NearestRange, Sampling, Scales};
 use crate::store::Owner;
 use crate::store::clouds::StoredCloud;
 use crate::store::key::CloudId;
@@ -199,8 +199,8 @@ async fn describe(
     stored: &StoredCloud,
 ) -> Result<Cloud, Problem> {
     let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
-    admission.set_flops(Scales::flops_needed(n, d));
-    find_scales(app, admission, stored).await?;
+    admission.set_flops(Sampling::flops_needed(n, d));
+    find_sampling(app, admission, stored).await?;
     admission.finish();
     Ok(Cloud::from(stored))
 }

@@ -118,11 +118,8 @@ impl Operation for InterpolationRequest {
         let (m, d) = (jets.n_queries(), jets.dimension());
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
-            gradients: (work.derivatives >= 1).then(|| {
-                Array::new((0..m).flat_map(|query| jets.gradient(query).to_vec()).collect(), &[m, d])
-            }),
-            hessians: (work.derivatives >= 2)
-                .then(|| Array::new((0..m).flat_map(|query| jets.hessian(query)).collect(), &[m, d, d])),
+            gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
+            hessians: (work.derivatives >= 2).then(|| Array::new(jets.hessians(), &[m, d, d])),
             diagnostics: fits.main.diagnostics(&interpolant.solution, m),
         })
     }

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 
 use crate::http::fields::KernelFamily;
 use crate::http::openapi::responses::ReadProblems;
+use crate::numerics::kernel::{Family, WendlandSmoothness};
 
 /// A parameter that a family takes beside `length_scale` and `variance`.
 #[derive(Serialize, ToSchema)]
@@ -87,7 +88,7 @@ pub async fn list_kernels() -> Json<KernelList> {
             formula: "for r < 1, else 0: (1-r)^4 (4r+1); (1-r)^6 (35r^2+18r+3)/3; (1-r)^8 (32r^3+25r^2+8r+1)",
             smoothness: "2, 4 or 6 times continuously differentiable, as the parameter smoothness says",
             parameters: vec![KernelParameter { name: "smoothness", default: 4.0, range: "2, 4, 6" }],
-            max_dimension: Some(crate::numerics::kernel::MAX_WENDLAND_DIMENSION),
+            max_dimension: Family::Wendland { smoothness: WendlandSmoothness::C4 }.max_dimension(),
             differentiable_at_points: always,
         },
         KernelDescription {

@@ -189,9 +189,7 @@ impl Operation for PosteriorRequest {
             variances: of_latent(Q::Variance, 0.0),
             observation_variances: of_latent(Q::ObservationVariance, alpha),
             covariance: covariance.map(|covariance| Array::new(covariance.latent, &[m, m])),
-            gradients: work.wants(Q::Gradients).then(|| {
-                Array::new((0..m).flat_map(|query| jets.gradient(query).to_vec()).collect(), &[m, d])
-            }),
+            gradients: work.wants(Q::Gradients).then(|| Array::new(jets.gradients(), &[m, d])),
             log_marginal_likelihood,
             diagnostics,
         })

@@ -5,15 +5,19 @@ use std::sync::{Arc, OnceLock};
 use super::fitted::{Fits, Fitted};
 use super::plan::{Cost, FactorFailure, FitPlan};
 use super::report::Report;
+use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
+use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::{GramFactor, Workspace};
 use crate::numerics::surface::Surface;
+use crate::numerics::surface::level::Signature;
 use crate::store::budget::{BeyondBudget, Reservation};
-use crate::store::factors::{Missing, StoredFactor};
+use crate::store::factors::{CacheOutcome, Missing, StoredFactor};
 use crate::store::key::ValuesKey;
 
 /// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
@@ -63,6 +67,35 @@ impl Fitting<'_> {
         }
     }
 
+    /// The same where nothing is missing, and there is memory for the work that nobody waits for: without waiting.
+    pub fn at_hand(
+        &self,
+        main: &FitPlan,
+        surface: Option<&FitPlan>,
+        cost: Cost,
+        report: &mut Report,
+    ) -> Option<(Fits, Reservation)> {
+        let find = |plan: &FitPlan| {
+            let stored = self.app.factors.get(plan.key)?;
+            Some(Fitted { plan: plan.clone(), stored })
+        };
+        let main = find(main)?;
+        let other = surface.filter(|surface| surface.key != main.plan.key);
+        let surface = match other {
+            Some(other) => Some(find(other)?),
+            None => None,
+        };
+        let mut fits = Fits { app: self.app.clone(), main, surface, made: None };
+        if self.has_surface {
+            fits.made = Some(fits.surface().stored.surface()?);
+        }
+        let memory = self.app.factors.try_reserve(self.admission.owner, n_bytes_of_work(cost))?;
+        for fitted in [Some(&fits.main), fits.surface.as_ref()].into_iter().flatten() {
+            report.found(&fitted.stored, CacheOutcome::Hit);
+        }
+        Some((fits, memory))
+    }
+
     /// `None` if what was there when the memory was counted is gone, or what was missing is there, or the memory was not enough:
     /// then everything goes back, and is counted again.
     async fn attempt(
@@ -92,7 +125,7 @@ impl Fitting<'_> {
     /// `None` if what is missing has changed while it waited.
     async fn reserve(&self, wanted: &Wanted<'_>) -> Result<Option<Memory>, Problem> {
         let counted = self.count(wanted);
-        let work = LEAST_BYTES.saturating_add(wanted.cost.n_bytes());
+        let work = n_bytes_of_work(wanted.cost);
         let total = counted.into_iter().fold(work, usize::saturating_add);
         let is_wanted = || self.count(wanted) == counted;
         let reserved = self.app.factors.reserve(self.admission.owner, total, is_wanted).await;
@@ -181,6 +214,10 @@ enum Extent {
     Fallback,
 }
 
+fn n_bytes_of_work(cost: Cost) -> usize {
+    LEAST_BYTES.saturating_add(cost.n_bytes())
+}
+
 /// The part of the matrix and what lies beside it.
 fn n_bytes_of_factor(plan: &FitPlan, extent: Extent) -> Option<usize> {
     let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
@@ -237,24 +274,42 @@ fn make_surface(
 ) -> impl Future<Output = Result<(Surface, Reservation), FactorFailure>> + Send + 'static {
     let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
     let flops = Surface::flops_needed(plan.fitted.n_points(), plan.fitted.dimension());
-    let shared = app.clone();
-    let job = move |observer: &JobObserver| {
-        let (factor, given) = (stored.factor.clone(), plan.fitted_normals());
-        let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
-        let surface = match shared.factors.solution(plan.key, key) {
-            Some(solution) => Surface::of(Interpolant { factor, solution }, given.as_deref(), observer),
-            None => Interpolant::signature_with_jets(factor, observer).and_then(|(signature, jets)| {
-                shared.factors.keep_solution(plan.key, key, signature.solution.clone());
-                Surface::with_jets(signature, jets, given.as_deref(), observer)
-            }),
-        };
-        // As with a factor, the memory goes with the job.
-        surface.map(|surface| (surface, memory))
-    };
     async move {
+        let sampling = match plan.merge {
+            None => Some(find_sampling(&app, &admission, &plan.stored).await.map_err(FactorFailure::Broken)?),
+            Some(_) => None,
+        };
+        let shared = app.clone();
+        let job = move |observer: &JobObserver| {
+            let signature = signature(&shared, &plan, &stored.factor, observer)?;
+            // Without the merged points it is another cloud.
+            let sampling = match sampling {
+                Some(sampling) => sampling,
+                None => Arc::new(Sampling::of(&plan.fitted, observer)?),
+            };
+            let surface = Surface::over(sampling, signature, plan.fitted_normals().as_deref(), observer)?;
+            // As with a factor, the memory goes with the job.
+            Ok((surface, memory))
+        };
         let (surface, taken) =
             app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
         let _ = times.set(taken);
         surface.map_err(FactorFailure::Refused)
     }
+}
+
+/// The signature function of a fit, its weights found if they were solved before.
+fn signature(
+    app: &App,
+    plan: &FitPlan,
+    factor: &Arc<GramFactor>,
+    observer: &JobObserver,
+) -> Result<Signature, NumericsError> {
+    let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
+    if let Some(solution) = app.factors.solution(plan.key, key) {
+        return Signature::of(Interpolant { factor: factor.clone(), solution }, observer);
+    }
+    let signature = Signature::fit(factor.clone(), observer)?;
+    app.factors.keep_solution(plan.key, key, signature.function().solution.clone());
+    Ok(signature)
 }

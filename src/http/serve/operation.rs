@@ -14,8 +14,8 @@ use super::intake::{Intake, read_body};
 use super::plan::{Cost, FitPlan, PlannedFit};
 use super::planner::Planner;
 use super::report::Report;
-use super::sampling::sample;
-use crate::http::compute::{Admission, JobObserver};
+use super::sampling::find_lacking;
+use crate::http::compute::{Admission, JobObserver, is_light};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
@@ -102,58 +102,109 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let admission = app.compute.admit(owner)?;
 
     let began = Instant::now();
-    let plan = prepare::<O>(&app, &admission, intake).await?;
+    let plan = match prepare::<O>(&app, &admission, intake, wanted, began).await? {
+        Prepared::Answered(answered) => return Ok(answered.respond(&app, &admission)),
+        Prepared::Ready(plan) => plan,
+    };
     let mut report = Report::parsed_in(began.elapsed());
 
     admission.set_flops(plan.expected_flops(&app, O::HAS_SURFACE));
     let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
-    let Resolved { work, cost, intake, .. } = plan;
-    let job = move |observer: &JobObserver| {
-        let answer = O::compute(work, &fits, observer)?;
-        drop(intake);
-        let times = observer.times();
-        let began = Instant::now();
-        let encoded = Encoded::of(answer, wanted)?;
-        Ok::<_, Problem>((encoded, memory, times, began.elapsed()))
-    };
-    let (encoded, memory, times, encode) = app.compute.run(&admission, cost.flops, job).await?.0?;
-    admission.finish();
-    report.computed(times, (!encoded.is_streamed()).then_some(encode));
-    Ok(report.head(encoded.into_response(&app.compute, memory)))
+    let flops = plan.cost.flops;
+    let job = move |observer: &JobObserver| answer::<O>(*plan, &fits, memory, report, wanted, observer);
+    let answered = app.compute.run(&admission, flops, job).await?.0?;
+    Ok(answered.respond(&app, &admission))
 }
 
-/// Parses and plans, and looks at the clouds if something was left out that follows from them.
+/// An answer that only needs to be sent, with its memory.
+struct Answered {
+    encoded: Encoded,
+    memory: Reservation,
+    report: Report,
+}
+
+impl Answered {
+    fn respond(self, app: &App, admission: &Admission) -> Response {
+        admission.finish();
+        self.report.head(self.encoded.into_response(&app.compute, self.memory))
+    }
+}
+
+/// Computes and encodes, on the pool.
+fn answer<O: Operation>(
+    plan: Resolved<O::Work>,
+    fits: &Fits,
+    memory: Reservation,
+    mut report: Report,
+    wanted: Wanted,
+    observer: &JobObserver,
+) -> Result<Answered, Problem> {
+    let Resolved { work, intake, .. } = plan;
+    let answer = O::compute(work, fits, observer)?;
+    drop(intake);
+    let times = observer.times();
+    let began = Instant::now();
+    let encoded = Encoded::of(answer, wanted)?;
+    report.computed(times, (!encoded.is_streamed()).then_some(began.elapsed()));
+    Ok(Answered { encoded, memory, report })
+}
+
+enum Prepared<W> {
+    Ready(Box<Resolved<W>>),
+    Answered(Answered),
+}
+
+/// Parses and plans, and looks at the clouds if something was left out that follows from them. What is small, and has all it
+/// needs at hand, is answered at once: each job more is a thread more to wait for.
 async fn prepare<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
     intake: Intake,
-) -> Result<Resolved<O::Work>, Problem> {
-    let (shared, owner) = (app.clone(), admission.owner);
+    wanted: Wanted,
+    began: Instant,
+) -> Result<Prepared<O::Work>, Problem> {
+    let (shared, admitted) = (app.clone(), admission.clone());
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
         let Intake { body, mut memory } = intake;
         let request: O = body.parse(&ParseContext::new(&shared.config, observer))?;
-        let plan = request.plan(&Planner { app: &shared, owner })?;
+        let plan = request.plan(&Planner { app: &shared, owner: admitted.owner })?;
         memory.shrink_to(n_bytes_held(&plan));
         if lacking(&plan).is_some() {
-            Ok(Prepared::Lacking(plan, memory))
-        } else {
-            resolve(plan, memory).map(Prepared::Ready)
+            return Ok(Parsed::Lacking(plan, memory));
         }
+        let plan = resolve(plan, memory)?;
+        let mut report = Report::parsed_in(began.elapsed());
+        let fitting = Fitting { app: &shared, admission: &admitted, has_surface: O::HAS_SURFACE };
+        let at_hand = match is_light(plan.cost.flops) {
+            true => fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report),
+            false => None,
+        };
+        Ok(match at_hand {
+            None => Parsed::Done(Prepared::Ready(Box::new(plan))),
+            Some((fits, memory)) => {
+                let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
+                Parsed::Done(Prepared::Answered(answered))
+            }
+        })
     };
     let (plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
-        Prepared::Ready(resolved) => return Ok(resolved),
-        Prepared::Lacking(plan, memory) => (plan, memory),
+        Parsed::Done(prepared) => return Ok(prepared),
+        Parsed::Lacking(plan, memory) => (plan, memory),
     };
     while let Some(fit) = lacking(&plan) {
-        sample(app, admission, fit).await?;
+        find_lacking(app, admission, fit).await?;
     }
-    app.compute.run(admission, 0.0, move |_| resolve(plan, memory)).await?.0
+    app.compute
+        .run(admission, 0.0, move |_| resolve(plan, memory))
+        .await?
+        .0
+        .map(|plan| Prepared::Ready(Box::new(plan)))
 }
 
-enum Prepared<W> {
-    Ready(Resolved<W>),
+enum Parsed<W> {
+    Done(Prepared<W>),
     /// Its fits need to know more of their clouds.
     Lacking(Plan<W>, Reservation),
 }

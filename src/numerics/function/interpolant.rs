@@ -40,20 +40,6 @@ impl Interpolant {
         Self::fit(factor, &ones, observer)
     }
 
-    /// [`Interpolant::signature`] with its values and derivatives at the points, unless the kernel has a kink there.
-    ///
-    /// # Errors
-    /// Those of [`Solution::with_jets`].
-    pub fn signature_with_jets(
-        factor: Arc<GramFactor>,
-        observer: &dyn Observer,
-    ) -> Result<(Self, Option<Jets>), NumericsError> {
-        let has_kink = factor.kernel().has_kink();
-        let order = if has_kink { JetOrder::Value } else { JetOrder::HessianWithMagnitudes };
-        let (solution, jets) = Solution::with_jets(&factor, &vec![1.0; factor.n_points()], order, observer)?;
-        Ok((Self { factor, solution: Arc::new(solution) }, (!has_kink).then_some(jets)))
-    }
-
     /// Evaluates at queries `[m, d]`.
     ///
     /// # Errors

@@ -2,9 +2,11 @@
 
 use pulp::Simd;
 
-use super::Profile;
+use super::facts::{Facts, analytic_length_scale};
+use super::profile::Profile;
 use crate::numerics::machine::exp::exp_minus;
 use crate::numerics::machine::registers::Pack;
+use crate::numerics::points::sampling::Scales;
 
 pub(super) struct Gauss;
 
@@ -14,5 +16,15 @@ impl Profile for Gauss {
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
         let e = exp_minus(q);
         [e, -e, e]
+    }
+}
+
+impl Facts for Gauss {
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        analytic_length_scale(scales)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (0, 0.0)
     }
 }

@@ -2,8 +2,10 @@
 
 use pulp::Simd;
 
-use super::Profile;
+use super::facts::{Facts, analytic_length_scale};
+use super::profile::Profile;
 use crate::numerics::machine::registers::Pack;
+use crate::numerics::points::sampling::Scales;
 
 pub(super) struct InverseMultiquadric;
 
@@ -15,5 +17,15 @@ impl Profile for InverseMultiquadric {
         let phi = inverse.sqrt();
         let first = -0.5 * phi * inverse;
         [phi, first, -1.5 * first * inverse]
+    }
+}
+
+impl Facts for InverseMultiquadric {
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        analytic_length_scale(scales)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (4, 0.0)
     }
 }

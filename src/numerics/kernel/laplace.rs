@@ -3,9 +3,11 @@
 
 use pulp::Simd;
 
-use super::{Profile, TINY};
+use super::facts::Facts;
+use super::profile::{Profile, TINY};
 use crate::numerics::machine::exp::exp_minus;
 use crate::numerics::machine::registers::Pack;
+use crate::numerics::points::sampling::Scales;
 
 pub(super) struct Laplace {
     pub(super) epsilon: f64,
@@ -20,5 +22,31 @@ impl Profile for Laplace {
         let e = exp_minus(t);
         let first = -0.5 * e * inverse;
         [e, first, -0.5 * first * inverse.mul_add(inverse, inverse)]
+    }
+}
+
+impl Facts for Laplace {
+    fn refused(&self) -> Option<(&'static str, &'static str)> {
+        (!(0.0..=1e5).contains(&self.epsilon)).then_some(("epsilon", "must be between 0 and 1e5"))
+    }
+
+    fn at_zero(&self) -> f64 {
+        (-self.epsilon.sqrt()).exp()
+    }
+
+    fn has_kink(&self) -> bool {
+        self.epsilon == 0.0
+    }
+
+    fn cusp_width(&self) -> Option<f64> {
+        Some(self.epsilon.sqrt())
+    }
+
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        0.5 * scales.radius
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (1, self.epsilon)
     }
 }

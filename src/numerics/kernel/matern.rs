@@ -5,17 +5,62 @@
 
 use pulp::Simd;
 
-use super::{Profile, TINY};
+use super::facts::{Facts, SMOOTH_SPACINGS};
+use super::laplace::Laplace;
+use super::profile::{Pairs, Profile, Profiles, TINY};
 use crate::numerics::machine::exp::exp_minus;
 use crate::numerics::machine::registers::Pack;
+use crate::numerics::points::sampling::Scales;
+
+/// The greatest order p, ν = p + ½.
+pub const MAX_MATERN_ORDER: u8 = 8;
 
 /// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
 const FAR: f64 = 1e3;
 
-/// ν = P + ½ for the orders that are used most, P of 1 or 2.
-pub(super) struct Matern<const P: u8>;
+pub(super) struct Matern {
+    pub(super) order: u8,
+}
 
-impl<const P: u8> Profile for Matern<P> {
+impl Profiles for Matern {
+    #[inline(always)]
+    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
+        match self.order {
+            // s = r: the same formula, and one loop less to compile.
+            0 => Laplace { epsilon: 0.0 }.run(pairs),
+            1 => OfOrder::<1>.run(pairs),
+            2 => OfOrder::<2>.run(pairs),
+            order => OfAnyOrder { order }.run(pairs),
+        }
+    }
+}
+
+impl Facts for Matern {
+    fn refused(&self) -> Option<(&'static str, &'static str)> {
+        (self.order > MAX_MATERN_ORDER).then_some(("nu", "must be one of 0.5, 1.5, ..., 8.5"))
+    }
+
+    fn has_kink(&self) -> bool {
+        self.order == 0
+    }
+
+    fn cusp_width(&self) -> Option<f64> {
+        self.has_kink().then_some(0.0)
+    }
+
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        (SMOOTH_SPACINGS * scales.spacing).min(2.0 * scales.radius)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (2, f64::from(self.order))
+    }
+}
+
+/// ν = P + ½ for the orders that are used most, P of 1 or 2.
+struct OfOrder<const P: u8>;
+
+impl<const P: u8> Profile for OfOrder<P> {
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
         profile(q, P)
@@ -23,11 +68,11 @@ impl<const P: u8> Profile for Matern<P> {
 }
 
 /// ν = order + ½ for any order: its loop is not unrolled.
-pub(super) struct SmoothMatern {
-    pub(super) order: u8,
+struct OfAnyOrder {
+    order: u8,
 }
 
-impl Profile for SmoothMatern {
+impl Profile for OfAnyOrder {
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
         profile(q, self.order)

@@ -4,7 +4,7 @@ use pulp::WithSimd;
 
 use super::*;
 use crate::numerics::machine::instruction_set::InstructionSet;
-use crate::numerics::machine::registers::{BLOCK, Block};
+use crate::numerics::machine::registers::{BLOCK, Block, Pack};
 
 /// Every family at parameters that a user might choose.
 pub(crate) fn all_families() -> Vec<Family> {

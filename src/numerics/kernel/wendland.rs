@@ -5,8 +5,56 @@
 
 use pulp::Simd;
 
-use super::{Profile, TINY};
+use super::facts::{Facts, SMOOTH_SPACINGS};
+use super::profile::{Pairs, Profile, Profiles, TINY};
 use crate::numerics::machine::registers::Pack;
+use crate::numerics::points::sampling::Scales;
+
+/// The greatest dimension in which φ_{3,k} is positive definite (Wendland 1995).
+const MAX_DIMENSION: usize = 3;
+
+/// How often a Wendland function is differentiable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WendlandSmoothness {
+    C2,
+    C4,
+    C6,
+}
+
+pub(super) struct Wendland {
+    pub(super) smoothness: WendlandSmoothness,
+}
+
+impl Profiles for Wendland {
+    #[inline(always)]
+    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
+        match self.smoothness {
+            WendlandSmoothness::C2 => C2.run(pairs),
+            WendlandSmoothness::C4 => C4.run(pairs),
+            WendlandSmoothness::C6 => C6.run(pairs),
+        }
+    }
+}
+
+impl Facts for Wendland {
+    fn max_dimension(&self) -> Option<usize> {
+        Some(MAX_DIMENSION)
+    }
+
+    /// The support must reach well past the neighbours.
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        (SMOOTH_SPACINGS * scales.spacing).min(4.0 * scales.radius)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        let smoothness = match self.smoothness {
+            WendlandSmoothness::C2 => 2.0,
+            WendlandSmoothness::C4 => 4.0,
+            WendlandSmoothness::C6 => 6.0,
+        };
+        (3, smoothness)
+    }
+}
 
 /// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it.
 #[inline(always)]
@@ -15,7 +63,7 @@ fn cut_off<S: Simd>(q: Pack<S>) -> (Pack<S>, Pack<S>) {
     (r, 1.0 - r)
 }
 
-pub(super) struct C2;
+struct C2;
 
 impl Profile for C2 {
     /// C²: φ = (1−r)⁴(4r+1), φ′ = −10(1−r)³, φ″ = 15(1−r)²/r.
@@ -27,7 +75,7 @@ impl Profile for C2 {
     }
 }
 
-pub(super) struct C4;
+struct C4;
 
 impl Profile for C4 {
     /// C⁴: φ = (1−r)⁶(35r²+18r+3)/3, φ′ = −(28/3)(1−r)⁵(5r+1), φ″ = 140(1−r)⁴.
@@ -44,7 +92,7 @@ impl Profile for C4 {
     }
 }
 
-pub(super) struct C6;
+struct C6;
 
 impl Profile for C6 {
     /// C⁶: φ = (1−r)⁸(32r³+25r²+8r+1), φ′ = −11(1−r)⁷(16r²+7r+1), φ″ = 132(1−r)⁶(6r+1).

@@ -1,16 +1,20 @@
 //! Eigenvalues of the small symmetric matrices that shape operators are.
 
+use smallvec::SmallVec;
+
+use super::small::{Small, zeros};
+
 /// Sweeps after which Jacobi has converged to rounding for any matrix of the sizes met here.
 const MAX_SWEEPS: usize = 30;
 
-/// Eigenvalues in ascending order with orthonormal eigenvectors: `vectors[k]` belongs to `values[k]`.
+/// Eigenvalues in ascending order with orthonormal eigenvectors as rows, `[k, k]`: row i belongs to `values[i]`.
 ///
 /// Cyclic Jacobi rotations (Golub and Van Loan 2013, sec. 8.5), accurate to rounding relative to the norm of the matrix,
 /// given row-major `[k, k]`. Reads the upper triangle.
-pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let mut a = matrix.to_vec();
-    let mut v: Vec<Vec<f64>> =
-        (0..k).map(|i| (0..k).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Small, Small) {
+    let mut a = Small::from_slice(matrix);
+    let mut v = zeros(k * k);
+    (0..k).for_each(|i| v[i * k + i] = 1.0);
     for _ in 0..MAX_SWEEPS {
         let mut rotated = false;
         for p in 0..k {
@@ -22,13 +26,14 @@ pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Vec<f64>, Vec<Vec<f6
             break;
         }
     }
-    let mut order: Vec<usize> = (0..k).collect();
+    let mut order: SmallVec<[usize; 16]> = (0..k).collect();
     order.sort_by(|&i, &j| a[i * k + i].total_cmp(&a[j * k + j]));
-    (order.iter().map(|&i| a[i * k + i]).collect(), order.iter().map(|&i| v[i].clone()).collect())
+    let values = order.iter().map(|&i| a[i * k + i]).collect();
+    (values, order.iter().flat_map(|&i| &v[i * k..][..k]).copied().collect())
 }
 
 /// Annihilates `a[p][q]`; answers whether it was worth it.
-fn rotate(a: &mut [f64], v: &mut [Vec<f64>], k: usize, p: usize, q: usize) -> bool {
+fn rotate(a: &mut [f64], v: &mut [f64], k: usize, p: usize, q: usize) -> bool {
     let (app, aqq, apq) = (a[p * k + p], a[q * k + q], a[p * k + q]);
     if apq.abs() <= 0.25 * f64::EPSILON * (app.abs() * aqq.abs()).sqrt() || apq == 0.0 {
         return false;
@@ -46,8 +51,8 @@ fn rotate(a: &mut [f64], v: &mut [Vec<f64>], k: usize, p: usize, q: usize) -> bo
         a[at_p] = c * x - s * y;
         a[at_q] = s * x + c * y;
     }
-    let (before, from_q) = v.split_at_mut(q);
-    for (x, y) in before[p].iter_mut().zip(&mut from_q[0]) {
+    let (before, from_q) = v.split_at_mut(q * k);
+    for (x, y) in before[p * k..][..k].iter_mut().zip(&mut from_q[..k]) {
         (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
     }
     true
@@ -71,15 +76,15 @@ mod tests {
             let matrix: Vec<f64> = (0..k * k).map(|at| entry(at / k, at % k)).collect();
             let (values, vectors) = symmetric_eigen(&matrix, k);
             prop_assert!(values.windows(2).all(|w| w[0] <= w[1]));
-            for (value, vector) in values.iter().zip(&vectors) {
+            for (value, vector) in values.iter().zip(vectors.chunks(k)) {
                 for i in 0..k {
                     let image: f64 = (0..k).map(|j| matrix[i * k + j] * vector[j]).sum();
                     // Rounding is a small multiple of ε times the norm, at most 18 here.
                     prop_assert!((image - value * vector[i]).abs() < 1e-13);
                 }
             }
-            for (a, x) in vectors.iter().enumerate() {
-                for (b, y) in vectors.iter().enumerate() {
+            for (a, x) in vectors.chunks(k).enumerate() {
+                for (b, y) in vectors.chunks(k).enumerate() {
                     let dot: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();
                     prop_assert!((dot - f64::from(u8::from(a == b))).abs() < 1e-14);
                 }
@@ -90,7 +95,7 @@ mod tests {
     #[test]
     fn equal_eigenvalues_keep_an_orthonormal_basis() {
         let (values, vectors) = symmetric_eigen(&[2.0, 0.0, 0.0, 2.0], 2);
-        assert_eq!(values, [2.0, 2.0]);
-        assert_eq!(vectors, [[1.0, 0.0], [0.0, 1.0]]);
+        assert_eq!(values[..], [2.0, 2.0]);
+        assert_eq!(vectors[..], [1.0, 0.0, 0.0, 1.0]);
     }
 }

@@ -7,4 +7,5 @@ pub mod pages;
 pub(crate) mod eigen;
 pub(crate) mod exp;
 pub(crate) mod registers;
+pub(crate) mod small;
 pub(crate) mod vector;

@@ -1,5 +1,7 @@
 //! Small vectors as slices.
 
+use super::small::Small;
+
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -10,27 +12,27 @@ pub(crate) fn norm(v: &[f64]) -> f64 {
 
 /// The vector of length 1 in the same direction; zero for zero. Components are scaled first, so that none is lost to the range
 /// of float64.
-pub(crate) fn unit(v: &[f64]) -> Vec<f64> {
+pub(crate) fn unit(v: &[f64]) -> Small {
     let largest = v.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 {
-        return v.to_vec();
+        return Small::from_slice(v);
     }
-    let scaled: Vec<f64> = v.iter().map(|c| c / largest).collect();
+    let scaled: Small = v.iter().map(|c| c / largest).collect();
     let length = norm(&scaled);
     scaled.iter().map(|c| c / length).collect()
 }
 
-/// An orthonormal basis of ν's complement: the other columns of the Householder reflection that maps ν to ±e₁.
-pub(crate) fn tangent_basis(normal: &[f64]) -> Vec<Vec<f64>> {
+/// An orthonormal basis of ν's complement as rows, `[d−1, d]`: the other columns of the Householder reflection that maps ν to
+/// ±e₁.
+pub(crate) fn tangent_basis(normal: &[f64]) -> Small {
     let d = normal.len();
     let sign = if normal[0] < 0.0 { -1.0 } else { 1.0 };
-    let mut w = normal.to_vec();
+    let mut w = Small::from_slice(normal);
     w[0] += sign;
     // |w|² = 2(1 + |ν₁|) for a unit ν: no cancellation by the choice of sign.
     let factor = 1.0 / (1.0 + normal[0].abs());
-    (1..d)
-        .map(|axis| (0..d).map(|i| f64::from(u8::from(i == axis)) - factor * w[i] * w[axis]).collect())
-        .collect()
+    let entry = |axis: usize, i: usize| f64::from(u8::from(i == axis)) - factor * w[i] * w[axis];
+    (1..d).flat_map(|axis| (0..d).map(move |i| (axis, i))).map(|(axis, i)| entry(axis, i)).collect()
 }
 
 #[cfg(test)]
@@ -44,16 +46,16 @@ mod tests {
             assert!((found[0] - 0.6).abs() < 1e-15 && (found[2] + 0.8).abs() < 1e-15, "{size}: {found:?}");
         }
         // Normals of merged points may cancel.
-        assert_eq!(unit(&[0.0, 0.0]), [0.0, 0.0]);
+        assert_eq!(unit(&[0.0, 0.0])[..], [0.0, 0.0]);
     }
 
     #[test]
     fn tangent_bases_are_orthonormal_for_every_normal() {
         for normal in [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [-0.48, 0.6, 0.64]] {
             let basis = tangent_basis(&normal);
-            for (i, a) in basis.iter().enumerate() {
+            for (i, a) in basis.chunks(3).enumerate() {
                 assert!(dot(a, &normal).abs() < 1e-15);
-                for (j, b) in basis.iter().enumerate() {
+                for (j, b) in basis.chunks(3).enumerate() {
                     assert!((dot(a, b) - f64::from(u8::from(i == j))).abs() < 1e-15);
                 }
             }

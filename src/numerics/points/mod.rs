@@ -4,5 +4,8 @@ pub mod cloud;
 pub mod duplicates;
 pub mod neighbours;
 pub mod noise;
+pub mod sampling;
 
+pub(crate) mod local_quadrics;
 pub(crate) mod patch;
+pub(crate) mod quadric;

@@ -71,44 +71,59 @@ impl Neighbours {
 
     /// The `count` nearest points to `x`, nearest first; fewer if the cloud has fewer.
     pub fn nearest(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
-        self.search(cloud, x, count, 0.0)
+        let mut found = Vec::new();
+        self.search(cloud, x, count, 0.0, &mut found);
+        found
+    }
+
+    /// [`Neighbours::nearest`] into a list that is there already.
+    pub fn nearest_into(&self, cloud: &Cloud, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        self.search(cloud, x, count, 0.0, found);
     }
 
     /// The `count` nearest points that do not coincide with `x`, nearest first.
     pub fn nearest_elsewhere(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
-        self.search(cloud, x, count, f64::from_bits(1))
+        let mut found = Vec::new();
+        self.search(cloud, x, count, f64::from_bits(1), &mut found);
+        found
     }
 
     /// The `count` nearest positions, each by its first point, nearest first: repeated observations count once.
     pub fn nearest_positions(&self, cloud: &Cloud, x: &[f64], count: usize) -> Vec<Neighbour> {
-        self.positions(cloud, x, count, 0.0)
+        let mut found = Vec::new();
+        self.positions(cloud, x, count, 0.0, &mut found);
+        found
     }
 
-    fn positions(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64) -> Vec<Neighbour> {
+    /// [`Neighbours::nearest_positions`] into a list that is there already.
+    pub fn nearest_positions_into(&self, cloud: &Cloud, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        self.positions(cloud, x, count, 0.0, found);
+    }
+
+    fn positions(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64, found: &mut Vec<Neighbour>) {
         let mut n_asked = count;
         loop {
-            let found = self.search(cloud, x, n_asked, at_least);
+            self.search(cloud, x, n_asked, at_least, found);
             let n_found = found.len();
-            let mut distinct: Vec<Neighbour> = Vec::with_capacity(count);
-            for next in found {
-                // Coinciding points are equally far.
-                let peers = distinct.iter().rev().take_while(|d| d.squared_distance == next.squared_distance);
-                let is_known = peers.into_iter().any(|d| cloud.point(d.point) == cloud.point(next.point));
-                if !is_known && distinct.len() < count {
-                    distinct.push(next);
-                }
-            }
-            if distinct.len() == count || n_found < n_asked {
-                return distinct;
+            keep_positions(cloud, found);
+            if found.len() >= count || n_found < n_asked {
+                found.truncate(count);
+                return;
             }
             n_asked *= 2;
         }
     }
 
-    /// The least and the mean distance from a point to its `count` nearest positions elsewhere, unit L; `None` if there are
-    /// none.
-    pub fn nearest_and_mean(&self, cloud: &Cloud, point: usize, count: usize) -> Option<(f64, f64)> {
-        let found = self.positions(cloud, cloud.point(point), count, f64::from_bits(1));
+    /// The least and the mean distance from a point to its `count` nearest positions elsewhere, unit L, with a list to put them
+    /// into; `None` if there are none.
+    pub fn nearest_and_mean(
+        &self,
+        cloud: &Cloud,
+        point: usize,
+        count: usize,
+        found: &mut Vec<Neighbour>,
+    ) -> Option<(f64, f64)> {
+        self.positions(cloud, cloud.point(point), count, f64::from_bits(1), found);
         let distances = found.iter().map(|n| n.squared_distance.sqrt());
         Some((distances.clone().next()?, distances.sum::<f64>() / found.len() as f64))
     }
@@ -122,12 +137,11 @@ impl Neighbours {
             .collect()
     }
 
-    fn search(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64) -> Vec<Neighbour> {
-        let mut found = Vec::with_capacity(count + 1);
+    fn search(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64, found: &mut Vec<Neighbour>) {
+        found.clear();
         if count > 0 {
-            self.visit(cloud, x, 0, &mut Search { count, at_least, found: &mut found });
+            self.visit(cloud, x, 0, &mut Search { count, at_least, found });
         }
-        found
     }
 
     fn visit(&self, cloud: &Cloud, x: &[f64], node: usize, search: &mut Search<'_>) {
@@ -186,6 +200,22 @@ impl Search<'_> {
             self.found.truncate(self.count);
         }
     }
+}
+
+/// Of sorted neighbours, those at a position that none before them has.
+fn keep_positions(cloud: &Cloud, found: &mut Vec<Neighbour>) {
+    let mut n_kept = 0;
+    for at in 0..found.len() {
+        let next = found[at];
+        // Coinciding points are equally far.
+        let peers = found[..n_kept].iter().rev().take_while(|d| d.squared_distance == next.squared_distance);
+        let is_known = peers.into_iter().any(|d| cloud.point(d.point) == cloud.point(next.point));
+        if !is_known {
+            found[n_kept] = next;
+            n_kept += 1;
+        }
+    }
+    found.truncate(n_kept);
 }
 
 fn widest_axis(cloud: &Cloud, order: &[u32]) -> (usize, f64) {
@@ -250,7 +280,7 @@ mod tests {
             [Neighbour { point: 2, squared_distance: 9.0 }]
         );
         assert_eq!(tree.spacings(&cloud), [3.0, 3.0, 3.0]);
-        assert_eq!(tree.nearest_and_mean(&cloud, 2, 4), Some((3.0, 3.0)));
+        assert_eq!(tree.nearest_and_mean(&cloud, 2, 4, &mut Vec::new()), Some((3.0, 3.0)));
     }
 
     #[test]
@@ -262,12 +292,12 @@ mod tests {
         };
         assert_eq!(points(3), [0, 1, 3]);
         assert_eq!(points(9), [0, 1, 3, 6]);
-        assert_eq!(tree.nearest_and_mean(&cloud, 0, 2), Some((1.0, 1.0)));
+        assert_eq!(tree.nearest_and_mean(&cloud, 0, 2, &mut Vec::new()), Some((1.0, 1.0)));
     }
 
     #[test]
     fn a_single_point_has_no_spacing() {
         let cloud = Cloud::new(vec![1.0, 2.0], 2).unwrap();
-        assert_eq!(Neighbours::of(&cloud).nearest_and_mean(&cloud, 0, 4), None);
+        assert_eq!(Neighbours::of(&cloud).nearest_and_mean(&cloud, 0, 4, &mut Vec::new()), None);
     }
 }

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use super::neighbours::Neighbours;
-use super::patch::{Patch, n_coefficients};
-use crate::numerics::defaults::median;
+use super::patch::Patch;
+use super::quadric::{Quadric, n_coefficients};
+use super::sampling::median;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 
@@ -46,8 +47,8 @@ pub fn estimate_noise(
         let nearest = neighbours.nearest_positions(cloud, x, n_large);
         let variance = |count: usize| {
             let nearest = nearest.get(..count)?;
-            let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point).collect())?;
-            Some((patch.quadric()?.residual * patch.radius).powi(2))
+            let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
+            Some((Quadric::of(&patch)?.residual * patch.radius).powi(2))
         };
         Some((growth * variance(n_small)? - variance(n_large)?) / (growth - 1.0))
     };

@@ -6,11 +6,12 @@
 //! Clouds so small that no patch lies on one side of them have a third (T3): whether the signature function would have
 //! predicted the points nearby, had each of them been left out.
 
+use super::Surface;
 use super::curvature::principal_curvatures;
-use super::offset::rescue;
+use super::offset::offset_jet_at;
 use crate::numerics::machine::vector::dot;
-use crate::numerics::points::patch::LocalFit;
-use crate::numerics::surface::{SPACING_NEIGHBOURS, Surface};
+use crate::numerics::points::local_quadrics::LocalQuadric;
+use crate::numerics::points::sampling::SPACING_NEIGHBOURS;
 
 /// Differences, against the largest curvature, up to which the quadric confirms, and up to which the patch does.
 const CONFIRMED_BY_QUADRIC: f64 = 0.07;
@@ -39,7 +40,7 @@ const PREDICTED_TURN: f64 = 1.2;
 const LEFT_OUT_MISS: f64 = 0.01;
 
 /// Curvatures at a query, to be confirmed.
-pub(crate) struct Claim<'a> {
+pub(crate) struct Unconfirmed<'a> {
     pub x: &'a [f64],
     /// h_q, unit L.
     pub spacing: f64,
@@ -48,15 +49,15 @@ pub(crate) struct Claim<'a> {
     pub normal: &'a [f64],
     /// |∇u| of the function that gave them.
     pub gradient_norm: f64,
-    pub fit: Option<&'a LocalFit>,
+    pub quadric: Option<LocalQuadric<'a>>,
     pub is_offset: bool,
     /// Whether the cost of a patch was admitted.
     pub may_use_patch: bool,
 }
 
-impl Claim<'_> {
+impl Unconfirmed<'_> {
     /// Whether the points around x confirm the curvatures.
-    pub(crate) fn is_confirmed(&self, surface: &Surface) -> bool {
+    pub(crate) fn is_confirmed_by(&self, surface: &Surface) -> bool {
         let is_noisy = self.is_noisy(surface);
         if self.is_offset {
             let difference = self.difference_from_quadric(surface);
@@ -81,7 +82,7 @@ impl Claim<'_> {
     /// of one over its radius.
     fn is_noisy(&self, surface: &Surface) -> bool {
         let scale = self.largest().max(0.5 / surface.radius());
-        self.fit.is_some_and(|fit| fit.uncertainty > NOISY * scale)
+        self.quadric.is_some_and(|quadric| quadric.uncertainty > NOISY * scale)
     }
 
     fn largest(&self) -> f64 {
@@ -89,20 +90,20 @@ impl Claim<'_> {
     }
 
     fn is_confirmed_by_quadric(&self, surface: &Surface) -> bool {
-        self.fit.is_some_and(|fit| fit.bend() < QUADRIC_BEND)
+        self.quadric.is_some_and(|quadric| quadric.bend() < QUADRIC_BEND)
             && self
                 .difference_from_quadric(surface)
                 .is_some_and(|difference| difference <= CONFIRMED_BY_QUADRIC)
     }
 
     fn difference_from_quadric(&self, surface: &Surface) -> Option<f64> {
-        let fit = self.fit.filter(|fit| fit.is_reliable())?;
-        Some(self.difference(surface, &fit.curvatures_for(self.normal)))
+        let quadric = self.quadric.filter(|quadric| quadric.is_reliable())?;
+        Some(self.difference(surface, &quadric.curvatures_for(self.normal)))
     }
 
     /// `None` where there is no patch.
     fn is_confirmed_by_patch(&self, surface: &Surface) -> Option<bool> {
-        let jet = rescue(surface, self.x)?;
+        let jet = offset_jet_at(surface, self.x)?;
         let side = dot(&jet.gradient, self.normal).signum();
         let (curvatures, _) = principal_curvatures(&jet.gradient, &jet.hessian, side);
         Some(self.difference(surface, &curvatures) <= CONFIRMED_BY_PATCH)
@@ -118,11 +119,12 @@ impl Claim<'_> {
     /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ 0.01 |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
     /// that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &Surface) -> bool {
-        let nearest = surface.neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
+        let nearest =
+            surface.sampling().neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
         // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
         let is_at_point =
             nearest.first().is_some_and(|found| found.squared_distance <= (0.5 * self.spacing).powi(2));
-        if !is_at_point || self.fit.is_some_and(|fit| fit.is_at_rim && fit.is_reliable()) {
+        if !is_at_point || self.quadric.is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable()) {
             return false;
         }
         let Some(misses) = surface.left_out_misses() else { return false };

@@ -1,38 +1,35 @@
 //! The shape operator of a level surface, from the gradient and the Hessian of its function.
 
 use crate::numerics::machine::eigen::symmetric_eigen;
+use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::machine::vector::{dot, norm, tangent_basis};
 
-/// Principal curvatures `[d−1]`, ascending, 1/L, and their directions: eigenpairs of `S = σ P D²u P/|∇u|`,
+/// Principal curvatures `[d−1]`, ascending, 1/L, and their directions `[d−1, d]`: eigenpairs of `S = σ P D²u P/|∇u|`,
 /// `P = I − ννᵀ`, ν = σ∇u/|∇u|, on the tangent space (errata.md, 3).
 ///
 /// Directions are orthonormal and tangent, the component of largest magnitude positive. Sphere of radius r, ν outward: all
 /// +1/r. The gradient must not be zero.
-pub(crate) fn principal_curvatures(
-    gradient: &[f64],
-    hessian: &[f64],
-    sign: f64,
-) -> (Vec<f64>, Vec<Vec<f64>>) {
+pub(crate) fn principal_curvatures(gradient: &[f64], hessian: &[f64], sign: f64) -> (Small, Small) {
     let d = gradient.len();
     let length = norm(gradient);
-    let normal: Vec<f64> = gradient.iter().map(|g| g / length).collect();
+    let normal: Small = gradient.iter().map(|g| g / length).collect();
     let basis = tangent_basis(&normal);
-    let image = |v: &[f64]| (0..d).map(|i| dot(&hessian[i * d..][..d], v)).collect::<Vec<f64>>();
-    let images: Vec<Vec<f64>> = basis.iter().map(|v| image(v)).collect();
-    let scale = sign / length;
-    let shape: Vec<f64> = basis.iter().flat_map(|a| images.iter().map(move |b| scale * dot(a, b))).collect();
-    let (values, vectors) = symmetric_eigen(&shape, d - 1);
-    (values, vectors.iter().map(|vector| in_space(&basis, vector)).collect())
-}
-
-/// The tangent vector with these coordinates in a basis, its largest component positive.
-fn in_space(basis: &[Vec<f64>], coordinates: &[f64]) -> Vec<f64> {
-    let mut v = vec![0.0; basis.len() + 1];
-    for (axis, c) in basis.iter().zip(coordinates) {
-        v.iter_mut().zip(axis).for_each(|(v, a)| *v += c * a);
+    let mut images = zeros(basis.len());
+    for (image, v) in images.chunks_exact_mut(d).zip(basis.chunks_exact(d)) {
+        image.iter_mut().zip(hessian.chunks_exact(d)).for_each(|(slot, row)| *slot = dot(row, v));
     }
-    make_largest_positive(&mut v);
-    v
+    let scale = sign / length;
+    let shape: Small =
+        basis.chunks_exact(d).flat_map(|a| images.chunks_exact(d).map(move |b| scale * dot(a, b))).collect();
+    let (values, vectors) = symmetric_eigen(&shape, d - 1);
+    let mut directions = zeros(basis.len());
+    for (direction, vector) in directions.chunks_exact_mut(d).zip(vectors.chunks_exact(d - 1)) {
+        for (axis, c) in basis.chunks_exact(d).zip(vector) {
+            direction.iter_mut().zip(axis).for_each(|(v, a)| *v += c * a);
+        }
+        make_largest_positive(direction);
+    }
+    (values, directions)
 }
 
 /// Flips a vector so that its component of largest magnitude is positive; the first of several.
@@ -41,4 +38,12 @@ fn make_largest_positive(v: &mut [f64]) {
     if largest < 0.0 {
         v.iter_mut().for_each(|x| *x = -*x);
     }
+}
+
+/// `tr H − νᵀHν`: the trace over the tangent space.
+pub(crate) fn tangential_trace(hessian: &[f64], normal: &[f64]) -> f64 {
+    let d = normal.len();
+    let trace: f64 = (0..d).map(|i| hessian[i * d + i]).sum();
+    let normal_part: f64 = (0..d).map(|i| normal[i] * dot(&hessian[i * d..][..d], normal)).sum();
+    trace - normal_part
 }

@@ -1,8 +1,10 @@
 //! Where geometry has no meaning, or less accuracy than it seems: the criteria of docs/numerics.md, Geometry.
 
 use crate::numerics::function::interpolant::Interpolant;
-use crate::numerics::kernel::{Family, Kernel};
-use crate::numerics::machine::vector::norm;
+use crate::numerics::kernel::Kernel;
+use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::points::local_quadrics::LocalQuadric;
+use crate::numerics::points::sampling::Scales;
 use crate::numerics::sums::jets::Jets;
 
 /// What is wrong at a query.
@@ -49,11 +51,14 @@ const SCALE_FACTOR: f64 = 0.05;
 /// The same fraction below which a gradient is weak: the error that the sampling leaves in it shows in the curvatures.
 const WEAK_FACTOR: f64 = 0.25;
 
+/// Cosine between ∇u and the normal of a reliable quadric below which ∇u is not normal to the surface at all.
+const OBLIQUE: f64 = 0.5;
+
 /// Spacings from the nearest point beyond which a query is far from the cloud.
 const FAR_SPACINGS: f64 = 3.0;
 
 /// T1: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
-pub(crate) fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) -> bool {
+fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) -> bool {
     let length_scale = signature.factor.kernel().length_scale();
     let (value, slope) = jets.magnitudes(query);
     let rounding = f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
@@ -61,7 +66,7 @@ pub(crate) fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) ->
 }
 
 /// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`.
-pub(crate) fn turns_within_spacing(jets: &Jets, query: usize, spacing: f64) -> bool {
+fn turns_within_spacing(jets: &Jets, query: usize, spacing: f64) -> bool {
     norm(jets.gradient(query)) < SCALE_FACTOR * spacing * norm(&jets.hessian(query))
 }
 
@@ -75,12 +80,26 @@ pub(crate) fn is_far(squared_distance: f64, spacing: f64) -> bool {
     squared_distance > (FAR_SPACINGS * spacing).powi(2)
 }
 
-/// Whether second derivatives at the points see a cusp: the rounding √ε ℓ of a Laplace kernel is below the median distance
-/// `spacing` to the nearest point.
-pub(crate) fn is_too_rough(kernel: &Kernel, spacing: f64) -> bool {
-    match kernel.family() {
-        Family::Laplace { epsilon } => epsilon.sqrt() * kernel.length_scale() < spacing,
-        Family::Matern { order } => order == 0,
-        Family::Gauss | Family::Wendland { .. } | Family::InverseMultiquadric => false,
+/// Whether ∇u is no normal at a query: rounding (T1), no direction at the scale of the sampling (T2), or oblique to a
+/// reliable quadric.
+pub(crate) fn vanishes(
+    signature: &Interpolant,
+    jets: &Jets,
+    query: usize,
+    spacing: f64,
+    quadric: Option<LocalQuadric<'_>>,
+) -> bool {
+    let gradient = jets.gradient(query);
+    if is_rounding(signature, jets, query) || turns_within_spacing(jets, query, spacing) {
+        return true;
     }
+    quadric
+        .filter(LocalQuadric::is_reliable)
+        .is_some_and(|quadric| dot(gradient, quadric.normal).abs() < OBLIQUE * norm(gradient))
+}
+
+/// Whether second derivatives at the points see a cusp: what rounds it is narrower than the median distance to the nearest point.
+pub(crate) fn is_too_rough(kernel: &Kernel, scales: &Scales) -> bool {
+    let nearest = scales.nearest_range().map_or(0.0, |range| range.median);
+    kernel.family().cusp_width().is_some_and(|width| width * kernel.length_scale() < nearest)
 }

@@ -3,78 +3,21 @@
 use rayon::prelude::*;
 
 use super::Surface;
-use super::curvature::principal_curvatures;
-use super::degeneracy::{Degeneracy, DegeneracyReason};
-use super::serving::Examination;
+use super::curvature::{principal_curvatures, tangential_trace};
+use super::degeneracy::Degeneracy;
+pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
+use super::serving::{Served, serve};
 use crate::numerics::error::NumericsError;
-use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-
-/// Which way normals point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Orientation {
-    /// Out of closed surfaces: ν = −∇u/|∇u| (errata.md, 2), with signs repaired where neighbours contradict it.
-    Outward,
-    /// ν = +∇u/|∇u|, whatever its sign.
-    Gradient,
-}
-
-/// Which function's level surface is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SurfaceModel {
-    /// The signature function, and the offset model where its gradient vanishes.
-    Auto,
-    Signature,
-    Offset,
-}
-
-/// What is asked of a geometry.
-#[derive(Debug, Clone, Copy)]
-pub struct GeometryRequest {
-    pub orientation: Orientation,
-    pub model: SurfaceModel,
-    /// Whether second derivatives are served: they are checked against the neighbours and the cusp of the kernel.
-    pub checks_curvatures: bool,
-    /// Queries at which the offset model may be asked where the signature function has no answer; beyond them the answer is
-    /// null. With more queries than that it confirms no curvatures either.
-    pub max_offsets: usize,
-}
-
-impl GeometryRequest {
-    /// Everything on: outward curvatures, checked, with all the work that they take.
-    pub const CURVATURES: Self = Self {
-        orientation: Orientation::Outward,
-        model: SurfaceModel::Auto,
-        checks_curvatures: true,
-        max_offsets: usize::MAX,
-    };
-}
-
-/// What is known of the surface at one query.
-pub(crate) struct Answer {
-    /// ∇u of the function that serves the query, `[d]`.
-    pub gradient: Vec<f64>,
-    /// Its Hessian, `[d, d]`.
-    pub hessian: Vec<f64>,
-    /// ν against ∇u: +1 or −1.
-    pub sign: f64,
-    pub is_offset: bool,
-    pub reason: Option<DegeneracyReason>,
-}
-
-impl Answer {
-    fn is_null(&self) -> bool {
-        self.reason.is_some_and(DegeneracyReason::is_null)
-    }
-}
 
 /// First and second order geometry of the surface at m queries, d ≥ 2.
 ///
 /// Where a query has no answer its normal is zero and meaningless: ask [`Geometry::is_null`] first.
 pub struct Geometry {
-    answers: Vec<Answer>,
-    levels: Vec<f64>,
+    served: Served,
+    /// `[m]`
     gradient_norms: Vec<f64>,
     /// `[m, d]`, norm 1.
     normals: Vec<f64>,
@@ -105,34 +48,32 @@ impl Geometry {
         request: &GeometryRequest,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let d = queries.dimension();
-        let examination = Examination::of(surface, queries, request, observer)?;
-        let answers = examination.answers(observer)?;
-        let gradient_norms: Vec<f64> = answers.iter().map(|answer| norm(&answer.gradient)).collect();
-        let mut normals = vec![0.0; answers.len() * d];
+        let served = serve(surface, queries, request, observer)?;
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let gradient_norms: Vec<f64> = (0..m).map(|query| norm(served.gradient(query))).collect();
+        let mut normals = vec![0.0; m * d];
         let mut degenerate = Vec::new();
-        for (query, (answer, normal)) in answers.iter().zip(normals.chunks_exact_mut(d)).enumerate() {
-            let gradient_norm = gradient_norms[query];
-            if let Some(reason) = answer.reason {
+        for (query, normal) in normals.chunks_exact_mut(d).enumerate() {
+            let (verdict, gradient_norm) = (served.verdict(query), gradient_norms[query]);
+            if let Some(reason) = verdict.reason {
                 degenerate.push(Degeneracy { query, reason, gradient_norm });
             }
-            if !answer.is_null() {
+            if !verdict.is_null() {
                 // Adding 0 turns −0 into 0.
-                let unit = answer.gradient.iter().map(|g| answer.sign * g / gradient_norm + 0.0);
+                let unit = served.gradient(query).iter().map(|g| verdict.sign * g / gradient_norm + 0.0);
                 normal.iter_mut().zip(unit).for_each(|(slot, c)| *slot = c);
             }
         }
-        let is_null = answers.iter().map(Answer::is_null).collect();
-        let levels = examination.into_levels();
-        Ok(Self { answers, levels, gradient_norms, normals, is_null, degenerate })
+        let is_null = (0..m).map(|query| served.verdict(query).is_null()).collect();
+        Ok(Self { served, gradient_norms, normals, is_null, degenerate })
     }
 
     pub fn n_queries(&self) -> usize {
-        self.answers.len()
+        self.is_null.len()
     }
 
     pub fn dimension(&self) -> usize {
-        self.normals.len() / self.answers.len()
+        self.normals.len() / self.n_queries()
     }
 
     /// Whether each query has no answer, `[m]`.
@@ -147,12 +88,12 @@ impl Geometry {
 
     /// Whether a query is served by the offset model.
     pub fn is_offset(&self, query: usize) -> bool {
-        self.answers[query].is_offset
+        self.served.verdict(query).is_offset
     }
 
     /// u at the queries, `[m]`: 1 on the surface at α = 0.
     pub fn levels(&self) -> &[f64] {
-        &self.levels
+        self.served.levels()
     }
 
     /// |∇u| of the function that serves each query, `[m]`: 1/L for the signature function, about 1 for the offset model.
@@ -173,8 +114,8 @@ impl Geometry {
 
     /// `tr(Dν) = σ(tr D²u − νᵀD²uν)/|∇u|` at a query: the sum of the principal curvatures, 1/L.
     pub fn trace_of_shape_operator(&self, query: usize) -> f64 {
-        let answer = &self.answers[query];
-        answer.sign * tangential_trace(&answer.hessian, self.normal(query)) / self.gradient_norms[query]
+        let trace = tangential_trace(self.served.hessian(query), self.normal(query));
+        self.served.verdict(query).sign * trace / self.gradient_norms[query]
     }
 
     /// Eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space (errata.md, 3).
@@ -201,24 +142,17 @@ impl Geometry {
             .filter(|(query, _)| !self.is_null[*query])
             .try_for_each(|(query, ((principal, directions), (mean, gaussian)))| {
                 observer.checkpoint()?;
-                let answer = &self.answers[query];
-                let (values, vectors) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
+                let sign = self.served.verdict(query).sign;
+                let (gradient, hessian) = (self.served.gradient(query), self.served.hessian(query));
+                let (values, vectors) = principal_curvatures(gradient, hessian, sign);
                 principal.copy_from_slice(&values);
-                directions.chunks_exact_mut(d).zip(&vectors).for_each(|(slot, v)| slot.copy_from_slice(v));
+                directions.copy_from_slice(&vectors);
                 *mean = values.iter().sum::<f64>() / k as f64;
                 *gaussian = values.iter().product();
                 Ok(())
             })?;
         Ok(curvatures)
     }
-}
-
-/// `tr H − νᵀHν`: the trace over the tangent space.
-pub(crate) fn tangential_trace(hessian: &[f64], normal: &[f64]) -> f64 {
-    let d = normal.len();
-    let trace: f64 = (0..d).map(|i| hessian[i * d + i]).sum();
-    let normal_part: f64 = (0..d).map(|i| normal[i] * dot(&hessian[i * d..][..d], normal)).sum();
-    trace - normal_part
 }
 
 #[cfg(test)]
@@ -228,6 +162,7 @@ mod tests {
     use super::*;
     use crate::numerics::function::interpolant::Interpolant;
     use crate::numerics::kernel::{Family, Kernel};
+    use crate::numerics::machine::vector::dot;
     use crate::numerics::observer::Unobserved;
     use crate::numerics::solver::GramFactor;
     use crate::numerics::sums::regularization::Regularization;

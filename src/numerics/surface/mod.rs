@@ -2,96 +2,56 @@
 
 pub mod degeneracy;
 pub mod geometry;
+pub mod level;
 pub mod operators;
 
 mod confirmation;
-pub(crate) mod curvature;
+mod curvature;
+mod directions;
 mod offset;
 mod orientation;
+mod request;
 mod serving;
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use rayon::prelude::*;
-
-use super::defaults::{Scales, median};
 use super::error::NumericsError;
 use super::observer::Observer;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
-use crate::numerics::machine::vector::{dot, norm, unit};
+use crate::numerics::machine::vector::dot;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::count_duplicates;
-use crate::numerics::points::neighbours::Neighbours;
-use crate::numerics::points::patch::{LocalFit, Patch, n_quadric_neighbours};
-use crate::numerics::sums::jets::{JetOrder, Jets};
-use degeneracy::{is_rounding, is_too_rough, turns_within_spacing};
-use orientation::{Directions, consistent_signs};
-
-/// Neighbours that define the sampling distance.
-pub(crate) const SPACING_NEIGHBOURS: usize = 4;
+use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::points::patch::Patch;
+use crate::numerics::points::quadric::n_quadric_neighbours;
+use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::numerics::sums::jets::Jets;
+use degeneracy::is_too_rough;
+use directions::Directions;
+use level::{Level, Signature};
+use orientation::Oriented;
+pub use orientation::SurfaceOrientation;
 
 /// Points up to which the diagonal of the inverse is computed: it costs three factorizations.
 const MAX_LEFT_OUT: usize = 512;
 
-/// Cosine between ∇u and the normal of a reliable local fit below which ∇u is not normal to the surface at all.
-const OBLIQUE: f64 = 0.5;
-
-/// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the points.
-const DIFFERENCE_STEP: f64 = 0.25;
-
-/// A signature function with local fits and consistently oriented normals at the points, d ≥ 2.
+/// A surface with local quadrics and consistently oriented normals at the points, d ≥ 2.
 ///
 /// Made once per factorization: it costs one evaluation at all points, and a quadric through the neighbours of each.
 pub struct Surface {
-    signature: Interpolant,
-    neighbours: Neighbours,
-    /// At the points; absent for kernels with a kink there.
-    jets: Option<Jets>,
-    spacings: Vec<f64>,
-    fits: Vec<Option<LocalFit>>,
-    /// Outward unit normals at the points, `[n, d]`; zero where nothing is known.
-    normals: Vec<f64>,
-    orientation: SurfaceOrientation,
+    level: Level,
+    sampling: Arc<Sampling>,
+    quadrics: LocalQuadrics,
+    oriented: Oriented,
     is_too_rough: bool,
     radius: f64,
-    has_consistent_signs: bool,
     left_out_misses: OnceLock<Option<Vec<f64>>>,
 }
 
-/// How the signs of normals were found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SurfaceOrientation {
-    /// Points whose gradient pointed inward.
-    pub n_flipped: usize,
-    /// Whether part of the surface has a rim, so that outward has no meaning there.
-    pub is_open: bool,
-    /// Whether the signs are those of normals that came with the cloud.
-    pub is_given: bool,
-}
-
-/// What the nearest positions say about a point.
-struct Surroundings {
-    /// Mean distance to those that define the sampling distance; 0 for one position alone.
-    spacing: f64,
-    nearest: Option<f64>,
-    fit: Option<LocalFit>,
-}
-
-impl Surroundings {
-    fn of(cloud: &Cloud, neighbours: &Neighbours, point: usize) -> Self {
-        let x = cloud.point(point);
-        let found = neighbours.nearest_positions(cloud, x, n_quadric_neighbours(cloud.dimension()));
-        let squared_distances = found.iter().map(|found| found.squared_distance);
-        let elsewhere = squared_distances.filter(|&squared| squared > 0.0).take(SPACING_NEIGHBOURS);
-        let distances: Vec<f64> = elsewhere.map(f64::sqrt).collect();
-        let spacing = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
-        Self { spacing, nearest: distances.first().copied(), fit: LocalFit::of(cloud, x, &found) }
-    }
-}
-
 impl Surface {
-    /// Examines the surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    /// The surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
     ///
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -100,168 +60,73 @@ impl Surface {
         given: Option<&Cloud>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let factor = &signature.factor;
-        let jets = match factor.kernel().has_kink() {
-            true => None,
-            false => Some(signature.at(factor.cloud(), JetOrder::HessianWithMagnitudes, observer)?),
-        };
-        Self::with_jets(signature, jets, given, observer)
+        let sampling = Arc::new(Sampling::of(signature.factor.cloud(), observer)?);
+        Self::over(sampling, Signature::of(signature, observer)?, given, observer)
     }
 
-    /// [`Surface::of`] with what [`Interpolant::signature_with_jets`] found at the points.
+    /// [`Surface::of`] over a sampling of the same cloud that is there already.
     ///
     /// # Errors
     /// Those of [`Surface::of`].
-    pub fn with_jets(
-        signature: Interpolant,
-        jets: Option<Jets>,
+    pub fn over(
+        sampling: Arc<Sampling>,
+        signature: Signature,
         given: Option<&Cloud>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let factor = signature.factor.clone();
+        let factor = signature.function().factor.clone();
         let cloud = factor.cloud();
         if cloud.dimension() < 2 {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
-        let neighbours = Neighbours::of(cloud);
-        let look_around = |point: usize| {
-            observer.checkpoint()?;
-            Ok(Surroundings::of(cloud, &neighbours, point))
-        };
-        let surroundings: Vec<Surroundings> =
-            (0..cloud.n_points()).into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
-        let nearest = median(surroundings.iter().filter_map(|found| found.nearest).collect()).unwrap_or(0.0);
-        let (spacings, fits) = surroundings.into_iter().map(|found| (found.spacing, found.fit)).unzip();
-        let orientation = SurfaceOrientation { n_flipped: 0, is_open: false, is_given: given.is_some() };
-        let is_too_rough = is_too_rough(factor.kernel(), nearest);
-        let (normals, left_out_misses) = (Vec::new(), OnceLock::new());
+        let (quadrics, _) = LocalQuadrics::of(cloud, sampling.neighbours(), cloud, observer)?;
+        let directions = Directions::of(&signature, &sampling, &quadrics, observer)?;
+        let oriented = Oriented::of(cloud, &sampling, directions, &quadrics, given);
+        let is_too_rough = is_too_rough(factor.kernel(), sampling.scales());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        let mut this = Self {
-            signature,
-            neighbours,
-            jets,
-            spacings,
-            fits,
-            normals,
-            orientation,
-            is_too_rough,
-            radius,
-            has_consistent_signs: false,
-            left_out_misses,
-        };
-        this.orient(given, observer)?;
-        Ok(this)
+        let (level, left_out_misses) = (Level::Signature(signature), OnceLock::new());
+        Ok(Self { level, sampling, quadrics, oriented, is_too_rough, radius, left_out_misses })
     }
 
-    fn orient(&mut self, given: Option<&Cloud>, observer: &dyn Observer) -> Result<(), NumericsError> {
-        let factor = self.signature.factor.clone();
-        let (cloud, d) = (factor.cloud(), factor.cloud().dimension());
-        let mut directions = self.directions(observer)?;
-        if let Some(given) = given {
-            directions.normals = given.points().flat_map(unit).collect();
-        }
-        let found = consistent_signs(cloud, &self.neighbours, &directions);
-        self.orientation.is_open = found.is_open;
-        self.has_consistent_signs = found.is_resolved;
-        self.normals = directions.normals;
-        if given.is_none() {
-            self.orientation.n_flipped = found.n_flipped;
-            for (normal, sign) in self.normals.chunks_exact_mut(d).zip(&found.signs) {
-                normal.iter_mut().for_each(|c| *c *= sign);
-            }
-        }
-        // Positions alone give the better direction where the cloud is dense; the signature function has given the sign.
-        for (normal, fit) in self.normals.chunks_exact_mut(d).zip(&self.fits) {
-            if let Some(fit) = fit.as_ref().filter(|fit| fit.is_reliable() && given.is_none()) {
-                let sign = dot(normal, &fit.normal).signum();
-                normal.iter_mut().zip(&fit.normal).for_each(|(c, n)| *c = sign * n);
-            }
-        }
-        Ok(())
+    fn level(&self) -> &Signature {
+        let Level::Signature(signature) = &self.level;
+        signature
     }
 
-    /// `−∇u/|∇u|` at the points where it means something, normals of unknown sign elsewhere.
-    fn directions(&self, observer: &dyn Observer) -> Result<Directions, NumericsError> {
-        let cloud = self.cloud();
-        let (n, d) = (cloud.n_points(), cloud.dimension());
-        let slopes = match self.jets {
-            Some(_) => Vec::new(),
-            None => self.slopes_along_fits(observer)?,
-        };
-        let mut normals = vec![0.0; n * d];
-        let mut has_sign = vec![false; n];
-        for point in 0..n {
-            let slot = &mut normals[point * d..][..d];
-            let fit = self.fits[point].as_ref();
-            match &self.jets {
-                Some(jets) if !self.vanishes(jets, point, self.spacings[point], fit) => {
-                    let gradient = jets.gradient(point);
-                    let length = norm(gradient);
-                    slot.iter_mut().zip(gradient).for_each(|(n, g)| *n = -g / length);
-                    has_sign[point] = true;
-                }
-                Some(_) => slot.copy_from_slice(fit.map_or(&vec![0.0; d], |fit| &fit.normal)),
-                None => {
-                    let Some(fit) = fit else { continue };
-                    let sign = if slopes[point] > 0.0 { -1.0 } else { 1.0 };
-                    slot.iter_mut().zip(&fit.normal).for_each(|(n, f)| *n = sign * f);
-                    has_sign[point] = slopes[point] != 0.0;
-                }
-            }
-        }
-        // The tip of a hairpin looks like the end of a curve; no quadric fits there.
-        let is_at_rim =
-            |fit: &Option<LocalFit>| fit.as_ref().is_some_and(|fit| fit.is_at_rim && fit.is_reliable());
-        let is_at_rim = self.fits.iter().map(is_at_rim).collect();
-        Ok(Directions { normals, has_sign, is_at_rim, spacings: self.spacings.clone() })
+    /// The function u whose level surface this is.
+    pub fn signature(&self) -> &Interpolant {
+        self.level().function()
     }
 
-    /// `u(x + δn) − u(x − δn)` along the normals of the local fits: the kink of the kernel at x is even and drops out.
-    fn slopes_along_fits(&self, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
-        let cloud = self.cloud();
-        let at = |side: f64| -> Result<Vec<f64>, NumericsError> {
-            let moved = (0..cloud.n_points()).flat_map(|point| {
-                let step = side * DIFFERENCE_STEP * self.spacings[point];
-                let normal = self.fits[point].as_ref().map(|fit| fit.normal.as_slice());
-                (0..cloud.dimension())
-                    .map(move |c| cloud.point(point)[c] + normal.map_or(0.0, |n| step * n[c]))
-            });
-            let moved = Cloud::new(moved.collect(), cloud.dimension())?;
-            Ok(self.signature.at(&moved, JetOrder::Value, observer)?.values())
-        };
-        Ok(at(1.0)?.iter().zip(at(-1.0)?).map(|(a, b)| a - b).collect())
+    pub fn cloud(&self) -> &Cloud {
+        self.signature().factor.cloud()
     }
 
-    /// Whether ∇u is no normal at a query: rounding (T1), no direction at the scale of the sampling (T2), or oblique to a
-    /// reliable local fit.
-    pub(crate) fn vanishes(&self, jets: &Jets, query: usize, spacing: f64, fit: Option<&LocalFit>) -> bool {
-        let gradient = jets.gradient(query);
-        let length = norm(gradient);
-        if is_rounding(&self.signature, jets, query) || turns_within_spacing(jets, query, spacing) {
-            return true;
-        }
-        fit.filter(|fit| fit.is_reliable())
-            .is_some_and(|fit| dot(gradient, &fit.normal).abs() < OBLIQUE * length)
+    pub fn orientation(&self) -> SurfaceOrientation {
+        self.oriented.how
+    }
+
+    pub(crate) fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
+    /// Whether ∇u is no normal at a query where `jets` are u and its derivatives.
+    pub(crate) fn vanishes(
+        &self,
+        jets: &Jets,
+        query: usize,
+        spacing: f64,
+        quadric: Option<LocalQuadric<'_>>,
+    ) -> bool {
+        degeneracy::vanishes(self.signature(), jets, query, spacing, quadric)
     }
 
     /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.
     pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
         let count = n_quadric_neighbours(self.cloud().dimension());
-        let patch = Patch::around(self.cloud(), &self.neighbours, x, count);
-        patch.is_some_and(|patch| patch.points.len() == count && patch.is_thread())
-    }
-
-    /// The function u whose level surface this is.
-    pub fn signature(&self) -> &Interpolant {
-        &self.signature
-    }
-
-    pub fn cloud(&self) -> &Cloud {
-        self.signature.factor.cloud()
-    }
-
-    pub fn orientation(&self) -> SurfaceOrientation {
-        self.orientation
+        let nearest = self.sampling.neighbours().nearest_positions(self.cloud(), x, count);
+        let patch = Patch::of(self.cloud(), x, nearest.iter().map(|found| found.point));
+        patch.is_some_and(|patch| patch.n_points() == count && patch.is_thread())
     }
 
     /// Whether second derivatives at the points see the cusp of the kernel.
@@ -287,63 +152,57 @@ impl Surface {
     }
 
     fn compute_left_out_misses(&self) -> Option<Vec<f64>> {
-        let factor = &self.signature.factor;
+        let factor = &self.signature().factor;
         // A repeated observation is predicted by its copy.
         if factor.n_points() > MAX_LEFT_OUT || count_duplicates(factor.cloud()) > 0 {
             return None;
         }
         let diagonal = factor.inverse_diagonal()?;
-        Some(self.signature.solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
-    }
-
-    pub(crate) fn neighbours(&self) -> &Neighbours {
-        &self.neighbours
-    }
-
-    /// Mean distance of a point to its neighbours, unit L.
-    pub(crate) fn spacing(&self, point: usize) -> f64 {
-        self.spacings[point]
+        Some(self.signature().solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
     }
 
     /// The outward unit normal of a point, zero where unknown.
     pub(crate) fn normal(&self, point: usize) -> &[f64] {
         let d = self.cloud().dimension();
-        &self.normals[point * d..][..d]
+        &self.oriented.normals[point * d..][..d]
     }
 
     /// u, ∇u and D²u at the points, where they were kept.
     pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
-        self.jets.as_ref()
+        self.level().jets()
     }
 
-    /// The local fit at a point.
-    pub(crate) fn fit(&self, point: usize) -> Option<&LocalFit> {
-        self.fits[point].as_ref()
+    /// The quadric through the neighbours of a point.
+    pub(crate) fn quadric(&self, point: usize) -> Option<LocalQuadric<'_>> {
+        self.quadrics.at(point)
     }
 
     /// The sign that turns ∇u at x into an outward direction: that of the points near x (a narrow kernel makes u a ridge, and −∇u
     /// points inward just inside), −1 on clouds that do not resolve their surface.
-    pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64]) -> f64 {
-        if !self.has_consistent_signs && !self.orientation.is_given {
+    /// `found` is room for them.
+    pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64], found: &mut Vec<Neighbour>) -> f64 {
+        if !self.oriented.is_consistent && !self.orientation().is_given {
             return -1.0;
         }
-        let nearest = self.neighbours.nearest(self.cloud(), x, SPACING_NEIGHBOURS);
-        let along: f64 = nearest
+        self.sampling.neighbours().nearest_into(self.cloud(), x, SPACING_NEIGHBOURS, found);
+        let along: f64 = found
             .iter()
             .map(|found| {
                 // Near a thin sheet the point on this side of it decides.
-                let weight = 1.0 / (found.squared_distance + 1e-3 * self.spacings[found.point].powi(2));
+                let spacing = self.sampling.spacing(found.point);
+                let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
                 weight * dot(self.normal(found.point), gradient)
             })
             .sum();
         if along > 0.0 { 1.0 } else { -1.0 }
     }
 
-    /// Whether ∇u at the points near x goes the way of a direction, +1 or −1; −1, inward, where there is no ∇u.
-    pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64]) -> f64 {
-        let Some(jets) = &self.jets else { return -1.0 };
-        let nearest = self.neighbours.nearest_positions(self.cloud(), x, SPACING_NEIGHBOURS);
-        let along: f64 = nearest.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
+    /// Whether ∇u at the points near x goes the way of a direction, +1 or −1; −1, inward, where there is no ∇u. `found` is
+    /// room for them.
+    pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64], found: &mut Vec<Neighbour>) -> f64 {
+        let Some(jets) = self.jets_at_points() else { return -1.0 };
+        self.sampling.neighbours().nearest_positions_into(self.cloud(), x, SPACING_NEIGHBOURS, found);
+        let along: f64 = found.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
         if along > 0.0 { 1.0 } else { -1.0 }
     }
 
@@ -357,25 +216,20 @@ impl Surface {
     /// Flops of [`Surface::of`]: the sums at the points, and two searches and a quadric at each.
     pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
         let (n, n_columns) = (n_points as f64, (dimension * (dimension + 1) / 2) as f64);
-        60.0 * n * n + 2.0 * Scales::flops_needed(n_points, dimension) + 40.0 * n * n_columns.powi(3)
+        60.0 * n * n + 2.0 * Sampling::flops_needed(n_points, dimension) + 40.0 * n * n_columns.powi(3)
     }
 
     /// Bytes held on the heap beside the factor.
     pub fn n_bytes(&self) -> usize {
         let n = self.cloud().n_points();
-        let jets = self.jets.as_ref().map_or(0, Jets::n_bytes);
-        // Their small vectors lie among short-lived ones, which leave about as much unused.
-        let fits: usize = self.fits.iter().flatten().map(|fit| 2 * fit.n_bytes()).sum();
         // Asked for later, if at all.
         let left_out_misses = if n <= MAX_LEFT_OUT { block_bytes(n * size_of::<f64>()) } else { 0 };
-        self.signature.solution.n_bytes()
-            + self.neighbours.n_bytes()
-            + jets
-            + vec_bytes(&self.spacings)
-            + vec_bytes(&self.fits)
-            + fits
-            + vec_bytes(&self.normals)
+        self.level().n_bytes()
+            + self.sampling.n_bytes()
+            + self.quadrics.n_bytes()
+            + vec_bytes(&self.oriented.normals)
             + left_out_misses
+            + block_bytes(arc_payload::<Sampling>())
             + block_bytes(arc_payload::<Self>())
     }
 }

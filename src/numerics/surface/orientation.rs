@@ -11,9 +11,12 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::numerics::machine::vector::dot;
+use super::directions::Directions;
+use crate::numerics::machine::vector::{dot, unit};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
 use crate::numerics::points::neighbours::{Neighbour, Neighbours};
+use crate::numerics::points::sampling::Sampling;
 
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
@@ -32,21 +35,62 @@ const CONTRADICTION: f64 = 0.1;
 /// Share of the gradients that must agree for their sign to be believed without the volume.
 const UNANIMITY: f64 = 0.95;
 
-/// What is known of the normals before their signs are made consistent.
-pub(crate) struct Directions {
-    /// Unit vectors at the points, `[n, d]`: `−∇u/|∇u|` where reliable, a normal of unknown sign elsewhere, or zero.
+/// How the signs of normals were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SurfaceOrientation {
+    /// Points whose gradient pointed inward.
+    pub n_flipped: usize,
+    /// Whether part of the surface has a rim, so that outward has no meaning there.
+    pub is_open: bool,
+    /// Whether the signs are those of normals that came with the cloud.
+    pub is_given: bool,
+}
+
+/// Outward normals at the points.
+pub(crate) struct Oriented {
+    /// Unit vectors `[n, d]`; zero where nothing is known.
     pub normals: Vec<f64>,
-    /// Whether the sign means something, `[n]`.
-    pub has_sign: Vec<bool>,
-    /// Whether the point is at the rim of an open surface, `[n]`.
-    pub is_at_rim: Vec<bool>,
-    /// Mean distance to the nearest points, unit L, `[n]`.
-    pub spacings: Vec<f64>,
+    pub how: SurfaceOrientation,
+    /// Whether neighbours have so much to do with one another that their signs can be compared.
+    pub is_consistent: bool,
+}
+
+impl Oriented {
+    /// Orients what is known of the normals; `given` are normals of the client, `[n, d]`, of any length but 0, which decide.
+    pub(crate) fn of(
+        cloud: &Cloud,
+        sampling: &Sampling,
+        directions: Directions,
+        quadrics: &LocalQuadrics,
+        given: Option<&Cloud>,
+    ) -> Self {
+        let directions = match given {
+            None => directions,
+            Some(given) => Directions { normals: given.points().flat_map(unit).collect(), ..directions },
+        };
+        let found = consistent_signs(cloud, sampling.neighbours(), sampling.spacings(), &directions);
+        let (is_open, is_consistent) = (found.is_open, found.is_resolved);
+        if given.is_some() {
+            let how = SurfaceOrientation { n_flipped: 0, is_open, is_given: true };
+            return Self { normals: directions.normals, how, is_consistent };
+        }
+        let how = SurfaceOrientation { n_flipped: found.n_flipped, is_open, is_given: false };
+        let mut normals = directions.normals;
+        for (point, normal) in normals.chunks_exact_mut(cloud.dimension()).enumerate() {
+            normal.iter_mut().for_each(|c| *c *= found.signs[point]);
+            // Positions alone give the better direction where the cloud is dense; the signature function has given the sign.
+            if let Some(quadric) = quadrics.at(point).filter(LocalQuadric::is_reliable) {
+                let sign = dot(normal, quadric.normal).signum();
+                normal.iter_mut().zip(quadric.normal).for_each(|(c, n)| *c = sign * n);
+            }
+        }
+        Self { normals, how, is_consistent }
+    }
 }
 
 /// Signs to multiply the normals of [`Directions`] with.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Signs {
+struct Signs {
     pub signs: Vec<f64>,
     /// Points whose gradient pointed the other way.
     pub n_flipped: usize,
@@ -56,8 +100,13 @@ pub(crate) struct Signs {
     pub is_resolved: bool,
 }
 
-/// Makes the signs of normals consistent.
-pub(crate) fn consistent_signs(cloud: &Cloud, neighbours: &Neighbours, directions: &Directions) -> Signs {
+/// Makes the signs of normals consistent; `spacings` are mean distances to the nearest points, unit L, `[n]`.
+fn consistent_signs(
+    cloud: &Cloud,
+    neighbours: &Neighbours,
+    spacings: &[f64],
+    directions: &Directions,
+) -> Signs {
     let n = cloud.n_points();
     let edges = sheet_edges(cloud, neighbours, &directions.normals);
     let mut pieces = SignedForest::new(n);
@@ -79,7 +128,7 @@ pub(crate) fn consistent_signs(cloud: &Cloud, neighbours: &Neighbours, direction
     }
     let (mut signs, mut is_open) = (relative.clone(), false);
     for piece in members.values() {
-        let piece = Piece { cloud, directions, points: piece, relative: &relative };
+        let piece = Piece { cloud, directions, spacings, points: piece, relative: &relative };
         let has_rim = piece.has_rim();
         let sign = piece.sign(has_rim);
         is_open |= has_rim;
@@ -163,6 +212,7 @@ fn borders(pieces: &mut SignedForest, edges: &[Edge]) -> Vec<(usize, usize, f64)
 struct Piece<'a> {
     cloud: &'a Cloud,
     directions: &'a Directions,
+    spacings: &'a [f64],
     points: &'a [usize],
     relative: &'a [f64],
 }
@@ -215,7 +265,7 @@ impl Piece<'_> {
     }
 
     fn area(&self, point: usize) -> f64 {
-        self.directions.spacings[point].powi(self.cloud.dimension() as i32 - 1)
+        self.spacings[point].powi(self.cloud.dimension() as i32 - 1)
     }
 }
 
@@ -264,7 +314,7 @@ mod tests {
 
     fn directions(cloud: &Cloud, normals: Vec<f64>) -> Directions {
         let n = cloud.n_points();
-        Directions { normals, has_sign: vec![true; n], is_at_rim: vec![false; n], spacings: vec![1.0; n] }
+        Directions { normals, has_sign: vec![true; n], is_at_rim: vec![false; n] }
     }
 
     #[test]
@@ -276,7 +326,7 @@ mod tests {
             let sign = |x: &[f64]| if x[2] > height { -1.0 } else { 1.0 };
             let normals = cloud.points().flat_map(|x| x.iter().map(|c| sign(x) * c).collect::<Vec<_>>());
             let directions = directions(&cloud, normals.collect());
-            let signs = consistent_signs(&cloud, &neighbours, &directions);
+            let signs = consistent_signs(&cloud, &neighbours, &[1.0; 400], &directions);
             assert_eq!(signs.n_flipped, expected);
             assert!(cloud.points().zip(&signs.signs).all(|(x, &s)| s == sign(x)));
             assert!(!signs.is_open);
@@ -289,7 +339,8 @@ mod tests {
         let layer = |z: f64| (0..100).flat_map(move |i| [(i % 10) as f64, (i / 10) as f64, z]);
         let cloud = Cloud::new(layer(0.0).chain(layer(0.5)).collect(), 3).unwrap();
         let normals = (0..200).flat_map(|i| [0.0, 0.0, if i < 100 { -1.0 } else { 1.0 }]).collect();
-        let signs = consistent_signs(&cloud, &Neighbours::of(&cloud), &directions(&cloud, normals));
+        let signs =
+            consistent_signs(&cloud, &Neighbours::of(&cloud), &[1.0; 200], &directions(&cloud, normals));
         assert_eq!(signs.n_flipped, 0);
     }
 
@@ -303,7 +354,7 @@ mod tests {
             .collect();
         let mut directions = directions(&cloud, normals);
         directions.has_sign = (0..300).map(|i| i % 3 != 0).collect();
-        let signs = consistent_signs(&cloud, &Neighbours::of(&cloud), &directions);
+        let signs = consistent_signs(&cloud, &Neighbours::of(&cloud), &[1.0; 300], &directions);
         assert_eq!(signs.n_flipped, 0);
         assert!(signs.signs.iter().enumerate().all(|(i, &s)| s == if i % 3 == 0 { -1.0 } else { 1.0 }));
     }

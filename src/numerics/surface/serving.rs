@@ -1,216 +1,335 @@
-//! The examination of a surface at queries: which function serves each of them, and what is wrong there.
+//! Which function serves each query of a surface, and what is wrong there.
 
 use std::borrow::Cow;
 
 use rayon::prelude::*;
 
 use super::Surface;
-use super::confirmation::Claim;
+use super::confirmation::Unconfirmed;
 use super::curvature::principal_curvatures;
 use super::degeneracy::{DegeneracyReason, is_far, is_weak};
-use super::geometry::{Answer, GeometryRequest, Orientation, SurfaceModel};
-use super::offset::rescue;
+use super::offset::{OffsetJet, offset_jet_at};
+use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::numerics::error::NumericsError;
+use crate::numerics::machine::small::Small;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
 use crate::numerics::points::neighbours::Neighbour;
-use crate::numerics::points::patch::{LocalFit, n_quadric_neighbours};
 use crate::numerics::sums::jets::{JetOrder, Jets};
 
-/// Distance from the local fit, in spacings, up to which a query counts as on the surface: there the gradient must be normal
-/// to it.
+/// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
+/// normal to it.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
 
-/// A surface, queries, and the signature function there.
-pub(crate) struct Examination<'a> {
-    surface: &'a Surface,
-    queries: &'a Cloud,
-    request: &'a GeometryRequest,
-    jets: Cow<'a, Jets>,
-    are_points: bool,
+/// What is known of the surface at m queries, in flat arrays.
+pub(crate) struct Served {
+    dimension: usize,
+    /// ∇ of the function that serves each query, `[m, d]`.
+    gradients: Vec<f64>,
+    /// Its Hessian, `[m, d, d]`.
+    hessians: Vec<f64>,
+    verdicts: Vec<Verdict>,
+    /// u, `[m]`.
+    levels: Vec<f64>,
+}
+
+/// What is said of a query beside its numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Verdict {
+    /// ν against ∇u: +1 or −1.
+    pub sign: f64,
+    pub is_offset: bool,
+    pub reason: Option<DegeneracyReason>,
+}
+
+impl Verdict {
+    pub(crate) fn is_null(self) -> bool {
+        self.reason.is_some_and(DegeneracyReason::is_null)
+    }
+}
+
+impl Served {
+    pub(crate) fn gradient(&self, query: usize) -> &[f64] {
+        &self.gradients[query * self.dimension..][..self.dimension]
+    }
+
+    /// Symmetric `[d, d]`.
+    pub(crate) fn hessian(&self, query: usize) -> &[f64] {
+        let n_entries = self.dimension * self.dimension;
+        &self.hessians[query * n_entries..][..n_entries]
+    }
+
+    pub(crate) fn verdict(&self, query: usize) -> Verdict {
+        self.verdicts[query]
+    }
+
+    pub(crate) fn levels(&self) -> &[f64] {
+        &self.levels
+    }
+}
+
+/// Finds everything that is known at each query.
+///
+/// # Errors
+/// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
+pub(crate) fn serve(
+    surface: &Surface,
+    queries: &Cloud,
+    request: &GeometryRequest,
+    observer: &dyn Observer,
+) -> Result<Served, NumericsError> {
+    let order = match request.model {
+        SurfaceModel::Offset => JetOrder::Value,
+        SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::HessianWithMagnitudes,
+    };
+    let are_points = queries == surface.cloud();
+    let jets = match surface.jets_at_points() {
+        Some(jets) if are_points => Cow::Borrowed(jets),
+        Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
+    };
+    observer.enter(Stage::Evaluate);
+    let surroundings = Surroundings::of(surface, queries, are_points, request.checks_curvatures, observer)?;
+    Service { surface, queries, request, jets, surroundings }.serve(observer)
+}
+
+/// What lies around the queries.
+enum Surroundings {
+    /// They are the points of the cloud, of which the surface knows.
+    OfPoints,
+    /// Their nearest points, and quadrics of their own where curvatures are held against them.
+    OfQueries { nearest: Vec<Neighbour>, quadrics: Option<LocalQuadrics> },
+}
+
+impl Surroundings {
+    fn of(
+        surface: &Surface,
+        queries: &Cloud,
+        are_points: bool,
+        checks_curvatures: bool,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let (cloud, neighbours) = (surface.cloud(), surface.sampling().neighbours());
+        if are_points {
+            return Ok(Self::OfPoints);
+        }
+        if checks_curvatures {
+            let (quadrics, nearest) = LocalQuadrics::of(cloud, neighbours, queries, observer)?;
+            return Ok(Self::OfQueries { nearest, quadrics: Some(quadrics) });
+        }
+        let find = |found: &mut Vec<Neighbour>, query: usize| {
+            observer.checkpoint()?;
+            neighbours.nearest_positions_into(cloud, queries.point(query), 1, found);
+            Ok(found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 }))
+        };
+        let nearest = (0..queries.n_points()).into_par_iter().map_init(Vec::new, find);
+        Ok(Self::OfQueries { nearest: nearest.collect::<Result<_, NumericsError>>()?, quadrics: None })
+    }
 }
 
 /// A query with what surrounds it.
+#[derive(Clone, Copy)]
 struct Site<'a> {
     x: &'a [f64],
     nearest: Neighbour,
     spacing: f64,
-    fit: Option<Cow<'a, LocalFit>>,
+    quadric: Option<LocalQuadric<'a>>,
 }
 
-impl<'a> Examination<'a> {
-    /// Evaluates the signature function at the queries, to the order that the model needs.
-    ///
-    /// # Errors
-    /// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
-    pub(crate) fn of(
-        surface: &'a Surface,
-        queries: &'a Cloud,
-        request: &'a GeometryRequest,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let are_points = queries == surface.cloud();
-        let order = match request.model {
-            SurfaceModel::Offset => JetOrder::Value,
-            SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::HessianWithMagnitudes,
-        };
-        let jets = match surface.jets_at_points() {
-            Some(jets) if are_points => Cow::Borrowed(jets),
-            Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
-        };
-        Ok(Self { surface, queries, request, jets, are_points })
-    }
+/// A surface, queries, and the signature function there.
+struct Service<'a> {
+    surface: &'a Surface,
+    queries: &'a Cloud,
+    request: &'a GeometryRequest,
+    jets: Cow<'a, Jets>,
+    surroundings: Surroundings,
+}
 
-    /// u at the queries, `[m]`.
-    pub(crate) fn into_levels(self) -> Vec<f64> {
-        self.jets.values()
-    }
+/// Where the numbers of a query go.
+struct Slot<'a> {
+    gradient: &'a mut [f64],
+    hessian: &'a mut [f64],
+}
 
-    /// Everything that is known at each query.
-    ///
-    /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(crate) fn answers(&self, observer: &dyn Observer) -> Result<Vec<Answer>, NumericsError> {
-        observer.enter(Stage::Evaluate);
-        let survey = |query| {
+impl Slot<'_> {
+    fn take(&mut self, jet: &OffsetJet) {
+        self.gradient.copy_from_slice(&jet.gradient);
+        self.hessian.copy_from_slice(&jet.hessian);
+    }
+}
+
+impl Service<'_> {
+    fn serve(&self, observer: &dyn Observer) -> Result<Served, NumericsError> {
+        let (m, d) = (self.queries.n_points(), self.queries.dimension());
+        let look = |query| {
             observer.checkpoint()?;
-            let site = self.site(query);
-            let needs_offset = match self.request.model {
-                SurfaceModel::Signature => false,
-                SurfaceModel::Offset => true,
-                SurfaceModel::Auto => self.vanishes(query, &site) || self.is_weak(query, &site),
-            };
-            Ok((site, needs_offset))
+            Ok(self.needs_offset(query, &self.site(query)))
         };
-        let m = self.queries.n_points();
-        let sites: Vec<(Site<'_>, bool)> =
-            (0..m).into_par_iter().map(survey).collect::<Result<_, NumericsError>>()?;
+        let needs_offset: Vec<bool> =
+            (0..m).into_par_iter().map(look).collect::<Result<_, NumericsError>>()?;
         let first_unaffordable =
-            (0..m).filter(|&query| sites[query].1).nth(self.request.max_offsets).unwrap_or(m);
-        let answer = |query: usize| {
-            observer.checkpoint()?;
-            let (site, needs_offset) = &sites[query];
-            let mut answer = match (*needs_offset, query < first_unaffordable) {
-                (true, true) => self.of_offset(query, site),
-                (true, false) => self.without_offset(query, site, DegeneracyReason::UnaffordableRescue),
-                (false, _) => self.of_signature(query, site),
-            };
-            answer.reason = answer.reason.or_else(|| self.flag(&answer, site));
-            Ok(answer)
-        };
-        (0..m).into_par_iter().map(answer).collect()
+            (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
+        let (mut gradients, mut hessians) = (vec![0.0; m * d], vec![0.0; m * d * d]);
+        let mut verdicts = vec![Verdict { sign: 1.0, is_offset: false, reason: None }; m];
+        let slots = gradients.par_chunks_exact_mut(d).zip(hessians.par_chunks_exact_mut(d * d));
+        slots.zip(&mut verdicts).enumerate().try_for_each_init(
+            Vec::new,
+            |found, (query, ((gradient, hessian), verdict))| {
+                observer.checkpoint()?;
+                let (site, mut slot) = (self.site(query), Slot { gradient, hessian });
+                *verdict = match (needs_offset[query], query < first_unaffordable) {
+                    (true, true) => self.by_offset(query, &site, &mut slot, found),
+                    (true, false) => {
+                        let reason = DegeneracyReason::UnaffordableRescue;
+                        self.without_offset(query, &site, reason, &mut slot, found)
+                    }
+                    (false, _) => self.by_signature(query, &site, &mut slot, found),
+                };
+                verdict.reason = verdict.reason.or_else(|| self.flag(*verdict, &slot, &site));
+                Ok(())
+            },
+        )?;
+        Ok(Served { dimension: d, gradients, hessians, verdicts, levels: self.jets.values() })
     }
 
-    fn site(&self, query: usize) -> Site<'a> {
-        let (surface, cloud) = (self.surface, self.surface.cloud());
-        let x = self.queries.point(query);
-        if self.are_points {
-            let nearest = Neighbour { point: query, squared_distance: 0.0 };
-            let fit = surface.fit(query).map(Cow::Borrowed);
-            return Site { x, nearest, spacing: surface.spacing(query), fit };
-        }
-        // Normals are held against a local fit to see whether they are oblique; that of the nearest point is good enough.
-        let count = if self.request.checks_curvatures { n_quadric_neighbours(cloud.dimension()) } else { 1 };
-        let found = surface.neighbours().nearest_positions(cloud, x, count);
-        let nearest = found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 });
-        let fit = match self.request.checks_curvatures {
-            true => LocalFit::of(cloud, x, &found),
-            false => surface.fit(nearest.point).map(|fit| fit.seen_from(cloud.point(nearest.point), x)),
+    fn site(&self, query: usize) -> Site<'_> {
+        let (surface, x) = (self.surface, self.queries.point(query));
+        let (nearest, quadric) = match &self.surroundings {
+            Surroundings::OfPoints => {
+                (Neighbour { point: query, squared_distance: 0.0 }, surface.quadric(query))
+            }
+            Surroundings::OfQueries { nearest, quadrics: Some(quadrics) } => {
+                (nearest[query], quadrics.at(query))
+            }
+            // Normals are held against a quadric to see whether they are oblique; that of the nearest point is good enough.
+            Surroundings::OfQueries { nearest, quadrics: None } => {
+                let nearest = nearest[query];
+                let quadric = surface.quadric(nearest.point);
+                (nearest, quadric.map(|quadric| quadric.seen_from(surface.cloud().point(nearest.point), x)))
+            }
         };
-        let fit = fit.map(Cow::Owned);
-        Site { x, nearest, spacing: surface.spacing(nearest.point), fit }
+        Site { x, nearest, spacing: surface.sampling().spacing(nearest.point), quadric }
+    }
+
+    fn needs_offset(&self, query: usize, site: &Site<'_>) -> bool {
+        match self.request.model {
+            SurfaceModel::Signature => false,
+            SurfaceModel::Offset => true,
+            SurfaceModel::Auto => self.vanishes(query, site) || self.is_weak(query, site),
+        }
     }
 
     fn vanishes(&self, query: usize, site: &Site<'_>) -> bool {
-        let fit = site.fit.as_deref().filter(|fit| fit.height.abs() <= ON_SURFACE_SPACINGS * site.spacing);
         let reach = ON_SURFACE_SPACINGS * site.spacing;
-        let is_on_thread = site.fit.is_none()
+        let quadric = site.quadric.filter(|quadric| quadric.height.abs() <= reach);
+        let is_on_thread = site.quadric.is_none()
             && site.nearest.squared_distance <= reach * reach
             && self.surface.is_thread(site.x);
-        is_on_thread || self.surface.vanishes(&self.jets, query, site.spacing, fit)
+        is_on_thread || self.surface.vanishes(&self.jets, query, site.spacing, quadric)
     }
 
     /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which
     /// the offset model interpolates.
     fn is_weak(&self, query: usize, site: &Site<'_>) -> bool {
         self.request.checks_curvatures
-            && site.fit.as_ref().is_some_and(|fit| fit.is_smooth())
+            && site.quadric.is_some_and(|quadric| quadric.is_smooth())
             && is_weak(&self.jets, query, site.spacing)
     }
 
-    fn of_signature(&self, query: usize, site: &Site<'_>) -> Answer {
+    fn by_signature(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
         if self.request.model == SurfaceModel::Signature && self.vanishes(query, site) {
-            return self.null(query, DegeneracyReason::VanishingGradient);
+            return self.null(query, DegeneracyReason::VanishingGradient, slot);
         }
-        let gradient = self.jets.gradient(query).to_vec();
+        slot.gradient.copy_from_slice(self.jets.gradient(query));
+        slot.hessian.copy_from_slice(&self.jets.hessian(query));
         let sign = match self.request.orientation {
             Orientation::Gradient => 1.0,
-            Orientation::Outward => self.surface.outward_sign(site.x, &gradient),
+            Orientation::Outward => self.surface.outward_sign(site.x, slot.gradient, found),
         };
-        Answer { gradient, hessian: self.jets.hessian(query), sign, is_offset: false, reason: None }
+        Verdict { sign, is_offset: false, reason: None }
     }
 
     /// The offset model, whose gradient points outward.
-    fn of_offset(&self, query: usize, site: &Site<'_>) -> Answer {
-        let Some(jet) = rescue(self.surface, site.x) else {
-            return self.without_offset(query, site, DegeneracyReason::VanishingGradient);
+    fn by_offset(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
+        let Some(jet) = offset_jet_at(self.surface, site.x) else {
+            return self.without_offset(query, site, DegeneracyReason::VanishingGradient, slot, found);
         };
+        slot.take(&jet);
         let sign = match self.request.orientation {
-            Orientation::Gradient => self.surface.gradient_side(site.x, &jet.gradient),
+            Orientation::Gradient => self.surface.gradient_side(site.x, slot.gradient, found),
             Orientation::Outward => 1.0,
         };
-        Answer { gradient: jet.gradient, hessian: jet.hessian, sign, is_offset: true, reason: None }
+        Verdict { sign, is_offset: true, reason: None }
     }
 
     /// What there is without the offset model: a weak gradient is better than nothing.
-    fn without_offset(&self, query: usize, site: &Site<'_>, reason: DegeneracyReason) -> Answer {
+    fn without_offset(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        reason: DegeneracyReason,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
         match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
-            true => self.of_signature(query, site),
-            false => self.null(query, reason),
+            true => self.by_signature(query, site, slot, found),
+            false => self.null(query, reason, slot),
         }
     }
 
-    fn null(&self, query: usize, reason: DegeneracyReason) -> Answer {
-        let d = self.queries.dimension();
-        let (gradient, hessian) = match self.request.model {
-            SurfaceModel::Offset => (vec![0.0; d], vec![0.0; d * d]),
+    fn null(&self, query: usize, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+        let is_offset = match self.request.model {
+            SurfaceModel::Offset => true,
             SurfaceModel::Auto | SurfaceModel::Signature => {
-                (self.jets.gradient(query).to_vec(), self.jets.hessian(query))
+                slot.gradient.copy_from_slice(self.jets.gradient(query));
+                slot.hessian.copy_from_slice(&self.jets.hessian(query));
+                false
             }
         };
-        let is_offset = self.request.model == SurfaceModel::Offset;
-        Answer { gradient, hessian, sign: 1.0, is_offset, reason: Some(reason) }
+        Verdict { sign: 1.0, is_offset, reason: Some(reason) }
     }
 
     /// What makes an answer doubtful.
-    fn flag(&self, answer: &Answer, site: &Site<'_>) -> Option<DegeneracyReason> {
+    fn flag(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> Option<DegeneracyReason> {
         if is_far(site.nearest.squared_distance, site.spacing) {
             return Some(DegeneracyReason::FarFromCloud);
         }
         if !self.request.checks_curvatures {
             return None;
         }
-        if !answer.is_offset && self.surface.is_too_rough() {
+        if !verdict.is_offset && self.surface.is_too_rough() {
             return Some(DegeneracyReason::KernelTooRough);
         }
-        (!self.is_resolved(answer, site)).then_some(DegeneracyReason::UnderResolved)
+        (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
     }
 
-    fn is_resolved(&self, answer: &Answer, site: &Site<'_>) -> bool {
-        let gradient_norm = norm(&answer.gradient);
-        let normal: Vec<f64> = answer.gradient.iter().map(|g| answer.sign * g / gradient_norm).collect();
-        let (curvatures, _) = principal_curvatures(&answer.gradient, &answer.hessian, answer.sign);
-        let claim = Claim {
+    fn is_resolved(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> bool {
+        let gradient_norm = norm(slot.gradient);
+        let normal: Small = slot.gradient.iter().map(|g| verdict.sign * g / gradient_norm).collect();
+        let (curvatures, _) = principal_curvatures(slot.gradient, slot.hessian, verdict.sign);
+        let unconfirmed = Unconfirmed {
             x: site.x,
             spacing: site.spacing,
             curvatures: &curvatures,
             normal: &normal,
             gradient_norm,
-            fit: site.fit.as_deref(),
-            is_offset: answer.is_offset,
+            quadric: site.quadric,
+            is_offset: verdict.is_offset,
             may_use_patch: self.queries.n_points() <= self.request.max_offsets,
         };
-        claim.is_confirmed(self.surface)
+        unconfirmed.is_confirmed_by(self.surface)
     }
 }

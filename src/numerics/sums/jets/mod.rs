@@ -9,6 +9,7 @@ use super::nodes::{Nodes, blocked};
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::Positions;
@@ -145,11 +146,16 @@ impl Jets {
         &self.jet(query)[self.layout.gradient()..][..self.layout.dimension]
     }
 
+    /// ∇u at every query, `[m, d]`.
+    pub fn gradients(&self) -> Vec<f64> {
+        (0..self.n_queries()).flat_map(|query| self.gradient(query)).copied().collect()
+    }
+
     /// D²u at a query, symmetric `[d, d]`.
-    pub fn hessian(&self, query: usize) -> Vec<f64> {
+    pub fn hessian(&self, query: usize) -> Small {
         let d = self.layout.dimension;
         let mut packed = self.jet(query)[self.layout.hessian()..].iter();
-        let mut full = vec![0.0; d * d];
+        let mut full = zeros(d * d);
         for a in 0..d {
             for (b, &entry) in (a..d).zip(&mut packed) {
                 full[a * d + b] = entry;
@@ -157,6 +163,11 @@ impl Jets {
             }
         }
         full
+    }
+
+    /// D²u at every query, `[m, d, d]`.
+    pub fn hessians(&self) -> Vec<f64> {
+        (0..self.n_queries()).flat_map(|query| self.hessian(query)).collect()
     }
 
     /// `Σ|λ_j||k_j|` and `Σ|λ_j||∇k_j|` at a query; order [`JetOrder::HessianWithMagnitudes`] only.

@@ -11,9 +11,11 @@ use std::sync::Arc;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::kernel::{Family, Kernel};
+use crate::numerics::machine::small::Small;
 use crate::numerics::observer::Unobserved;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::patch::{Patch, n_coefficients};
+use crate::numerics::points::patch::Patch;
+use crate::numerics::points::quadric::n_coefficients;
 use crate::numerics::solver::GramFactor;
 use crate::numerics::sums::jets::JetOrder;
 use crate::numerics::sums::regularization::Regularization;
@@ -43,9 +45,9 @@ pub(crate) fn n_patch_points(dimension: usize) -> usize {
 #[derive(Debug, Clone)]
 pub(crate) struct OffsetJet {
     /// `[d]`, unitless.
-    pub gradient: Vec<f64>,
+    pub gradient: Small,
     /// `[d, d]`, 1/L.
-    pub hessian: Vec<f64>,
+    pub hessian: Small,
 }
 
 /// F at x, from a patch around x and one unit normal per point of the patch, `[k, d]`, consistently oriented.
@@ -55,11 +57,11 @@ pub(crate) struct OffsetJet {
 pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, NumericsError> {
     let d = patch.dimension();
     let delta = OFFSET_SPACINGS * mean_spacing(patch);
-    let normals: Vec<Vec<f64>> = normals.chunks_exact(d).map(|normal| patch.to_frame(normal)).collect();
-    let up = if normals.iter().map(|normal| normal[d - 1]).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+    let normals: Vec<f64> = normals.chunks_exact(d).flat_map(|normal| patch.to_frame(normal)).collect();
+    let up = if normals.chunks_exact(d).map(|normal| normal[d - 1]).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
     let (mut nodes, mut data) = (Vec::new(), Vec::new());
     for side in [0.0, delta, -delta] {
-        for (x, normal) in patch.coordinates().chunks_exact(d).zip(&normals) {
+        for (x, normal) in patch.coordinates().chunks_exact(d).zip(normals.chunks_exact(d)) {
             nodes.extend(x.iter().zip(normal).map(|(x, n)| x + side * n));
             data.push(side);
         }
@@ -82,23 +84,23 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
     let model = fit(ALPHAS[0]).or_else(|_| fit(ALPHAS[1])).or_else(|_| fit(ALPHAS[2]))?;
     let origin = Cloud::new(vec![0.0; d], d)?;
     let jets = model.at(&origin, JetOrder::Hessian, &Unobserved)?;
-    let mut gradient = jets.gradient(0).to_vec();
+    let mut gradient = Small::from_slice(jets.gradient(0));
     gradient[d - 1] += up;
     Ok(OffsetJet { gradient: patch.in_space(&gradient), hessian: rotated(patch, &jets.hessian(0)) })
 }
 
 /// `QᵀHQ/radius`: a Hessian in the frame and scale of the patch as one in space.
-fn rotated(patch: &Patch, hessian: &[f64]) -> Vec<f64> {
+fn rotated(patch: &Patch, hessian: &[f64]) -> Small {
     let d = patch.dimension();
     // H is symmetric: rotate its rows, transpose, rotate again.
-    let rows: Vec<Vec<f64>> = hessian.chunks_exact(d).map(|row| patch.in_space(row)).collect();
-    let columns = (0..d).map(|c| rows.iter().map(|row| row[c]).collect::<Vec<f64>>());
-    columns.flat_map(|column| patch.in_space(&column)).map(|h| h / patch.radius).collect()
+    let rows: Small = hessian.chunks_exact(d).flat_map(|row| patch.in_space(row)).collect();
+    let column = |c: usize| rows.iter().skip(c).step_by(d).copied().collect::<Small>();
+    (0..d).flat_map(|c| patch.in_space(&column(c))).map(|h| h / patch.radius).collect()
 }
 
 /// Spacing of k points spread over a ball of radius 1 in d − 1 dimensions: each has `1/k` of its volume, some 1.8^{d−1}.
 fn mean_spacing(patch: &Patch) -> f64 {
-    let k = patch.points.len() as f64;
+    let k = patch.n_points() as f64;
     1.8 * k.powf(-1.0 / (patch.dimension() as f64 - 1.0))
 }
 
@@ -113,7 +115,7 @@ mod tests {
         let at = |i: usize| ((i % 7) as f64 / 3.0 - 1.0, (i / 7) as f64 / 3.0 - 1.0);
         let points: Vec<f64> = (0..49).map(at).flat_map(|(x, y)| [x, y, height(x, y)]).collect();
         let cloud = Cloud::new(points, 3).unwrap();
-        let patch = Patch::of(&cloud, &[0.0; 3], (0..49).collect()).unwrap();
+        let patch = Patch::of(&cloud, &[0.0; 3], 0..49).unwrap();
         let normal = |(x, y)| {
             let [a, b] = slope(x, y);
             let length = (1.0 + a * a + b * b).sqrt();

@@ -4,8 +4,10 @@ mod layers;
 
 use super::Surface;
 use crate::numerics::machine::vector::{dot, norm};
-use crate::numerics::points::patch::{Patch, n_coefficients};
-use layers::{OffsetJet, n_patch_points, offset_jet};
+use crate::numerics::points::patch::Patch;
+use crate::numerics::points::quadric::n_coefficients;
+pub(crate) use layers::OffsetJet;
+use layers::{n_patch_points, offset_jet};
 
 /// Spacings from the nearest point up to which the offset model is asked.
 const REACH_SPACINGS: f64 = 2.0;
@@ -23,23 +25,21 @@ const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
 ///
 /// `None` where the cloud does not support it: x far from all points, too few points on one sheet around it, or an
 /// interpolant that is no distance.
-pub(crate) fn rescue(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
+pub(crate) fn offset_jet_at(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
     let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
-    let mut points: Vec<usize> = Vec::with_capacity(n_patch_points(d));
-    let nearest = surface.neighbours().nearest_positions(cloud, x, n_patch_points(d));
+    let nearest = surface.sampling().neighbours().nearest_positions(cloud, x, n_patch_points(d));
     let first = nearest.first()?;
-    if first.squared_distance > (REACH_SPACINGS * surface.spacing(first.point)).powi(2) {
+    if first.squared_distance > (REACH_SPACINGS * surface.sampling().spacing(first.point)).powi(2) {
         return None;
     }
     let normal = surface.normal(first.point);
-    points.extend(
-        nearest.iter().map(|found| found.point).filter(|&p| dot(surface.normal(p), normal) > SAME_SHEET),
-    );
+    let is_same_sheet = |&point: &usize| dot(surface.normal(point), normal) > SAME_SHEET;
+    let points: Vec<usize> = nearest.iter().map(|found| found.point).filter(is_same_sheet).collect();
     if points.len() < MIN_PER_COEFFICIENT * n_coefficients(d) {
         return None;
     }
-    let patch = Patch::of(cloud, x, points)?;
-    let normals: Vec<f64> = patch.points.iter().flat_map(|&point| surface.normal(point)).copied().collect();
+    let patch = Patch::of(cloud, x, points.iter().copied())?;
+    let normals: Vec<f64> = points.iter().flat_map(|&point| surface.normal(point)).copied().collect();
     let jet = offset_jet(&patch, &normals).ok()?;
     let length = norm(&jet.gradient);
     let is_distance = GRADIENT_NORMS.contains(&length) && dot(&jet.gradient, normal) > 0.5 * length;

@@ -10,7 +10,8 @@ use faer::MatMut;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::geometry::{Geometry, tangential_trace};
+use super::curvature::tangential_trace;
+use super::geometry::Geometry;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::kernel::{Kernel, Pairs};

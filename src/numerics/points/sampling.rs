@@ -1,0 +1,149 @@
+//! How a cloud is sampled: who is near whom, how far apart, and the lengths that kernels follow.
+
+use rayon::prelude::*;
+
+use super::cloud::{Cloud, squared_distance};
+use super::neighbours::Neighbours;
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::observer::Observer;
+
+/// Positions around a point that define the sampling distance there.
+pub const SPACING_NEIGHBOURS: usize = 4;
+
+/// What the positions of a cloud say, found once for all who ask.
+pub struct Sampling {
+    neighbours: Neighbours,
+    spacings: Vec<f64>,
+    scales: Scales,
+}
+
+impl Sampling {
+    /// Looks at the neighbours of every point.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let neighbours = Neighbours::of(cloud);
+        let n = cloud.n_points();
+        let (mut distances, mut spacings) = (vec![0.0; n], vec![0.0; n]);
+        let slots = distances.par_iter_mut().zip(&mut spacings);
+        slots.enumerate().try_for_each_init(Vec::new, |found, (point, (nearest, spacing))| {
+            observer.checkpoint()?;
+            if let Some(lengths) = neighbours.nearest_and_mean(cloud, point, SPACING_NEIGHBOURS, found) {
+                (*nearest, *spacing) = lengths;
+            }
+            Ok(())
+        })?;
+        // Nobody is elsewhere if all points coincide.
+        let (nearest, means) = match distances.iter().all(|&distance| distance == 0.0) {
+            true => (Vec::new(), Vec::new()),
+            false => (distances, spacings.clone()),
+        };
+        Ok(Self { neighbours, spacings, scales: Scales::of(cloud, nearest, means) })
+    }
+
+    /// Flops of [`Sampling::of`]: every search visits a few leaves, in many dimensions most of the cloud.
+    pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
+        let n = n_points as f64;
+        let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
+        // Distance, comparison and descent.
+        n * visited * (3.0 * dimension as f64 + 10.0)
+    }
+
+    pub fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    /// h_q: mean distance from a point to the [`SPACING_NEIGHBOURS`] nearest positions elsewhere, unit L; 0 for one position alone.
+    pub fn spacing(&self, point: usize) -> f64 {
+        self.spacings[point]
+    }
+
+    /// The same for all points, `[n]`.
+    pub fn spacings(&self) -> &[f64] {
+        &self.spacings
+    }
+
+    pub fn scales(&self) -> &Scales {
+        &self.scales
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        self.neighbours.n_bytes() + vec_bytes(&self.spacings)
+    }
+}
+
+/// Lengths of a cloud, unit L; those that kernels follow are 1 for one position alone, which has no scale.
+#[derive(Debug, Clone, Copy)]
+pub struct Scales {
+    /// Half the diagonal of the bounding box.
+    pub radius: f64,
+    /// Root mean square distance to the centroid, which no rotation changes.
+    pub extent: f64,
+    /// h: median distance to the nearest point elsewhere.
+    pub nearest: f64,
+    /// h₄: median of the mean distance to the 4 nearest points elsewhere.
+    pub spacing: f64,
+    nearest_range: Option<NearestRange>,
+}
+
+/// Distances from each point to the nearest point elsewhere, unit L.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestRange {
+    pub min: f64,
+    pub median: f64,
+    pub max: f64,
+}
+
+impl Scales {
+    fn of(cloud: &Cloud, nearest: Vec<f64>, means: Vec<f64>) -> Self {
+        let range = |of: fn(f64, f64) -> f64| nearest.iter().copied().reduce(of);
+        let (min, max) = (range(f64::min), range(f64::max));
+        match (min, median(nearest), max, median(means)) {
+            (Some(min), Some(median), Some(max), Some(spacing)) => Self {
+                radius: cloud.radius(),
+                extent: extent(cloud),
+                nearest: median,
+                spacing,
+                nearest_range: Some(NearestRange { min, median, max }),
+            },
+            _ => Self { radius: 1.0, extent: 1.0, nearest: 1.0, spacing: 1.0, nearest_range: None },
+        }
+    }
+
+    /// `None` if all points coincide.
+    pub fn nearest_range(&self) -> Option<NearestRange> {
+        self.nearest_range
+    }
+}
+
+fn extent(cloud: &Cloud) -> f64 {
+    let n = cloud.n_points() as f64;
+    let mut centroid = vec![0.0; cloud.dimension()];
+    for x in cloud.points() {
+        centroid.iter_mut().zip(x).for_each(|(c, x)| *c += x / n);
+    }
+    cloud.points().map(|x| squared_distance(x, &centroid) / n).sum::<f64>().sqrt()
+}
+
+/// The middle of a list, the upper one of two.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return None;
+    }
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![]), None);
+    }
+}
