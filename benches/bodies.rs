@@ -132,7 +132,7 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
         async move {
             let wanted = Wanted { format: Format::Npy, coding: Coding::Identity };
             let memory =
-                app.factors.reserve(Owner(0), 2 * size_of_val(&*matrix), || true).await.unwrap().unwrap();
+                app.prepared.reserve(Owner(0), 2 * size_of_val(&*matrix), || true).await.unwrap().unwrap();
             let encode = move || Encoded::of(Matrix(matrix), wanted);
             let encoded = app.compute.run_small(Owner(0), encode).await;
             encoded.ok().unwrap().ok().unwrap().into_response(&app.compute, memory)

@@ -14,7 +14,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::{Observer, Stage};
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 use support::common::clouds::fibonacci_sphere;
 use support::{ROUNDS, measure, size_argument, timed};
@@ -53,7 +53,9 @@ fn main() {
         let stopwatch = Stopwatch::default();
         let kernel = Kernel::new(Family::Matern { order: 2 }, 0.2, 1.0).unwrap();
         let alpha = Regularization::uniform(1e-6).unwrap();
-        GramFactor::factorize(cloud.clone(), kernel, alpha, &stopwatch).unwrap();
+        System::new(cloud.clone(), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &stopwatch))
+            .unwrap();
         let end = Instant::now();
         let stage = |stage| stopwatch.time(stage, end);
         vec![

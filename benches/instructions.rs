@@ -18,7 +18,7 @@ use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::machine::instruction_set::InstructionSet;
 use gramian::numerics::observer::{Observer, Stage, Unobserved};
 use gramian::numerics::points::neighbours::Neighbours;
-use gramian::numerics::solver::{GramFactor, Solution};
+use gramian::numerics::solver::{Solution, Solver, System};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::nodes::Nodes;
 use gramian::numerics::sums::regularization::Regularization;
@@ -90,8 +90,11 @@ impl Observer for UpToGram {
 fn gram(family: Family) {
     let (cloud, kernel) = (Arc::new(scattered(1024, 3, 1)), kernel(family));
     let observer = UpToGram::default();
-    let outcome =
-        measured(|| GramFactor::factorize(cloud, kernel, Regularization::Uniform(1e-6), &observer).map(drop));
+    let outcome = measured(|| {
+        System::new(cloud, kernel, Regularization::Uniform(1e-6))
+            .and_then(|system| Solver::dense(system, &observer))
+            .map(drop)
+    });
     assert!(outcome.is_err(), "it stops behind the Gram matrix");
 }
 
@@ -109,9 +112,11 @@ fn portable_jets(order: JetOrder) {
     measured(|| Jets::over(&nodes, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
 }
 
-fn factorized(n: usize) -> GramFactor {
+fn factorized(n: usize) -> Solver {
     let cloud = Arc::new(scattered(n, 3, 1));
-    GramFactor::factorize(cloud, kernel(MATERN), Regularization::Uniform(1e-6), &Unobserved).unwrap()
+    System::new(cloud, kernel(MATERN), Regularization::Uniform(1e-6))
+        .and_then(|system| Solver::dense(system, &Unobserved))
+        .unwrap()
 }
 
 fn factorize(n: usize) {

@@ -17,7 +17,7 @@ use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
@@ -64,13 +64,13 @@ fn kernel() -> Kernel {
     Kernel::new(Family::Matern { order: 2 }, LENGTH_SCALE, 1.0).unwrap()
 }
 
-fn factorize(cloud: &Arc<Cloud>) -> GramFactor {
+fn factorize(cloud: &Arc<Cloud>) -> Solver {
     let alpha = Regularization::uniform(ALPHA).unwrap();
-    GramFactor::factorize(cloud.clone(), kernel(), alpha, &Unobserved).unwrap()
+    System::new(cloud.clone(), kernel(), alpha).and_then(|system| Solver::dense(system, &Unobserved)).unwrap()
 }
 
 /// Weights, surface, geometry at the points and the matrix there.
-fn laplace_beltrami(factor: &Arc<GramFactor>) -> Vec<f64> {
+fn laplace_beltrami(factor: &Arc<Solver>) -> Vec<f64> {
     let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
     let geometry = Geometry::of(&fits::surface(factor), factor.cloud(), &request, &Unobserved).unwrap();
     laplace_beltrami_matrix(&geometry, factor, factor.cloud(), &Unobserved).unwrap()

@@ -1,7 +1,11 @@
 //! Logs: one JSON line each, to standard error.
 
+use tracing::Level;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::fmt;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Lines that wait for a reader that is slow, or has stopped: some megabytes.
 const MAX_WAITING_LINES: usize = 4096;
@@ -13,13 +17,14 @@ pub struct Log {
     lost: ErrorCounter,
 }
 
-/// Starts logging at the level of `RUST_LOG`, `info` if absent.
+/// Starts logging at the level of `RUST_LOG`, which may name levels of single modules as well; `info` if absent.
 pub fn start() -> Log {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let wanted = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
+    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(Level::INFO));
     let builder = NonBlockingBuilder::default().buffered_lines_limit(MAX_WAITING_LINES).lossy(true);
     let (lines, writer) = builder.finish(std::io::stderr());
     let log = Log { _writer: writer, lost: lines.error_counter() };
-    tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(lines).init();
+    tracing_subscriber::registry().with(fmt::layer().json().with_writer(lines)).with(filter).init();
     log
 }
 

@@ -12,14 +12,14 @@ use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::sampling::Sampling;
-use gramian::numerics::solver::{GramFactor, Solution};
+use gramian::numerics::solver::choose::choose;
+use gramian::numerics::solver::{Solution, Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
-use gramian::store::factors::{FactorBytes, FactorStore, StoredFactor};
-use gramian::store::key::{CloudId, FactorKey, ValuesKey};
+use gramian::store::key::{CloudId, FitKey, ValuesKey};
+use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
 
 use crate::common::clouds::fibonacci_sphere;
 use crate::common::fits;
@@ -35,7 +35,7 @@ const BUDGET: usize = 1 << 34;
 
 const OWNER: Owner = Owner(0);
 
-type Factors = FactorStore<&'static str>;
+type Factors = PreparedStore<&'static str>;
 type Clouds = CloudStore<NumericsError>;
 
 #[tokio::test]
@@ -49,7 +49,7 @@ async fn what_the_stores_count_is_what_they_take() {
     let clouds = |from: usize, to: usize| {
         async move |store: &Clouds, k: usize| keep_cloud(store, scattered(k, from, to), k).await
     };
-    let bytes = FactorBytes { kept: BUDGET, spare: BUDGET / 8, budget: BUDGET, n_owners: 1 };
+    let bytes = PreparedBytes { kept: BUDGET, spare: BUDGET / 8, budget: BUDGET, n_owners: 1 };
     let (new_factors, new_clouds) = (|| Factors::new(bytes), || Clouds::new(BUDGET));
     let measurements = [
         growth("weights of 64 to 1,000 values", new_factors(), Factors::n_bytes, 60_000, keep_weights).await,
@@ -123,16 +123,19 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
     let (cloud, kernel, alpha) = (fibonacci_sphere(n), kernel(k), Regularization::Uniform(1e-6));
     let key = key(&cloud, &kernel, &alpha);
     let factorize = move |memory| async move {
-        let factor = GramFactor::factorize(Arc::new(cloud), kernel, alpha, &Unobserved).unwrap();
-        Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
+        let factor = System::new(Arc::new(cloud), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))
+            .unwrap();
+        Ok(PreparedFit::new(factor, Duration::ZERO, Duration::ZERO, memory))
     };
     let memory =
-        store.reserve(OWNER, GramFactor::n_bytes_needed(n).unwrap(), || true).await.unwrap().unwrap();
-    let (stored, _) = store.get_or_factorize(key, Some(memory), factorize).await.unwrap().unwrap();
+        store.reserve(OWNER, choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
+    let (stored, _) = store.get_or_prepare(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
-        let factor = stored.factor.clone();
+        let factor = stored.solver().clone();
         let make = |memory| async move { Ok((fits::surface(&factor), memory)) };
-        let memory = store.reserve(OWNER, Surface::n_bytes_needed(n, 3), || true).await.unwrap().unwrap();
+        let memory =
+            store.reserve(OWNER, choose(n, 3, usize::MAX).surface.n_bytes, || true).await.unwrap().unwrap();
         let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();
         Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     }
@@ -143,8 +146,8 @@ fn kernel(k: usize) -> Kernel {
     Kernel::new(Family::Matern { order: 2 }, 0.3 + 1e-6 * k as f64, 1.0).unwrap()
 }
 
-fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FactorKey {
-    FactorKey::of_dense(OWNER, CloudId::of(cloud, None), kernel, alpha, false)
+fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FitKey {
+    FitKey::of_dense(OWNER, CloudId::of(cloud, None), kernel, alpha, false)
 }
 
 fn resident_bytes() -> f64 {

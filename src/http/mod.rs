@@ -26,7 +26,8 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::config::Origins;
 use around::{authentication, middleware};
 use routes::{
-    clouds, interpolation, kernels, laplace_beltrami, pages, posterior, process, surface, surface_gradient,
+    clouds, curvatures, interpolation, kernels, laplace_beltrami, normals, pages, posterior, process,
+    surface_gradient,
 };
 use serve::app::App;
 
@@ -80,8 +81,8 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         // Whatever follows computes, and negotiates by itself.
         .routes(routes!(interpolation::compute_interpolation))
         .routes(routes!(posterior::compute_posterior))
-        .routes(routes!(surface::compute_normals))
-        .routes(routes!(surface::compute_curvatures))
+        .routes(routes!(normals::compute_normals))
+        .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))
         .routes(routes!(surface_gradient::assemble_surface_gradient_matrix))
         .routes(routes!(laplace_beltrami::compute_laplace_beltrami))

@@ -76,7 +76,7 @@ mod tests {
     use crate::numerics::points::cloud::Cloud;
     use crate::numerics::points::noise::estimate_noise;
     use crate::numerics::points::sampling::Sampling;
-    use crate::numerics::solver::GramFactor;
+    use crate::numerics::solver::{Solver, System};
     use crate::numerics::sums::regularization::Regularization;
     use crate::numerics::surface::Surface;
     use crate::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
@@ -105,8 +105,10 @@ mod tests {
             let cloud = Arc::new(circle(n));
             let (kernel, alpha) = of(&cloud, Purpose::Normals);
             let alpha = Regularization::uniform(alpha).unwrap();
-            let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
-            let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
+            let solver = System::new(cloud.clone(), kernel, alpha)
+                .and_then(|system| Solver::dense(system, &Unobserved))
+                .unwrap();
+            let signature = Interpolant::signature(Arc::new(solver), &Unobserved).unwrap();
             let surface = Surface::of(signature, None, &Unobserved).unwrap();
             let model = SurfaceModel::Signature;
             let request = GeometryRequest { model, checks_curvatures: false, ..GeometryRequest::CURVATURES };

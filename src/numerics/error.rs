@@ -1,5 +1,7 @@
 //! The one error type of the numerical layer.
 
+use super::solver::kind::{Quantity, SolverKind};
+
 /// What the numerics refuses, named by its cause, with the index of the offending point where there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NumericsError {
@@ -42,6 +44,8 @@ pub enum NumericsError {
     Overflow { query: usize },
     #[error("the weights are outside the range of float64")]
     WeightsOverflow,
+    #[error("the {solver:?} solver does not serve {quantity:?}")]
+    Unsupported { solver: SolverKind, quantity: Quantity },
     #[error("{n_bytes} bytes of memory are not to be had")]
     OutOfMemory { n_bytes: usize },
     #[error("the computation was cancelled")]

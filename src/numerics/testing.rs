@@ -1,8 +1,11 @@
-//! Clouds for the unit tests of this layer: those of the integration tests.
+//! Clouds and kernels for the unit tests of this layer: those of the integration tests.
 
 #[path = "../../tests/common/clouds.rs"]
 mod clouds;
+#[path = "../../tests/common/kernels.rs"]
+mod kernels;
 #[path = "../../tests/common/random.rs"]
 mod random;
 
 pub(crate) use clouds::{circle, fibonacci_sphere};
+pub(crate) use kernels::all_families;

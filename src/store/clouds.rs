@@ -16,7 +16,7 @@ use crate::numerics::points::sampling::{Sampling, Scales};
 ///
 /// The cells are only ever read and set: what they hold is computed elsewhere, by [`CloudStore::sampling`] and
 /// [`CloudStore::noise`].
-pub struct StoredCloud {
+pub struct RegisteredCloud {
     pub id: CloudId,
     pub cloud: Arc<Cloud>,
     /// The client's normals, `[n, d]`, not normalised.
@@ -30,7 +30,7 @@ pub struct StoredCloud {
     noise: OnceLock<f64>,
 }
 
-impl StoredCloud {
+impl RegisteredCloud {
     fn new(id: CloudId, cloud: Cloud, normals: Option<Cloud>) -> Self {
         // What is kept comes first, what is needed for a moment behind it.
         let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
@@ -73,7 +73,7 @@ impl StoredCloud {
 
 /// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
 pub struct CloudStore<E> {
-    clouds: FairCache<CloudId, Arc<StoredCloud>>,
+    clouds: FairCache<CloudId, Arc<RegisteredCloud>>,
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
 }
@@ -84,16 +84,21 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 
     /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered, not kept.
-    pub fn register(&self, owner: Owner, cloud: Cloud, normals: Option<Cloud>) -> (Arc<StoredCloud>, bool) {
+    pub fn register(
+        &self,
+        owner: Owner,
+        cloud: Cloud,
+        normals: Option<Cloud>,
+    ) -> (Arc<RegisteredCloud>, bool) {
         let id = CloudId::of(&cloud, normals.as_ref());
         if let Some(found) = self.clouds.get(owner, &id) {
             return (found, false);
         }
-        let stored = Arc::new(StoredCloud::new(id, cloud, normals));
+        let stored = Arc::new(RegisteredCloud::new(id, cloud, normals));
         self.clouds.get_or_insert(owner, id, stored, |stored| stored.n_bytes())
     }
 
-    pub fn get(&self, owner: Owner, id: CloudId) -> Option<Arc<StoredCloud>> {
+    pub fn get(&self, owner: Owner, id: CloudId) -> Option<Arc<RegisteredCloud>> {
         self.clouds.get(owner, &id)
     }
 
@@ -104,7 +109,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub async fn sampling<F>(
         &self,
         owner: Owner,
-        stored: &StoredCloud,
+        stored: &RegisteredCloud,
         compute: impl FnOnce() -> F,
     ) -> Result<Arc<Sampling>, E>
     where
@@ -128,7 +133,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub async fn noise<F>(
         &self,
         owner: Owner,
-        stored: &StoredCloud,
+        stored: &RegisteredCloud,
         compute: impl FnOnce() -> F,
     ) -> Result<(), E>
     where
@@ -149,7 +154,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 
     /// All clouds of an owner, oldest first, ties by id.
-    pub fn list(&self, owner: Owner) -> Vec<Arc<StoredCloud>> {
+    pub fn list(&self, owner: Owner) -> Vec<Arc<RegisteredCloud>> {
         let mut clouds = self.clouds.values(owner);
         clouds.sort_by_key(|stored| (stored.created_at, stored.id));
         clouds

@@ -49,14 +49,14 @@ impl fmt::Debug for CloudId {
 
 /// Everything a factorization depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct FactorKey {
+pub struct FitKey {
     pub owner: Owner,
     pub cloud_id: CloudId,
     /// BLAKE3 of kernel, regularization, solver and whether duplicates were merged.
     fit: [u8; 32],
 }
 
-impl FactorKey {
+impl FitKey {
     /// Names the dense factorization of a cloud (with duplicates merged or not).
     pub fn of_dense(
         owner: Owner,
@@ -134,7 +134,7 @@ mod tests {
         let kernel = |family, length_scale, variance| Kernel::new(family, length_scale, variance).unwrap();
         let alpha = Regularization::Uniform;
         let of = |owner, kernel: &Kernel, regularization: &Regularization, merged| {
-            FactorKey::of_dense(Owner(owner), id, kernel, regularization, merged)
+            FitKey::of_dense(Owner(owner), id, kernel, regularization, merged)
         };
         let gauss = kernel(Family::Gauss, 1.0, 1.0);
         let keys = [

@@ -15,9 +15,9 @@
 
 pub mod budget;
 pub mod clouds;
-pub mod factors;
 mod fair_cache;
 pub mod key;
+pub mod prepared;
 mod single_flight;
 
 /// Whose clouds are meant: the position of the API key in the configuration, or the one owner of an open service.

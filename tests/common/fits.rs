@@ -12,7 +12,7 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::noise::estimate_noise;
 use gramian::numerics::points::sampling::Sampling;
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
@@ -30,33 +30,37 @@ pub fn default_kernel_and_alpha(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64
 }
 
 /// `K + αI` of a cloud, factorized.
-pub fn factorize(cloud: &Cloud, kernel: Kernel, alpha: f64) -> Arc<GramFactor> {
+pub fn factorize(cloud: &Cloud, kernel: Kernel, alpha: f64) -> Arc<Solver> {
     let alpha = Regularization::uniform(alpha).unwrap();
-    Arc::new(GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap())
+    Arc::new(
+        System::new(Arc::new(cloud.clone()), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))
+            .unwrap(),
+    )
 }
 
 /// The function of some values, for tests that expect a refusal.
-pub fn try_fit(factor: &Arc<GramFactor>, values: &[f64]) -> Result<Interpolant, NumericsError> {
+pub fn try_fit(factor: &Arc<Solver>, values: &[f64]) -> Result<Interpolant, NumericsError> {
     Interpolant::fit(factor.clone(), values, &Unobserved)
 }
 
 /// The function of some values.
-pub fn fit(factor: &Arc<GramFactor>, values: &[f64]) -> Interpolant {
+pub fn fit(factor: &Arc<Solver>, values: &[f64]) -> Interpolant {
     try_fit(factor, values).unwrap()
 }
 
 /// The signature function of the factor's cloud: that of the constant 1.
-pub fn signature(factor: &Arc<GramFactor>) -> Interpolant {
+pub fn signature(factor: &Arc<Solver>) -> Interpolant {
     Interpolant::signature(factor.clone(), &Unobserved).unwrap()
 }
 
 /// The surface through the factor's cloud, which has no normals of its own.
-pub fn surface(factor: &Arc<GramFactor>) -> Surface {
+pub fn surface(factor: &Arc<Solver>) -> Surface {
     Surface::of(signature(factor), None, &Unobserved).unwrap()
 }
 
 /// Outward normals and curvatures at queries, of the signature function by itself: no offset model.
-pub fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> Geometry {
+pub fn geometry(factor: &Arc<Solver>, queries: &Cloud) -> Geometry {
     let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
     Geometry::of(&surface(factor), queries, &request, &Unobserved).unwrap()
 }

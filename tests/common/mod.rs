@@ -1,5 +1,6 @@
-//! What tests, benchmarks and examples share: random numbers, clouds, and fits of them.
+//! What tests, benchmarks and examples share: random numbers, clouds, kernels, and fits of them.
 
 pub mod clouds;
 pub mod fits;
+pub mod kernels;
 pub mod random;

@@ -8,7 +8,7 @@ use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::solver::{Method, Solver};
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 use serde_json::Value;
@@ -48,7 +48,7 @@ struct Case<'a> {
     points: Cloud,
     values: Vec<f64>,
     queries: Cloud,
-    factor: Arc<GramFactor>,
+    factor: Arc<Solver>,
     failures: Vec<String>,
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::solver::{Method, Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 
 use crate::support::*;
@@ -15,8 +15,8 @@ fn mixed(variance: f64) -> Interpolant {
     let points = fibonacci_sphere(512);
     let variances = (0..512).map(|i: usize| if i.is_multiple_of(3) { variance } else { 0.0 }).collect();
     let noise = Regularization::per_point(variances).unwrap();
-    let factor =
-        GramFactor::factorize(Arc::new(points.clone()), kernel(Family::Gauss, 1.0), noise, &Unobserved);
+    let factor = System::new(Arc::new(points.clone()), kernel(Family::Gauss, 1.0), noise)
+        .and_then(|system| Solver::dense(system, &Unobserved));
     let factor = Arc::new(factor.unwrap());
     assert_eq!(factor.method(), Method::PivotedCholesky);
     // Only the noisy points are off the wave, by less than their standard deviation.
@@ -38,11 +38,11 @@ fn exact_points_are_met_and_noisy_ones_smoothed() {
         assert!(error < 1e-6, "variance {variance:e}: {error:e}");
         assert!(u.solution.relative_residual < 1e-9);
         // D Λ is the misfit: the noisy points are missed by just what the fit says.
-        let misfit = jets(&u, u.factor.cloud())[0].clone();
+        let misfit = jets(&u, u.solver.cloud())[0].clone();
         let exact: Vec<f64> = (0..512).filter(|i: &usize| !i.is_multiple_of(3)).map(|i| misfit[i]).collect();
         let wanted: Vec<f64> = (0..512)
             .filter(|i: &usize| !i.is_multiple_of(3))
-            .map(|i| wave(u.factor.cloud().point(i)))
+            .map(|i| wave(u.solver.cloud().point(i)))
             .collect();
         assert!(relative_distance(&exact, &wanted) < 1e-6);
     }

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use gramian::numerics::kernel::Family;
 use gramian::numerics::observer::Unobserved;
-use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::solver::Method;
+use gramian::numerics::solver::choose::choose;
 use gramian::numerics::surface::operators::{laplace_beltrami, surface_gradient};
 
 use crate::support::*;
@@ -63,9 +64,9 @@ fn the_fallback_keeps_the_memory_of_cholesky_or_beyond_a_quarter_of_the_rank_all
         assert!(ranks.contains(&factor.rank()), "{} of {n}", factor.rank());
         // The order of the points comes on top, and what the allocator rounds up: two slices of 64 KiB.
         let needed = if factor.rank() > n / 4 {
-            GramFactor::n_bytes_needed_at_most(n).unwrap()
+            choose(n, 3, usize::MAX).at_most.n_bytes
         } else {
-            GramFactor::n_bytes_needed(n).unwrap()
+            choose(n, 3, usize::MAX).expected.n_bytes
         };
         let bound = needed + n * size_of::<usize>() + (128 << 10);
         let found = factor.n_bytes() - size_of_val(points.coordinates());

@@ -94,7 +94,7 @@ fn check_refusal(twins: &Cloud, kernel: Kernel, values: &[f64], error: &Numerics
 }
 
 fn at_points(u: &Interpolant) -> Vec<f64> {
-    u.at(u.factor.cloud(), JetOrder::Value, &Unobserved).unwrap().values()
+    u.at(u.solver.cloud(), JetOrder::Value, &Unobserved).unwrap().values()
 }
 
 #[test]

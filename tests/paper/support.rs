@@ -80,7 +80,7 @@ impl Surface {
 
     /// Values sampled at the points of the cloud.
     pub fn function(&self, values: &[f64]) -> Function<'_> {
-        Function { surface: self, interpolant: fit(&self.surface.signature().factor, values) }
+        Function { surface: self, interpolant: fit(&self.surface.signature().solver, values) }
     }
 
     fn jets(&self, queries: &Cloud, order: JetOrder) -> Jets {

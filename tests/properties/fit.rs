@@ -4,7 +4,7 @@ use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::{GramFactor, Method};
+use gramian::numerics::solver::{Method, Solver};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 
 use crate::common::clouds::{fibonacci_sphere, random_cube, waves};
@@ -108,7 +108,7 @@ fn derivatives_agree_with_central_differences_off_the_cloud() {
         let here = jets(&u, &queries, JetOrder::Hessian);
         // Truncation h²/6 · derivative of order ≤ 4, at most 1e3 for √ε = 0.1 and at this distance from the
         // kinks; rounding ε/h is far below.
-        let tolerance = 200.0 * h * h * u.factor.kernel().at_zero() * absolute_sum(&u.solution.weights);
+        let tolerance = 200.0 * h * h * u.solver.kernel().at_zero() * absolute_sum(&u.solution.weights);
         for axis in 0..3 {
             let below = jets(&u, &shifted(&queries, axis, -h), JetOrder::Gradient);
             let above = jets(&u, &shifted(&queries, axis, h), JetOrder::Gradient);
@@ -198,7 +198,7 @@ fn variances_lie_between_zero_and_the_prior_and_fall_with_every_point() {
     }
 }
 
-fn latent(factor: &GramFactor, queries: &Cloud) -> Vec<f64> {
+fn latent(factor: &Solver, queries: &Cloud) -> Vec<f64> {
     variances(factor, queries, &Unobserved).unwrap().latent
 }
 

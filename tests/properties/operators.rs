@@ -7,7 +7,7 @@ use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::Solver;
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
@@ -37,7 +37,7 @@ fn smoothness(family: Family) -> i32 {
     }
 }
 
-fn exact_factor(cloud: &Cloud, family: Family, length_scale: f64) -> Arc<GramFactor> {
+fn exact_factor(cloud: &Cloud, family: Family, length_scale: f64) -> Arc<Solver> {
     factorize(cloud, kernel(family, width(family) * length_scale), 0.0)
 }
 
@@ -104,7 +104,7 @@ fn with_two_kernels_the_laplacian_of_a_constant_tends_to_zero() {
 
 /// Largest error of Δ x_c = −(d − 1) x_c over the coordinates of the unit sphere, one fit for surface and
 /// values.
-fn coordinate_error(factor: &Arc<GramFactor>, queries: &Cloud) -> f64 {
+fn coordinate_error(factor: &Arc<Solver>, queries: &Cloud) -> f64 {
     let (cloud, geometry) = (factor.cloud(), geometry(factor, queries));
     assert!(geometry.is_null().iter().all(|is_null| !is_null));
     let error = |axis: usize| {

@@ -1,28 +1,14 @@
 //! Kernels and small dense algebra shared by the properties.
 
-use gramian::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
+use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::Solver;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 
-pub const EPS: f64 = f64::EPSILON;
+pub use crate::common::kernels::all_families as families;
 
-/// Every family, in the parameters of the brief: 17 kernels.
-pub fn families() -> Vec<Family> {
-    let mut families = vec![
-        Family::Gauss,
-        Family::Laplace { epsilon: 1.0 },
-        Family::Laplace { epsilon: 0.01 },
-        Family::Laplace { epsilon: 0.0 },
-        Family::Wendland { smoothness: WendlandSmoothness::C2 },
-        Family::Wendland { smoothness: WendlandSmoothness::C4 },
-        Family::Wendland { smoothness: WendlandSmoothness::C6 },
-        Family::InverseMultiquadric,
-    ];
-    families.extend((0..=MAX_MATERN_ORDER).map(|order| Family::Matern { order }));
-    families
-}
+pub const EPS: f64 = f64::EPSILON;
 
 /// The families with derivatives at the points of the cloud: all but Laplace ε = 0 and Matérn 1/2, which have
 /// a kink there.
@@ -81,7 +67,7 @@ pub fn forward_solve(l: &[f64], b: &[f64]) -> Vec<f64> {
 }
 
 /// `n ε cond(K + αI)`: the relative rounding error that a solve may leave in the weights.
-pub fn rounding(factor: &GramFactor) -> f64 {
+pub fn rounding(factor: &Solver) -> f64 {
     factor.n_points() as f64 * EPS / factor.reciprocal_condition()
 }
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use gramian::numerics::defaults::Purpose;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::solver::GramFactor;
+use gramian::numerics::solver::Solver;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
 
 /// The factorization for a purpose with nothing chosen by the client.
-pub fn factor(cloud: &Cloud, purpose: Purpose) -> Arc<GramFactor> {
+pub fn factor(cloud: &Cloud, purpose: Purpose) -> Arc<Solver> {
     let (kernel, alpha) = default_kernel_and_alpha(cloud, purpose);
     factorize(cloud, kernel, alpha)
 }

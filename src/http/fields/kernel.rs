@@ -1,9 +1,76 @@
-//! Kernels of requests to kernels of the numerics, and back into the diagnostics.
+//! Kernels as JSON has them, to kernels of the numerics and back.
 
-use crate::http::fields::{Kernel, KernelFamily, KernelUsed};
-use crate::http::problem::{Place, Problem};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::schemas::Smoothness;
+use crate::http::problem::{Pointers, Problem};
+use crate::http::wire::read::members::{present, word};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use crate::numerics::points::sampling::Scales;
+
+/// The families of kernels; `GET /v1/kernels` has their formulas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelFamily {
+    Gauss,
+    Laplace,
+    Matern,
+    Wendland,
+    InverseMultiquadric,
+}
+
+/// A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Kernel {
+    /// The family, which determines φ.
+    #[serde(deserialize_with = "word")]
+    pub family: KernelFamily,
+    /// The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub length_scale: Option<f64>,
+    /// The factor of φ, unit of the values squared; 1 if absent.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub variance: Option<f64>,
+    /// laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, minimum = 0.0)]
+    pub epsilon: Option<f64>,
+    /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, minimum = 0.5, maximum = 8.5, multiple_of = 0.5)]
+    pub nu: Option<f64>,
+    /// wendland: 2, 4 or 6 times differentiable; 4 if absent.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, value_type = Option<Smoothness>)]
+    pub smoothness: Option<u8>,
+}
+
+/// The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct KernelUsed {
+    /// The family, which determines φ.
+    pub family: KernelFamily,
+    /// The length scale ℓ, in the unit of the coordinates.
+    pub length_scale: f64,
+    /// The factor of φ, unit of the values squared.
+    pub variance: f64,
+    /// laplace: φ = exp(−√(r² + epsilon)).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub epsilon: Option<f64>,
+    /// matern: the smoothness ν.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub nu: Option<f64>,
+    /// wendland: how often differentiable.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<Smoothness>)]
+    pub smoothness: Option<u8>,
+}
 
 /// A kernel that is checked but for a length scale that the cloud has yet to give.
 #[derive(Debug, Clone, Copy)]
@@ -17,13 +84,13 @@ impl PlannedKernel {
     ///
     /// # Errors
     /// 422 if the cloud is too small or large for any.
-    pub fn resolve(&self, scales: Option<&Scales>, place: Place) -> Result<NumericalKernel, Problem> {
+    pub fn resolve(&self, scales: Option<&Scales>, pointers: Pointers) -> Result<NumericalKernel, Problem> {
         match *self {
             Self::Given(kernel) => Ok(kernel),
             Self::OfCloud { family, variance } => {
                 let scales = scales.ok_or_else(Problem::internal)?;
                 NumericalKernel::new(family, family.default_length_scale(scales), variance)
-                    .map_err(|error| Problem::from_numerics(error, place))
+                    .map_err(|error| Problem::from_numerics(error, pointers))
             }
         }
     }
@@ -34,19 +101,19 @@ impl Kernel {
     ///
     /// # Errors
     /// 422 with a pointer to the parameter.
-    pub fn plan(&self, place: Place) -> Result<PlannedKernel, Problem> {
-        let family = self.resolve_family(place)?;
+    pub fn plan(&self, pointers: Pointers) -> Result<PlannedKernel, Problem> {
+        let family = self.resolve_family(pointers)?;
         let variance = self.variance.unwrap_or(1.0);
         // Without a length scale the other parameters are checked with any.
         let kernel = NumericalKernel::new(family, self.length_scale.unwrap_or(1.0), variance)
-            .map_err(|error| Problem::from_numerics(error, place))?;
+            .map_err(|error| Problem::from_numerics(error, pointers))?;
         Ok(match self.length_scale {
             Some(_) => PlannedKernel::Given(kernel),
             None => PlannedKernel::OfCloud { family, variance },
         })
     }
 
-    fn resolve_family(&self, place: Place) -> Result<Family, Problem> {
+    fn resolve_family(&self, pointers: Pointers) -> Result<Family, Problem> {
         let of_others = [
             ("epsilon", KernelFamily::Laplace, self.epsilon.is_some()),
             ("nu", KernelFamily::Matern, self.nu.is_some()),
@@ -55,7 +122,7 @@ impl Kernel {
         for (name, owner, is_given) in of_others {
             if is_given && self.family != owner {
                 let detail = format!("{name} is a parameter of another family");
-                return Err(Problem::invalid_request(format!("{}/{name}", place.kernel), detail));
+                return Err(Problem::invalid_request(format!("{}/{name}", pointers.kernel), detail));
             }
         }
         match self.family {
@@ -69,7 +136,7 @@ impl Kernel {
                     return Ok(Family::Matern { order: order as u8 });
                 }
                 let detail = format!("nu must be one of 0.5, 1.5, ..., 8.5, found {nu}");
-                Err(Problem::invalid_request(format!("{}/nu", place.kernel), detail))
+                Err(Problem::invalid_request(format!("{}/nu", pointers.kernel), detail))
             }
             KernelFamily::Wendland => {
                 let smoothness = match self.smoothness.unwrap_or(4) {
@@ -78,7 +145,10 @@ impl Kernel {
                     6 => WendlandSmoothness::C6,
                     other => {
                         let detail = format!("smoothness must be 2, 4 or 6, found {other}");
-                        return Err(Problem::invalid_request(format!("{}/smoothness", place.kernel), detail));
+                        return Err(Problem::invalid_request(
+                            format!("{}/smoothness", pointers.kernel),
+                            detail,
+                        ));
                     }
                 };
                 Ok(Family::Wendland { smoothness })

@@ -87,7 +87,7 @@ pub struct ProblemDocument<'a> {
 
 /// Where the parts of a fit stand in the request: what `geometry` leaves out stands elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub struct Pointers {
     /// The points of the cloud, or its id.
     pub points: &'static str,
     pub kernel: &'static str,
@@ -97,10 +97,14 @@ pub struct Place {
     pub queries: &'static str,
 }
 
-impl Place {
+impl Pointers {
     /// The fields of the request itself, the cloud as points.
-    pub const REQUEST: Place =
-        Place { points: "/cloud/points", kernel: "/kernel", regularization: "/alpha", queries: "/queries" };
+    pub const REQUEST: Pointers = Pointers {
+        points: "/cloud/points",
+        kernel: "/kernel",
+        regularization: "/alpha",
+        queries: "/queries",
+    };
 
     /// One entry of a list; an id has none.
     fn entry(list: &str, index: usize) -> String {
@@ -183,37 +187,37 @@ impl Problem {
     }
 
     /// Turns a refusal of the numerics into its problem: status, type, pointer and remedy.
-    pub fn from_numerics(error: NumericsError, place: Place) -> Self {
+    pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Self {
         use NumericsError as E;
         let detail = error.to_string();
         let at = |slug, pointer: &str| Self::of_field(slug, pointer, detail.clone());
         match error {
             E::EmptyCloud | E::ZeroDimension | E::DimensionTooSmall { .. } => {
-                at(Slug::InvalidCloud, place.points)
+                at(Slug::InvalidCloud, pointers.points)
             }
-            E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &Place::entry(place.points, point)),
+            E::RaggedPoints { point, .. } => at(Slug::InvalidCloud, &Pointers::entry(pointers.points, point)),
             E::NonFiniteCoordinate { point, coordinate } | E::CoordinateTooLarge { point, coordinate } => {
-                at(Slug::InvalidCloud, &format!("{}/{coordinate}", Place::entry(place.points, point)))
+                at(Slug::InvalidCloud, &format!("{}/{coordinate}", Pointers::entry(pointers.points, point)))
             }
-            E::DimensionMismatch { .. } => at(Slug::DimensionMismatch, place.queries),
+            E::DimensionMismatch { .. } => at(Slug::DimensionMismatch, pointers.queries),
             E::LengthMismatch { .. } => at(Slug::LengthMismatch, "/values"),
             E::InvalidKernelParameter { parameter, .. } => {
-                at(Slug::InvalidRequest, &format!("{}/{parameter}", place.kernel))
+                at(Slug::InvalidRequest, &format!("{}/{parameter}", pointers.kernel))
             }
-            E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, place.regularization),
+            E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, pointers.regularization),
             E::InvalidRegularization { point: Some(point), .. } => {
-                at(Slug::InvalidRequest, &Place::entry(place.regularization, point))
+                at(Slug::InvalidRequest, &Pointers::entry(pointers.regularization, point))
             }
             E::KernelNotPositiveDefinite { .. } => {
                 let remedy = format!("{detail}; choose another family");
-                Self::of_field(Slug::KernelNotPositiveDefinite, format!("{}/family", place.kernel), remedy)
+                Self::of_field(Slug::KernelNotPositiveDefinite, format!("{}/family", pointers.kernel), remedy)
             }
             E::KernelNotSmooth { query, .. } => {
                 let remedy = format!(
                     "{detail}; use laplace with epsilon > 0 or matern with nu of 1.5 or more, query elsewhere, or ask for the \
                      geometry of surface offset, which needs no gradient"
                 );
-                Self::of_field(Slug::KernelNotSmooth, Place::entry(place.queries, query), remedy)
+                Self::of_field(Slug::KernelNotSmooth, Pointers::entry(pointers.queries, query), remedy)
             }
             E::DuplicatePoints { points } => {
                 let remedy = format!(
@@ -222,7 +226,7 @@ impl Problem {
                 );
                 let mut problem = Self::new(Slug::DuplicatePoints, remedy);
                 for point in points.iter().take(10) {
-                    let pointer = Place::entry(place.points, *point);
+                    let pointer = Pointers::entry(pointers.points, *point);
                     problem
                         .members
                         .errors
@@ -237,13 +241,14 @@ impl Problem {
                 // Rounded up: the remedy must work when it is typed in.
                 let enough = 1.01 * minimum_alpha;
                 let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
-                let mut problem = Self::of_field(Slug::NotPositiveDefinite, place.regularization, remedy);
+                let mut problem = Self::of_field(Slug::NotPositiveDefinite, pointers.regularization, remedy);
                 problem.members.minimum_alpha = Some(minimum_alpha);
                 if let NotDefinite::NeedsCholesky { point } = reason {
                     problem.members.point_indices = vec![point];
                 }
                 problem
             }
+            E::Unsupported { .. } => at(Slug::InvalidRequest, "/solver"),
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }
@@ -307,12 +312,12 @@ mod tests {
     #[test]
     fn pointers_lead_into_the_fit_that_failed() {
         let error = NumericsError::RaggedPoints { point: 17, expected: 3, found: 2 };
-        let problem = Problem::from_numerics(error.clone(), Place::REQUEST);
+        let problem = Problem::from_numerics(error.clone(), Pointers::REQUEST);
         assert_eq!(problem.members.errors[0].pointer, "/cloud/points/17");
-        let elsewhere = Place { points: "/geometry/cloud/points", ..Place::REQUEST };
+        let elsewhere = Pointers { points: "/geometry/cloud/points", ..Pointers::REQUEST };
         let problem = Problem::from_numerics(error.clone(), elsewhere);
         assert_eq!(problem.members.errors[0].pointer, "/geometry/cloud/points/17");
-        let by_id = Place { points: "/cloud/id", ..Place::REQUEST };
+        let by_id = Pointers { points: "/cloud/id", ..Pointers::REQUEST };
         assert_eq!(Problem::from_numerics(error, by_id).members.errors[0].pointer, "/cloud/id");
     }
 

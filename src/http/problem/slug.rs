@@ -30,6 +30,16 @@ pub enum Slug {
     Internal,
 }
 
+/// What the catalogue says of a problem type.
+struct Entry {
+    /// The last segment of the problem's `type`.
+    name: &'static str,
+    status: StatusCode,
+    title: &'static str,
+    /// What it means and what to do, for the page behind the `type`.
+    explanation: &'static str,
+}
+
 impl Slug {
     pub const ALL: [Slug; 23] = [
         Self::MalformedRequest,
@@ -63,181 +73,182 @@ impl Slug {
 
     /// The last segment of the problem's `type`.
     pub fn as_str(self) -> &'static str {
-        self.entry().0
+        self.entry().name
     }
 
     pub fn status(self) -> StatusCode {
-        self.entry().1
+        self.entry().status
     }
 
     pub fn title(self) -> &'static str {
-        self.entry().2
+        self.entry().title
     }
 
     /// What it means and what to do, for the page behind the `type`.
     pub fn explanation(self) -> &'static str {
-        self.entry().3
+        self.entry().explanation
     }
 
-    fn entry(self) -> (&'static str, StatusCode, &'static str, &'static str) {
+    /// The line of the catalogue.
+    fn entry(self) -> Entry {
         match self {
-            Self::MalformedRequest => (
-                "malformed-request",
-                StatusCode::BAD_REQUEST,
-                "The head of the request is ambiguous",
-                "There is no Host or more than one, Host and target disagree, there is a Transfer-Encoding beside a \
+            Self::MalformedRequest => Entry {
+                name: "malformed-request",
+                status: StatusCode::BAD_REQUEST,
+                title: "The head of the request is ambiguous",
+                explanation: "There is no Host or more than one, Host and target disagree, there is a Transfer-Encoding beside a \
                  Content-Length or another one than chunked, or a line does not end in CR LF. Two programs may understand \
                  such a request differently, so it is refused and the connection is closed.",
-            ),
-            Self::MalformedJson => (
-                "malformed-json",
-                StatusCode::BAD_REQUEST,
-                "The body is not JSON",
-                "The body ends early, has a syntax error, or holds a number that JSON or float64 does not have, such as NaN \
+            },
+            Self::MalformedJson => Entry {
+                name: "malformed-json",
+                status: StatusCode::BAD_REQUEST,
+                title: "The body is not JSON",
+                explanation: "The body ends early, has a syntax error, or holds a number that JSON or float64 does not have, such as NaN \
                  or 1e400. The detail names line and column.",
-            ),
-            Self::MalformedBody => (
-                "malformed-body",
-                StatusCode::BAD_REQUEST,
-                "The body is not what its headers say",
-                "The body is not safetensors or npy as its Content-Type says, cannot be decompressed as its Content-Encoding \
+            },
+            Self::MalformedBody => Entry {
+                name: "malformed-body",
+                status: StatusCode::BAD_REQUEST,
+                title: "The body is not what its headers say",
+                explanation: "The body is not safetensors or npy as its Content-Type says, cannot be decompressed as its Content-Encoding \
                  says, or ends early.",
-            ),
-            Self::InvalidRequest => (
-                "invalid-request",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "The request does not have the documented form",
-                "A field has the wrong type, is null, unknown, missing, or out of its range. Each entry of errors points to \
+            },
+            Self::InvalidRequest => Entry {
+                name: "invalid-request",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The request does not have the documented form",
+                explanation: "A field has the wrong type, is null, unknown, missing, or out of its range. Each entry of errors points to \
                  one. Optional fields are left out, not null.",
-            ),
-            Self::InvalidCloud => (
-                "invalid-cloud",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "The points do not form a cloud",
-                "A cloud has at least one point, and all its points have the same number of finite coordinates. The geometry \
+            },
+            Self::InvalidCloud => Entry {
+                name: "invalid-cloud",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The points do not form a cloud",
+                explanation: "A cloud has at least one point, and all its points have the same number of finite coordinates. The geometry \
                  of a hypersurface needs at least two coordinates.",
-            ),
-            Self::DuplicatePoints => (
-                "duplicate-points",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "Points coincide and alpha is 0",
-                "No function takes two values at one point. Set alpha above 0 to treat them as repeated observations, or set \
+            },
+            Self::DuplicatePoints => Entry {
+                name: "duplicate-points",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "Points coincide and alpha is 0",
+                explanation: "No function takes two values at one point. Set alpha above 0 to treat them as repeated observations, or set \
                  duplicates to merge to average their values. point_indices lists them.",
-            ),
-            Self::DimensionMismatch => (
-                "dimension-mismatch",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "Points of different dimension",
-                "Queries, normals and the cloud of the geometry have the dimension of the cloud.",
-            ),
-            Self::LengthMismatch => (
-                "length-mismatch",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "One entry per point is needed",
-                "values, noise_variances and normals have one entry per point of their cloud, in the order of the points.",
-            ),
-            Self::KernelNotSmooth => (
-                "kernel-not-smooth",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "The kernel has no derivatives here",
-                "The Laplace kernel with epsilon 0 and the Matérn kernel with nu 0.5 have a kink at every point of the cloud. \
+            },
+            Self::DimensionMismatch => Entry {
+                name: "dimension-mismatch",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "Points of different dimension",
+                explanation: "Queries, normals and the cloud of the geometry have the dimension of the cloud.",
+            },
+            Self::LengthMismatch => Entry {
+                name: "length-mismatch",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "One entry per point is needed",
+                explanation: "values, noise_variances and normals have one entry per point of their cloud, in the order of the points.",
+            },
+            Self::KernelNotSmooth => Entry {
+                name: "kernel-not-smooth",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The kernel has no derivatives here",
+                explanation: "The Laplace kernel with epsilon 0 and the Matérn kernel with nu 0.5 have a kink at every point of the cloud. \
                  Use laplace with epsilon above 0 or matern with nu of 1.5 or more, or query other places.",
-            ),
-            Self::KernelNotPositiveDefinite => (
-                "kernel-not-positive-definite",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "The kernel is not positive definite in this dimension",
-                "Wendland kernels are positive definite up to dimension 3. Choose another family.",
-            ),
-            Self::NotPositiveDefinite => (
-                "not-positive-definite",
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "The Gram matrix is not positive definite in float64",
-                "The kernel is too smooth or too wide for this cloud at this alpha: no honest answer exists in float64. Set \
+            },
+            Self::KernelNotPositiveDefinite => Entry {
+                name: "kernel-not-positive-definite",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The kernel is not positive definite in this dimension",
+                explanation: "Wendland kernels are positive definite up to dimension 3. Choose another family.",
+            },
+            Self::NotPositiveDefinite => Entry {
+                name: "not-positive-definite",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The Gram matrix is not positive definite in float64",
+                explanation: "The kernel is too smooth or too wide for this cloud at this alpha: no honest answer exists in float64. Set \
                  alpha to minimum_alpha or more, shorten the length_scale, or use a rougher kernel.",
-            ),
-            Self::UnknownCloud => (
-                "unknown-cloud",
-                StatusCode::NOT_FOUND,
-                "No such cloud",
-                "The cloud was never posted with this key, was deleted, or was dropped as the least recently used. Post its \
+            },
+            Self::UnknownCloud => Entry {
+                name: "unknown-cloud",
+                status: StatusCode::NOT_FOUND,
+                title: "No such cloud",
+                explanation: "The cloud was never posted with this key, was deleted, or was dropped as the least recently used. Post its \
                  points again: the id stays the same.",
-            ),
-            Self::NotFound => (
-                "not-found",
-                StatusCode::NOT_FOUND,
-                "No such path",
-                "The path is not part of the interface. /openapi.json lists every path.",
-            ),
-            Self::MethodNotAllowed => (
-                "method-not-allowed",
-                StatusCode::METHOD_NOT_ALLOWED,
-                "The path does not have this method",
-                "The Allow header lists the methods it has.",
-            ),
-            Self::NotAcceptable => (
-                "not-acceptable",
-                StatusCode::NOT_ACCEPTABLE,
-                "No acceptable media type",
-                "Answers come as application/json, those of requests that compute also as application/x-safetensors, and single \
+            },
+            Self::NotFound => Entry {
+                name: "not-found",
+                status: StatusCode::NOT_FOUND,
+                title: "No such path",
+                explanation: "The path is not part of the interface. /openapi.json lists every path.",
+            },
+            Self::MethodNotAllowed => Entry {
+                name: "method-not-allowed",
+                status: StatusCode::METHOD_NOT_ALLOWED,
+                title: "The path does not have this method",
+                explanation: "The Allow header lists the methods it has.",
+            },
+            Self::NotAcceptable => Entry {
+                name: "not-acceptable",
+                status: StatusCode::NOT_ACCEPTABLE,
+                title: "No acceptable media type",
+                explanation: "Answers come as application/json, those of requests that compute also as application/x-safetensors, and single \
                  matrices as application/x-npy. Add one of them, or */*, to the Accept header.",
-            ),
-            Self::UnsupportedMediaType => (
-                "unsupported-media-type",
-                StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "The body has an unknown media type or encoding",
-                "Send application/json or application/x-safetensors, clouds also as application/x-npy, and say so in the \
+            },
+            Self::UnsupportedMediaType => Entry {
+                name: "unsupported-media-type",
+                status: StatusCode::UNSUPPORTED_MEDIA_TYPE,
+                title: "The body has an unknown media type or encoding",
+                explanation: "Send application/json or application/x-safetensors, clouds also as application/x-npy, and say so in the \
                  Content-Type header. Content-Encoding may be gzip or zstd.",
-            ),
-            Self::RequestTimeout => (
-                "request-timeout",
-                StatusCode::REQUEST_TIMEOUT,
-                "The body came too slowly",
-                "A body must come at 16 KiB a second but for GRAMIAN_BODY_SECONDS. Send it again over a connection that keeps \
+            },
+            Self::RequestTimeout => Entry {
+                name: "request-timeout",
+                status: StatusCode::REQUEST_TIMEOUT,
+                title: "The body came too slowly",
+                explanation: "A body must come at 16 KiB a second but for GRAMIAN_BODY_SECONDS. Send it again over a connection that keeps \
                  up, compress it, or send tensors instead of JSON.",
-            ),
-            Self::BodyTooLarge => (
-                "body-too-large",
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "The body is too large",
-                "The body has more bytes than GRAMIAN_MAX_BODY_BYTES, or than the part of GRAMIAN_MEMORY_BYTES that one request \
+            },
+            Self::BodyTooLarge => Entry {
+                name: "body-too-large",
+                status: StatusCode::PAYLOAD_TOO_LARGE,
+                title: "The body is too large",
+                explanation: "The body has more bytes than GRAMIAN_MAX_BODY_BYTES, or than the part of GRAMIAN_MEMORY_BYTES that one request \
                  may have, or the header of its tensors more than 64 KiB. Register the cloud once and refer to it by id, split \
                  the queries, and send lists of numbers as tensors.",
-            ),
-            Self::ProblemTooLarge => (
-                "problem-too-large",
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "The problem is too large",
-                "Points, dimension, queries, the size of the answer or the memory for it are over this server's limits. limit \
+            },
+            Self::ProblemTooLarge => Entry {
+                name: "problem-too-large",
+                status: StatusCode::PAYLOAD_TOO_LARGE,
+                title: "The problem is too large",
+                explanation: "Points, dimension, queries, the size of the answer or the memory for it are over this server's limits. limit \
                  and required are in the unit that the detail names. Thin the cloud or register fewer points; split queries \
                  over several requests, which share one factorization.",
-            ),
-            Self::Unauthorized => (
-                "unauthorized",
-                StatusCode::UNAUTHORIZED,
-                "No valid API key",
-                "Send Authorization: Bearer <key> with one of the configured keys.",
-            ),
-            Self::Overloaded => (
-                "overloaded",
-                StatusCode::SERVICE_UNAVAILABLE,
-                "The server has all it can do",
-                "More requests wait for a thread than the server queues, the memory for requests is taken, all its connections \
+            },
+            Self::Unauthorized => Entry {
+                name: "unauthorized",
+                status: StatusCode::UNAUTHORIZED,
+                title: "No valid API key",
+                explanation: "Send Authorization: Bearer <key> with one of the configured keys.",
+            },
+            Self::Overloaded => Entry {
+                name: "overloaded",
+                status: StatusCode::SERVICE_UNAVAILABLE,
+                title: "The server has all it can do",
+                explanation: "More requests wait for a thread than the server queues, the memory for requests is taken, all its connections \
                  are in use, or it is shutting down. Try again after the seconds in Retry-After.",
-            ),
-            Self::DeadlineExceeded => (
-                "deadline-exceeded",
-                StatusCode::GATEWAY_TIMEOUT,
-                "The answer took too long",
-                "The answer was not ready within GRAMIAN_DEADLINE_SECONDS and its computation was cancelled. Fewer points cost \
+            },
+            Self::DeadlineExceeded => Entry {
+                name: "deadline-exceeded",
+                status: StatusCode::GATEWAY_TIMEOUT,
+                title: "The answer took too long",
+                explanation: "The answer was not ready within GRAMIAN_DEADLINE_SECONDS and its computation was cancelled. Fewer points cost \
                  the cube, fewer queries proportionally less.",
-            ),
-            Self::Internal => (
-                "internal",
-                StatusCode::INTERNAL_SERVER_ERROR,
-                "Internal error",
-                "This is a bug. The request id in instance identifies it in the logs.",
-            ),
+            },
+            Self::Internal => Entry {
+                name: "internal",
+                status: StatusCode::INTERNAL_SERVER_ERROR,
+                title: "Internal error",
+                explanation: "This is a bug. The request id in instance identifies it in the logs.",
+            },
         }
     }
 }

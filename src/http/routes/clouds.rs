@@ -23,9 +23,10 @@ use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
-use crate::numerics::points::sampling::{NearestRange, Sampling, Scales};
+use crate::numerics::points::sampling::{NearestRange, Scales};
+use crate::numerics::solver::choose::sampling_flops;
 use crate::store::Owner;
-use crate::store::clouds::StoredCloud;
+use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 
 /// Clouds in a page when the client names no number.
@@ -90,8 +91,8 @@ pub struct Cloud {
     created_at: String,
 }
 
-impl From<&StoredCloud> for Cloud {
-    fn from(stored: &StoredCloud) -> Self {
+impl From<&RegisteredCloud> for Cloud {
+    fn from(stored: &RegisteredCloud) -> Self {
         let (min, max) = stored.bounding_box.clone();
         let nearest = stored.scales().and_then(Scales::nearest_range);
         Self {
@@ -196,10 +197,10 @@ pub async fn get_cloud(
 async fn describe(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    stored: &StoredCloud,
+    stored: &RegisteredCloud,
 ) -> Result<Cloud, Problem> {
     let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
-    admission.set_flops(Sampling::flops_needed(n, d));
+    admission.set_flops(sampling_flops(n, d));
     find_sampling(app, admission, stored).await?;
     admission.finish();
     Ok(Cloud::from(stored))
@@ -252,7 +253,7 @@ pub async fn delete_cloud(
     if !app.clouds.remove(owner, id) {
         return Err(unknown_cloud(&cloud_id));
     }
-    app.factors.forget_cloud(owner, id);
+    app.prepared.forget_cloud(owner, id);
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -307,7 +308,7 @@ struct Cursor {
 }
 
 impl Cursor {
-    fn of(stored: &StoredCloud) -> Self {
+    fn of(stored: &RegisteredCloud) -> Self {
         let since_epoch = stored.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         Self { nanoseconds: since_epoch.as_nanos(), id: stored.id }
     }
@@ -356,11 +357,11 @@ impl Page {
 }
 
 /// Weak: a cloud that was deleted and posted again has the same points, but another `created_at`.
-fn etag_of(stored: &StoredCloud) -> String {
+fn etag_of(stored: &RegisteredCloud) -> String {
     format!("W/\"{}\"", stored.id)
 }
 
-fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<StoredCloud>, Problem> {
+fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<RegisteredCloud>, Problem> {
     let found = CloudId::parse(cloud_id).and_then(|id| app.clouds.get(owner, id));
     found.ok_or_else(|| unknown_cloud(cloud_id))
 }

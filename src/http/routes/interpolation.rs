@@ -21,6 +21,7 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::choose::{Asked, work_price};
 use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 
@@ -102,9 +103,8 @@ impl Operation for InterpolationRequest {
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
         let per_query = [1, 1 + d, 1 + d + d * d][usize::from(derivatives)];
         let cost = Cost {
-            flops: 40.0 * (n as f64) * (m + n) as f64,
+            work: work_price(Asked::Function, n, m, d),
             n_numbers: planner.check_answer(m.checked_mul(per_query))?,
-            n_scratch: 8 * n + m * (1 + d + d * d),
             n_held: n + m * d,
         };
         Ok(Plan { main, surface: None, work: Work { values: self.values, queries, derivatives }, cost })

@@ -8,7 +8,7 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use super::surfaces::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -187,7 +187,7 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrix = laplace_beltrami_matrix(geometry, &fits.main.stored.factor, &work.queries, observer)
+        let matrix = laplace_beltrami_matrix(geometry, fits.main.stored.solver(), &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;

@@ -25,6 +25,7 @@ use crate::http::wire::write::array::Array;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::choose::{Asked, work_price};
 use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 
@@ -135,28 +136,23 @@ impl Operation for PosteriorRequest {
         let (n, m, d) = (main.n_points(), work.queries.n_points(), work.queries.dimension());
         let has_covariance = work.wants(PosteriorQuantity::Covariance);
         let n_numbers = planner.check_answer(m.checked_mul(d + 3 + if has_covariance { m } else { 0 }))?;
-        let whitened = has_covariance
-            || work.wants(PosteriorQuantity::Variance)
-            || work.wants(PosteriorQuantity::ObservationVariance);
-        let (nf, mf) = (n as f64, m as f64);
-        let flops = 40.0 * nf * (nf + mf)
-            + if whitened { nf * nf * mf } else { 0.0 }
-            + if has_covariance { nf * mf * mf } else { 0.0 };
-        let whitened_columns = match (has_covariance, whitened) {
-            (true, _) => m,
-            (false, true) => m.min(COLUMNS_AT_ONCE),
-            (false, false) => 0,
-        };
-        let n_scratch = whitened_columns.saturating_add(8).saturating_mul(n).saturating_add(m * (2 + d));
+        let variances =
+            work.wants(PosteriorQuantity::Variance) || work.wants(PosteriorQuantity::ObservationVariance);
+        let asked = Asked::Posterior { variances, covariance: has_covariance };
         let n_held = n + m * d;
-        Ok(Plan { main, surface: None, work, cost: Cost { flops, n_numbers, n_scratch, n_held } })
+        Ok(Plan {
+            main,
+            surface: None,
+            work,
+            cost: Cost { work: work_price(asked, n, m, d), n_numbers, n_held },
+        })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
         use PosteriorQuantity as Q;
         let refused = |error| fits.main.refused(error);
         let interpolant = fits.interpolant(&work.values, observer)?;
-        let (factor, queries) = (&interpolant.factor, &work.queries);
+        let (solver, queries) = (&interpolant.solver, &work.queries);
         let order = if work.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value };
         let jets = interpolant.at(queries, order, observer).map_err(refused)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
@@ -164,11 +160,11 @@ impl Operation for PosteriorRequest {
         let wants_variances = work.wants(Q::Variance) || work.wants(Q::ObservationVariance);
         let latent = match wants_variances {
             false => None,
-            true => Some(variances(factor, queries, observer).map_err(refused)?),
+            true => Some(variances(solver, queries, observer).map_err(refused)?),
         };
         let covariance = match work.wants(Q::Covariance) {
             false => None,
-            true => Some(covariance(factor, queries, observer).map_err(refused)?),
+            true => Some(covariance(solver, queries, observer).map_err(refused)?),
         };
         let clamped = latent.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
         warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
@@ -176,10 +172,10 @@ impl Operation for PosteriorRequest {
             false => None,
             true => {
                 let values = fits.main.merged(&work.values);
-                Some(log_marginal_likelihood(factor, &interpolant.solution, &values).map_err(refused)?)
+                Some(log_marginal_likelihood(solver, &interpolant.solution, &values).map_err(refused)?)
             }
         };
-        let alpha = factor.regularization().at(0);
+        let alpha = solver.regularization().at(0);
         let of_latent = |quantity, noise: f64| {
             let latent = latent.as_ref().filter(|_| work.wants(quantity))?;
             Some(Array::new(latent.latent.iter().map(|v| v + noise).collect(), &[m]))
@@ -204,9 +200,6 @@ fn check_observation_noise(work: &Work, plan: &PlannedFit) -> Result<(), Problem
     let detail = "observation_variance needs alpha: with noise_variances the noise at queries is unknown";
     Err(Problem::invalid_request("/include", detail))
 }
-
-/// Queries whose variances are computed at once.
-const COLUMNS_AT_ONCE: usize = 512;
 
 fn warn_of_clamping(clamped: &[usize], diagnostics: &mut Diagnostics) {
     let Some(first) = clamped.first() else { return };

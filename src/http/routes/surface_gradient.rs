@@ -6,7 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::operators::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use super::surfaces::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -170,8 +170,9 @@ impl Operation for SurfaceGradientMatrixRequest {
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrices = surface_gradient_matrices(geometry, &fits.main.stored.factor, &work.queries, observer)
-            .map_err(|error| fits.main.refused(error))?;
+        let matrices =
+            surface_gradient_matrices(geometry, fits.main.stored.solver(), &work.queries, observer)
+                .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(SurfaceGradientMatrixResponse {

@@ -6,14 +6,14 @@ use std::sync::atomic::AtomicUsize;
 use tokio_util::sync::CancellationToken;
 
 use super::keys::Keys;
-use super::plan::FactorFailure;
+use super::plan::FitFailure;
 use crate::config::Config;
 use crate::http::compute::Compute;
 use crate::http::problem::Problem;
 use crate::memory::Memory;
 use crate::store::budget::Budget;
 use crate::store::clouds::CloudStore;
-use crate::store::factors::{FactorBytes, FactorStore};
+use crate::store::prepared::{PreparedBytes, PreparedStore};
 
 /// Configuration, stores and compute pool.
 pub struct App {
@@ -23,7 +23,7 @@ pub struct App {
     /// The memory of bodies that are read, unpacked and parsed, and of requests that wait.
     pub intake: Budget,
     pub clouds: CloudStore<Problem>,
-    pub factors: FactorStore<FactorFailure>,
+    pub prepared: PreparedStore<FitFailure>,
     pub compute: Arc<Compute>,
     /// Requests between their arrival and their answer.
     pub n_requests: AtomicUsize,
@@ -39,12 +39,12 @@ impl App {
     pub fn new(config: Config) -> Result<Arc<Self>, rayon::ThreadPoolBuildError> {
         let (memory, keys) = (Memory::of(&config), Keys::new(&config.api_keys));
         let n_owners = keys.n_owners();
-        let of_factors =
-            FactorBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
+        let of_prepared =
+            PreparedBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
         Ok(Arc::new(Self {
             intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
-            factors: FactorStore::new(of_factors),
+            prepared: PreparedStore::new(of_prepared),
             compute: Arc::new(Compute::new(
                 config.n_threads(),
                 config.max_queue,

@@ -21,8 +21,8 @@ use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
-use crate::store::factors::StoredFactor;
 use crate::store::key::ValuesKey;
+use crate::store::prepared::PreparedFit;
 
 /// Below this reciprocal condition fewer than three digits of the weights are sure.
 const ILL_CONDITIONED: f64 = 1e-13;
@@ -79,7 +79,7 @@ pub struct SurfaceGeometry {
 /// A fit with its factorization.
 pub struct Fitted {
     pub plan: FitPlan,
-    pub stored: Arc<StoredFactor>,
+    pub stored: Arc<PreparedFit>,
 }
 
 impl Fitted {
@@ -90,14 +90,14 @@ impl Fitted {
 
     /// Finds the weights of values that were solved before, or solves.
     fn interpolant(&self, app: &App, values: &[f64], observer: &JobObserver) -> Result<Interpolant, Problem> {
-        let factor = self.stored.factor.clone();
+        let solver = self.stored.solver().clone();
         let key = ValuesKey::of(values);
-        if let Some(solution) = app.factors.solution(self.plan.key, key) {
-            return Ok(Interpolant { factor, solution });
+        if let Some(solution) = app.prepared.solution(self.plan.key, key) {
+            return Ok(Interpolant { solver, solution });
         }
         let interpolant =
-            Interpolant::fit(factor, &self.merged(values), observer).map_err(|error| self.refused(error))?;
-        app.factors.keep_solution(self.plan.key, key, interpolant.solution.clone());
+            Interpolant::fit(solver, &self.merged(values), observer).map_err(|error| self.refused(error))?;
+        app.prepared.keep_solution(self.plan.key, key, interpolant.solution.clone());
         Ok(interpolant)
     }
 
@@ -119,13 +119,13 @@ impl Fitted {
 
     /// What the answer says of this fit.
     pub fn diagnostics(&self, solution: &Solution, n_queries: usize) -> Diagnostics {
-        let (plan, factor) = (&self.plan, &self.stored.factor);
+        let (plan, solver) = (&self.plan, self.stored.solver());
         let n_merged = plan.merge.as_ref().map_or(0, |merge| merge.n_merged());
         let mut warnings = Vec::new();
         let mut warn = |code, detail| warnings.push(Warning { code, detail });
-        let reciprocal_condition = factor.reciprocal_condition();
-        if factor.method() == Method::PivotedCholesky {
-            let (rank, n) = (factor.rank(), factor.n_points());
+        let reciprocal_condition = solver.reciprocal_condition();
+        if solver.method() == Method::PivotedCholesky {
+            let (rank, n) = (solver.rank(), solver.n_points());
             let detail = format!(
                 "Cholesky fails in float64; least squares on {rank} of {n} points, which span the rest to rounding"
             );
@@ -152,11 +152,11 @@ impl Fitted {
                 Regularization::PerPoint(_) => None,
             },
             solver: SolverUsed::Dense,
-            factorization: match factor.method() {
+            factorization: match solver.method() {
                 Method::Cholesky => FactorizationUsed::Cholesky,
                 Method::PivotedCholesky => FactorizationUsed::PivotedCholesky,
             },
-            rank: factor.rank(),
+            rank: solver.rank(),
             reciprocal_condition,
             relative_residual: solution.relative_residual,
             native_norm_squared: solution.native_norm_squared,
@@ -212,7 +212,7 @@ impl SurfaceGeometry {
             |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
         let n_offset = (0..m).filter(|&query| self.geometry.is_offset(query)).count();
         let orientation = self.surface.orientation();
-        let too_rough = match self.surface.signature().factor.kernel().family() {
+        let too_rough = match self.surface.signature().solver.kernel().family() {
             Family::Laplace { .. } => LAPLACE_TOO_ROUGH,
             _ => KERNEL_TOO_ROUGH,
         };

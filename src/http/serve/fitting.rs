@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::fitted::{Fits, Fitted};
-use super::plan::{Cost, FactorFailure, FitPlan};
+use super::plan::{Cost, FitFailure, FitPlan};
 use super::report::Report;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes};
@@ -13,12 +13,13 @@ use crate::http::serve::app::App;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::points::sampling::Sampling;
-use crate::numerics::solver::{GramFactor, Workspace};
+use crate::numerics::solver::choose::Choice;
+use crate::numerics::solver::{Solver, System, Workspace};
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::level::Signature;
 use crate::store::budget::{BeyondBudget, Reservation};
-use crate::store::factors::{CacheOutcome, Missing, StoredFactor};
 use crate::store::key::ValuesKey;
+use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
 
 /// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
 const LEAST_BYTES: usize = 16 << 10;
@@ -51,13 +52,7 @@ impl Fitting<'_> {
         cost: Cost,
         report: &mut Report,
     ) -> Result<(Fits, Reservation), Problem> {
-        let mut wanted = Wanted {
-            main,
-            other: surface.filter(|surface| surface.key != main.key),
-            of_main: Extent::Cholesky,
-            of_other: Extent::Cholesky,
-            cost,
-        };
+        let mut wanted = Wanted::of(main, surface, cost);
         loop {
             if let Some(found) = self.attempt(&mut wanted, report).await? {
                 return Ok(found);
@@ -76,7 +71,7 @@ impl Fitting<'_> {
         report: &mut Report,
     ) -> Option<(Fits, Reservation)> {
         let find = |plan: &FitPlan| {
-            let stored = self.app.factors.get(plan.key)?;
+            let stored = self.app.prepared.get(plan.key)?;
             Some(Fitted { plan: plan.clone(), stored })
         };
         let main = find(main)?;
@@ -89,7 +84,7 @@ impl Fitting<'_> {
         if self.has_surface {
             fits.made = Some(fits.surface().stored.surface()?);
         }
-        let memory = self.app.factors.try_reserve(self.admission.owner, n_bytes_of_work(cost))?;
+        let memory = self.app.prepared.try_reserve(self.admission.owner, n_bytes_of_work(cost))?;
         for fitted in [Some(&fits.main), fits.surface.as_ref()].into_iter().flatten() {
             report.found(&fitted.stored, CacheOutcome::Hit);
         }
@@ -128,7 +123,7 @@ impl Fitting<'_> {
         let work = n_bytes_of_work(wanted.cost);
         let total = counted.into_iter().fold(work, usize::saturating_add);
         let is_wanted = || self.count(wanted) == counted;
-        let reserved = self.app.factors.reserve(self.admission.owner, total, is_wanted).await;
+        let reserved = self.app.prepared.reserve(self.admission.owner, total, is_wanted).await;
         let Some(mut work) = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))? else {
             return Ok(None);
         };
@@ -136,19 +131,43 @@ impl Fitting<'_> {
         Ok(Some(Memory { work, main, other, surface }))
     }
 
-    /// Bytes for the factorizations and the surface that are missing now.
+    /// What is missing now of the solver and the surface of each fit, with what making it ready takes.
+    fn missing<'w>(&self, wanted: &Wanted<'w>) -> impl Iterator<Item = (Missing, Choice, Extent)> {
+        let memory = self.app.prepared.memory();
+        let fits = [(Some(wanted.main), wanted.of_main), (wanted.other, wanted.of_other)];
+        // The surface is that of the last of them.
+        let of_surface = wanted.other.unwrap_or(wanted.main).key;
+        fits.into_iter().filter_map(move |(plan, extent)| {
+            let plan = plan?;
+            let with_surface = self.has_surface && plan.key == of_surface;
+            Some((self.app.prepared.missing(plan.key, with_surface), plan.choice(memory), extent))
+        })
+    }
+
+    /// Bytes for the solvers and the surface that are missing now.
     fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
-        let missing = |plan: &FitPlan, extent, with_surface| {
-            let Missing { factor, surface } = self.app.factors.missing(plan.key, with_surface);
-            let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
-            let factor = if factor { n_bytes_of_factor(plan, extent) } else { Some(0) };
-            let surface = if surface { Surface::n_bytes_needed(n, d) } else { 0 };
-            (factor.unwrap_or(usize::MAX), surface)
+        let mut counted = [0; 3];
+        for (at, (missing, choice, extent)) in self.missing(wanted).enumerate() {
+            if missing.solver {
+                counted[at] = match extent {
+                    Extent::Expected => choice.expected.n_bytes,
+                    Extent::AtMost => choice.at_most.n_bytes,
+                };
+            }
+            if missing.surface {
+                counted[2] = choice.surface.n_bytes;
+            }
+        }
+        counted
+    }
+
+    /// Flops of what a request will compute by itself, as far as can be seen beforehand.
+    pub fn expected_flops(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> f64 {
+        let missing = |(missing, choice, _): (Missing, Choice, Extent)| {
+            let solver = if missing.solver { choice.expected.flops } else { 0.0 };
+            solver + if missing.surface { choice.surface.flops } else { 0.0 }
         };
-        let of_main = missing(wanted.main, wanted.of_main, self.has_surface && wanted.other.is_none());
-        let of_other = wanted.other.map(|other| missing(other, wanted.of_other, self.has_surface));
-        let of_other = of_other.unwrap_or((0, 0));
-        [of_main.0, of_other.0, of_main.1 + of_other.1]
+        cost.work.flops + self.missing(&Wanted::of(main, surface, cost)).map(missing).sum::<f64>()
     }
 
     /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
@@ -160,15 +179,15 @@ impl Fitting<'_> {
         report: &mut Report,
     ) -> Result<Option<Fitted>, Problem> {
         let begin =
-            |memory: Reservation| factorize(self.app.clone(), self.admission.clone(), plan.clone(), memory);
-        match self.app.factors.get_or_factorize(plan.key, memory, begin).await {
+            |memory: Reservation| prepare(self.app.clone(), self.admission.clone(), plan.clone(), memory);
+        match self.app.prepared.get_or_prepare(plan.key, memory, begin).await {
             Ok(Some((stored, outcome))) => {
                 report.found(&stored, outcome);
                 Ok(Some(Fitted { plan: plan.clone(), stored }))
             }
             Ok(None) => Ok(None),
-            Err(FactorFailure::NeedsAll) => {
-                *extent = Extent::Fallback;
+            Err(FitFailure::NeedsAll) => {
+                *extent = Extent::AtMost;
                 Ok(None)
             }
             Err(failure) => Err(failure.of(plan)),
@@ -182,12 +201,12 @@ impl Fitting<'_> {
         memory: Option<Reservation>,
         report: &mut Report,
     ) -> Result<Option<Arc<Surface>>, Problem> {
-        let factors = &self.app.factors;
+        let fits = &self.app.prepared;
         let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));
         let begin = |memory: Reservation| {
             make_surface(self.app.clone(), self.admission.clone(), fitted, times.clone(), memory)
         };
-        let found = factors.get_or_make_surface(key, &fitted.stored, memory, begin).await;
+        let found = fits.get_or_make_surface(key, &fitted.stored, memory, begin).await;
         if let Some(&times) = times.get() {
             report.made_surface(times);
         }
@@ -205,27 +224,24 @@ struct Wanted<'a> {
     cost: Cost,
 }
 
-/// How much of its matrix a factorization is given memory for.
+impl<'a> Wanted<'a> {
+    fn of(main: &'a FitPlan, surface: Option<&'a FitPlan>, cost: Cost) -> Self {
+        let other = surface.filter(|surface| surface.key != main.key);
+        Self { main, other, of_main: Extent::Expected, of_other: Extent::Expected, cost }
+    }
+}
+
+/// How much memory a solver is given.
 #[derive(Clone, Copy)]
 enum Extent {
-    /// Half of it. The fallback takes the other half as well if it is to be had at that moment.
-    Cholesky,
-    /// All of it, from the start: it is known that the fallback is needed.
-    Fallback,
+    /// As much as is nearly always enough. It takes the rest as well if that is to be had at that moment.
+    Expected,
+    /// All that it may need, from the start: it is known that it needs it.
+    AtMost,
 }
 
 fn n_bytes_of_work(cost: Cost) -> usize {
     LEAST_BYTES.saturating_add(cost.n_bytes())
-}
-
-/// The part of the matrix and what lies beside it.
-fn n_bytes_of_factor(plan: &FitPlan, extent: Extent) -> Option<usize> {
-    let (n, d) = (plan.fitted.n_points(), plan.fitted.dimension());
-    let matrix = match extent {
-        Extent::Cholesky => GramFactor::n_bytes_needed(n),
-        Extent::Fallback => GramFactor::n_bytes_needed_at_most(n),
-    };
-    matrix?.checked_add(n.checked_mul((d + 10) * size_of::<f64>())?)
 }
 
 fn beyond(limit: usize, required: usize) -> Problem {
@@ -234,14 +250,14 @@ fn beyond(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(required)).with_remedy(remedy)
 }
 
-async fn factorize(
+async fn prepare(
     app: Arc<App>,
     admission: Arc<Admission>,
     plan: FitPlan,
     mut memory: Reservation,
-) -> Result<StoredFactor, FactorFailure> {
-    let flops = GramFactor::flops_needed(plan.fitted.n_points());
-    let spare = app.factors.spare().clone();
+) -> Result<PreparedFit, FitFailure> {
+    let flops = plan.choice(app.prepared.memory()).at_most.flops;
+    let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {
         let (n_taken, mut is_short) = (memory.n_bytes(), false);
         // It never waits for memory: it holds some already.
@@ -250,18 +266,18 @@ async fn factorize(
             !is_short
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let factor =
-            GramFactor::factorize_in(workspace, plan.fitted, plan.kernel, plan.regularization, observer);
-        match factor {
+        let system = System::new(plan.fitted, plan.kernel, plan.regularization);
+        let solver = system.and_then(|system| Solver::dense_in(workspace, system, observer));
+        match solver {
             // The memory goes with the job: it may run on for a moment when nobody waits any more.
-            Ok(factor) => Ok((factor, memory)),
-            Err(_) if is_short => Err(FactorFailure::NeedsAll),
-            Err(error) => Err(FactorFailure::Refused(error)),
+            Ok(solver) => Ok((solver, memory)),
+            Err(_) if is_short => Err(FitFailure::NeedsAll),
+            Err(error) => Err(FitFailure::Refused(error)),
         }
     };
-    let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
-    let (factor, memory) = outcome?;
-    Ok(StoredFactor::new(factor, times.gram, times.factor, memory))
+    let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
+    let (solver, memory) = outcome?;
+    Ok(PreparedFit::new(solver, times.gram, times.factor, memory))
 }
 
 /// The surface of the signature function, with the client's normals if there are any.
@@ -271,17 +287,17 @@ fn make_surface(
     fitted: &Fitted,
     times: Arc<OnceLock<StageTimes>>,
     memory: Reservation,
-) -> impl Future<Output = Result<(Surface, Reservation), FactorFailure>> + Send + 'static {
+) -> impl Future<Output = Result<(Surface, Reservation), FitFailure>> + Send + 'static {
     let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
-    let flops = Surface::flops_needed(plan.fitted.n_points(), plan.fitted.dimension());
+    let flops = plan.choice(app.prepared.memory()).surface.flops;
     async move {
         let sampling = match plan.merge {
-            None => Some(find_sampling(&app, &admission, &plan.stored).await.map_err(FactorFailure::Broken)?),
+            None => Some(find_sampling(&app, &admission, &plan.stored).await.map_err(FitFailure::Broken)?),
             Some(_) => None,
         };
         let shared = app.clone();
         let job = move |observer: &JobObserver| {
-            let signature = signature(&shared, &plan, &stored.factor, observer)?;
+            let signature = signature(&shared, &plan, stored.solver(), observer)?;
             // Without the merged points it is another cloud.
             let sampling = match sampling {
                 Some(sampling) => sampling,
@@ -291,10 +307,9 @@ fn make_surface(
             // As with a factor, the memory goes with the job.
             Ok((surface, memory))
         };
-        let (surface, taken) =
-            app.compute.run(&admission, flops, job).await.map_err(FactorFailure::Broken)?;
+        let (surface, taken) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
         let _ = times.set(taken);
-        surface.map_err(FactorFailure::Refused)
+        surface.map_err(FitFailure::Refused)
     }
 }
 
@@ -302,14 +317,14 @@ fn make_surface(
 fn signature(
     app: &App,
     plan: &FitPlan,
-    factor: &Arc<GramFactor>,
+    solver: &Arc<Solver>,
     observer: &JobObserver,
 ) -> Result<Signature, NumericsError> {
     let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
-    if let Some(solution) = app.factors.solution(plan.key, key) {
-        return Signature::of(Interpolant { factor: factor.clone(), solution }, observer);
+    if let Some(solution) = app.prepared.solution(plan.key, key) {
+        return Signature::of(Interpolant { solver: solver.clone(), solution }, observer);
     }
-    let signature = Signature::fit(factor.clone(), observer)?;
-    app.factors.keep_solution(plan.key, key, signature.function().solution.clone());
+    let signature = Signature::fit(solver.clone(), observer)?;
+    app.prepared.keep_solution(plan.key, key, signature.function().solution.clone());
     Ok(signature)
 }

@@ -22,8 +22,6 @@ use crate::http::wire::negotiation::{Format, Wanted};
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
-use crate::numerics::solver::GramFactor;
-use crate::numerics::surface::Surface;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 
@@ -75,22 +73,6 @@ pub struct Resolved<W> {
     intake: Reservation,
 }
 
-impl<W> Resolved<W> {
-    /// Flops of what this request will compute by itself, as far as can be seen beforehand.
-    fn expected_flops(&self, app: &App, has_surface: bool) -> f64 {
-        let other = self.surface.as_ref().filter(|surface| surface.key != self.main.key);
-        let fits = [(Some(&self.main), has_surface && other.is_none()), (other, has_surface)];
-        let of_fit = |(fit, with_surface): (Option<&FitPlan>, bool)| {
-            let Some(fit) = fit else { return 0.0 };
-            let (n, d) = (fit.fitted.n_points(), fit.fitted.dimension());
-            let missing = app.factors.missing(fit.key, with_surface);
-            let factor = if missing.factor { GramFactor::flops_expected(n) } else { 0.0 };
-            factor + if missing.surface { Surface::flops_needed(n, d) } else { 0.0 }
-        };
-        self.cost.flops + fits.into_iter().map(of_fit).sum::<f64>()
-    }
-}
-
 /// Serves one request.
 ///
 /// # Errors
@@ -108,10 +90,10 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     };
     let mut report = Report::parsed_in(began.elapsed());
 
-    admission.set_flops(plan.expected_flops(&app, O::HAS_SURFACE));
     let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
+    admission.set_flops(fitting.expected_flops(&plan.main, plan.surface.as_ref(), plan.cost));
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
-    let flops = plan.cost.flops;
+    let flops = plan.cost.work.flops;
     let job = move |observer: &JobObserver| answer::<O>(*plan, &fits, memory, report, wanted, observer);
     let answered = app.compute.run(&admission, flops, job).await?.0?;
     Ok(answered.respond(&app, &admission))
@@ -177,7 +159,7 @@ async fn prepare<O: Operation>(
         let plan = resolve(plan, memory)?;
         let mut report = Report::parsed_in(began.elapsed());
         let fitting = Fitting { app: &shared, admission: &admitted, has_surface: O::HAS_SURFACE };
-        let at_hand = match is_light(plan.cost.flops) {
+        let at_hand = match is_light(plan.cost.work.flops) {
             true => fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report),
             false => None,
         };

@@ -5,22 +5,23 @@ use std::sync::Arc;
 
 use crate::http::fields::DuplicatePolicy;
 use crate::http::fields::kernel::PlannedKernel;
-use crate::http::problem::{Place, Problem};
+use crate::http::problem::{Pointers, Problem};
 use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::Kernel as NumericalKernel;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::Merge;
+use crate::numerics::solver::choose::{Choice, Price, choose};
 use crate::numerics::sums::regularization::Regularization;
 use crate::store::Owner;
-use crate::store::clouds::StoredCloud;
-use crate::store::key::FactorKey;
+use crate::store::clouds::RegisteredCloud;
+use crate::store::key::FitKey;
 
 /// A fit that is checked as far as the request goes; what is left out follows from the cloud.
 pub struct PlannedFit {
     pub owner: Owner,
-    pub stored: Arc<StoredCloud>,
-    pub place: Place,
+    pub stored: Arc<RegisteredCloud>,
+    pub pointers: Pointers,
     pub(super) kernel: Option<PlannedKernel>,
     pub(super) regularization: Option<Regularization>,
     pub(super) duplicates: DuplicatePolicy,
@@ -57,10 +58,10 @@ impl PlannedFit {
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
     pub fn resolve(self) -> Result<FitPlan, Problem> {
-        let Self { owner, stored, place, .. } = self;
-        let refuse = |error| Problem::from_numerics(error, place);
+        let Self { owner, stored, pointers, .. } = self;
+        let refuse = |error| Problem::from_numerics(error, pointers);
         let (kernel, default_alpha) = match &self.kernel {
-            Some(kernel) => (kernel.resolve(stored.scales(), place)?, DEFAULT_ALPHA),
+            Some(kernel) => (kernel.resolve(stored.scales(), pointers)?, DEFAULT_ALPHA),
             None => {
                 let scales = stored.scales().ok_or_else(Problem::internal)?;
                 // With a regularization given, nothing follows from it.
@@ -76,26 +77,26 @@ impl PlannedFit {
         let merges =
             self.duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
         let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
-        let key = FactorKey::of_dense(owner, stored.id, &kernel, &regularization, merged.is_some());
+        let key = FitKey::of_dense(owner, stored.id, &kernel, &regularization, merged.is_some());
         let (fitted, merge) = match merged {
             None => (stored.cloud.clone(), None),
             Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
         };
-        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, place })
+        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, pointers })
     }
 }
 
 /// A fit whose inputs are checked and whose cost is known and admitted.
 #[derive(Clone)]
 pub struct FitPlan {
-    pub stored: Arc<StoredCloud>,
+    pub stored: Arc<RegisteredCloud>,
     /// The cloud that is factorized: without the merged duplicates.
     pub fitted: Arc<Cloud>,
     pub merge: Option<Arc<Merge>>,
     pub kernel: NumericalKernel,
     pub regularization: Regularization,
-    pub key: FactorKey,
-    pub place: Place,
+    pub key: FitKey,
+    pub pointers: Pointers,
 }
 
 impl FitPlan {
@@ -110,6 +111,11 @@ impl FitPlan {
         Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
     }
 
+    /// The solver of this fit with what it and the surface take, within so many bytes of memory.
+    pub fn choice(&self, memory: usize) -> Choice {
+        choose(self.fitted.n_points(), self.fitted.dimension(), memory)
+    }
+
     /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
     pub fn refused(&self, mut error: NumericsError) -> Problem {
         use NumericsError::{KernelNotSmooth, NotPositiveDefinite};
@@ -119,18 +125,17 @@ impl FitPlan {
         {
             *point = merge.first_point(*point);
         }
-        Problem::from_numerics(error, self.place)
+        Problem::from_numerics(error, self.pointers)
     }
 }
 
-/// What the work of an operation costs beside its factorizations.
+/// What answering takes beside what the fits take.
 #[derive(Debug, Clone, Copy)]
 pub struct Cost {
-    pub flops: f64,
+    /// The work, and what lies on the way to the answer.
+    pub work: Price,
     /// Numbers of the answer.
     pub n_numbers: usize,
-    /// Numbers that are needed on the way to it.
-    pub n_scratch: usize,
     /// Numbers of the request beside its clouds: values and queries.
     pub n_held: usize,
 }
@@ -138,21 +143,20 @@ pub struct Cost {
 impl Cost {
     /// Bytes of the answer as numbers, once more while it is put together, and of what leads to it.
     pub fn n_bytes(&self) -> usize {
-        let n_numbers = self.n_numbers.saturating_mul(2).saturating_add(self.n_scratch);
-        n_numbers.saturating_mul(size_of::<f64>())
+        self.n_numbers.saturating_mul(2 * size_of::<f64>()).saturating_add(self.work.n_bytes)
     }
 }
 
 /// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
 #[derive(Debug, Clone)]
-pub enum FactorFailure {
+pub enum FitFailure {
     Refused(NumericsError),
     Broken(Problem),
     /// Cholesky has failed, and there was no memory for the fallback at that moment.
     NeedsAll,
 }
 
-impl FactorFailure {
+impl FitFailure {
     /// The refusal, with pointers into the request that has this fit.
     pub fn of(self, plan: &FitPlan) -> Problem {
         match self {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::plan::PlannedFit;
 use crate::http::fields::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
-use crate::http::problem::{Place, Problem};
+use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::app::App;
 use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
 use crate::http::wire::read::points::Points;
@@ -14,7 +14,7 @@ use crate::numerics::error::NumericsError;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::sums::regularization::Regularization;
 use crate::store::Owner;
-use crate::store::clouds::StoredCloud;
+use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 
 /// Bytes that a number takes in JSON at most, with its comma.
@@ -32,11 +32,11 @@ impl Planner<'_> {
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
     pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<PlannedFit, Problem> {
-        let place = place_of(&fit);
+        let pointers = pointers_of(&fit);
         let stored = self.cloud(fit.cloud, "/cloud")?;
         let (SolverChoice::Auto | SolverChoice::Dense) = fit.solver;
         let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
-        self.plan(stored, chosen, fit.duplicates, purpose, place)
+        self.plan(stored, chosen, fit.duplicates, purpose, pointers)
     }
 
     /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
@@ -45,8 +45,8 @@ impl Planner<'_> {
     /// A [`Problem`] with a pointer to the field.
     pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(PlannedFit, PlannedFit), Problem> {
         let geometry = geometry.unwrap_or_default();
-        let place = place_of(&fit);
-        let surface_place = place_of_surface(&geometry, place);
+        let pointers = pointers_of(&fit);
+        let surface_pointers = pointers_of_surface(&geometry, pointers);
         let values_cloud = self.cloud(fit.cloud, "/cloud")?;
         let surface_cloud = match geometry.cloud {
             None => values_cloud.clone(),
@@ -72,9 +72,9 @@ impl Planner<'_> {
                 false => geometry.noise_variances,
             },
         };
-        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, place)?;
+        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, pointers)?;
         let surface =
-            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, surface_place)?;
+            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, surface_pointers)?;
         Ok((values, surface))
     }
 
@@ -88,11 +88,11 @@ impl Planner<'_> {
         fits: &mut [&mut PlannedFit],
     ) -> Result<Arc<Cloud>, Problem> {
         // The last fit is that of the surface, whose points are the default.
-        let Some(default) = fits.last().map(|fit| (fit.stored.cloud.clone(), fit.place.points)) else {
+        let Some(default) = fits.last().map(|fit| (fit.stored.cloud.clone(), fit.pointers.points)) else {
             return Err(Problem::internal());
         };
         let Some(points) = queries else {
-            fits.iter_mut().for_each(|fit| fit.place.queries = default.1);
+            fits.iter_mut().for_each(|fit| fit.pointers.queries = default.1);
             return Ok(default.0);
         };
         let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
@@ -136,7 +136,7 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// 404 `unknown-cloud`, 413 beyond the limits, 422 for what is no cloud.
-    pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<StoredCloud>, Problem> {
+    pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<RegisteredCloud>, Problem> {
         match (cloud.id, cloud.points) {
             (Some(id), None) => {
                 if cloud.normals.is_some() {
@@ -162,7 +162,7 @@ impl Planner<'_> {
         points: Points,
         normals: Option<Points>,
         pointer: &str,
-    ) -> Result<(Arc<StoredCloud>, bool), Problem> {
+    ) -> Result<(Arc<RegisteredCloud>, bool), Problem> {
         let at = format!("{pointer}/points");
         let cloud = rectangular(points, &at, Slug::InvalidCloud)?;
         let (limit, required) = (self.app.config.max_points, cloud.n_points());
@@ -182,30 +182,30 @@ impl Planner<'_> {
 
     fn plan(
         &self,
-        stored: Arc<StoredCloud>,
+        stored: Arc<RegisteredCloud>,
         chosen: Chosen,
         duplicates: DuplicatePolicy,
         purpose: Purpose,
-        place: Place,
+        pointers: Pointers,
     ) -> Result<PlannedFit, Problem> {
-        let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(place)).transpose()?;
-        let regularization = chosen.regularization(&stored, place)?;
-        Ok(PlannedFit { owner: self.owner, stored, place, kernel, regularization, duplicates, purpose })
+        let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(pointers)).transpose()?;
+        let regularization = chosen.regularization(&stored, pointers)?;
+        Ok(PlannedFit { owner: self.owner, stored, pointers, kernel, regularization, duplicates, purpose })
     }
 }
 
 /// Where the fit of a request stands.
-fn place_of(fit: &Fit) -> Place {
-    Place {
+fn pointers_of(fit: &Fit) -> Pointers {
+    Pointers {
         points: if fit.cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
         regularization: if fit.noise_variances.is_some() { "/noise_variances" } else { "/alpha" },
-        ..Place::REQUEST
+        ..Pointers::REQUEST
     }
 }
 
 /// Where the fit of the surface stands: what `geometry` leaves out, in the request.
-fn place_of_surface(geometry: &Geometry, request: Place) -> Place {
-    Place {
+fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Pointers {
+    Pointers {
         points: match &geometry.cloud {
             None => request.points,
             Some(cloud) if cloud.id.is_some() => "/geometry/cloud/id",
@@ -236,19 +236,23 @@ struct Chosen {
 
 impl Chosen {
     /// What is given; `None` leaves it to the service.
-    fn regularization(self, stored: &StoredCloud, place: Place) -> Result<Option<Regularization>, Problem> {
-        let refuse = |error| Problem::from_numerics(error, place);
+    fn regularization(
+        self,
+        stored: &RegisteredCloud,
+        pointers: Pointers,
+    ) -> Result<Option<Regularization>, Problem> {
+        let refuse = |error| Problem::from_numerics(error, pointers);
         match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
                 let detail = "noise_variances stands instead of alpha; give one of them";
-                Err(Problem::invalid_request(place.regularization, detail))
+                Err(Problem::invalid_request(pointers.regularization, detail))
             }
             (None, None) => Ok(None),
             (Some(alpha), None) => Regularization::uniform(alpha).map(Some).map_err(refuse),
             (None, Some(variances)) => {
                 let found = variances.len();
                 if stored.cloud.n_points() != found {
-                    return Err(length_mismatch(place.regularization, &stored.cloud, found));
+                    return Err(length_mismatch(pointers.regularization, &stored.cloud, found));
                 }
                 Regularization::per_point(variances).map(Some).map_err(refuse)
             }

@@ -6,7 +6,7 @@ use axum::http::HeaderValue;
 use axum::response::Response;
 
 use crate::http::compute::StageTimes;
-use crate::store::factors::{CacheOutcome, StoredFactor};
+use crate::store::prepared::{CacheOutcome, PreparedFit};
 
 /// Times and cache, as `Server-Timing` and `Cache-Status`.
 #[derive(Default)]
@@ -25,7 +25,7 @@ impl Report {
     }
 
     /// Adds a factor. With two of them the answer is a hit only if both are: the outcomes are ordered by cost.
-    pub fn found(&mut self, stored: &StoredFactor, outcome: CacheOutcome) {
+    pub fn found(&mut self, stored: &PreparedFit, outcome: CacheOutcome) {
         self.cache = self.cache.max(Some(outcome));
         if outcome != CacheOutcome::Hit {
             self.stages.gram += stored.gram_time;

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use super::app::App;
 use super::plan::PlannedFit;
 use crate::http::compute::{Admission, JobObserver};
-use crate::http::problem::{Place, Problem};
+use crate::http::problem::{Pointers, Problem};
 use crate::numerics::error::NumericsError;
-use crate::numerics::points::noise::{estimate_noise, noise_flops_needed};
+use crate::numerics::points::noise::estimate_noise;
 use crate::numerics::points::sampling::Sampling;
-use crate::store::clouds::StoredCloud;
+use crate::numerics::solver::choose::{noise_flops, sampling_flops};
+use crate::store::clouds::RegisteredCloud;
 
 /// Finds what a fit lacks of its cloud.
 ///
@@ -23,7 +24,7 @@ pub async fn find_lacking(
     let sampling = find_sampling(app, admission, &fit.stored).await?;
     if fit.lacks_noise() {
         let cloud = fit.stored.cloud.clone();
-        let flops = noise_flops_needed(cloud.n_points(), cloud.dimension());
+        let flops = noise_flops(cloud.n_points(), cloud.dimension());
         let look = move |observer: &JobObserver| estimate_noise(&cloud, sampling.neighbours(), observer);
         let looking = look_at(app, admission, flops, look);
         app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
@@ -38,10 +39,10 @@ pub async fn find_lacking(
 pub async fn find_sampling(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    stored: &StoredCloud,
+    stored: &RegisteredCloud,
 ) -> Result<Arc<Sampling>, Problem> {
     let cloud = stored.cloud.clone();
-    let flops = Sampling::flops_needed(cloud.n_points(), cloud.dimension());
+    let flops = sampling_flops(cloud.n_points(), cloud.dimension());
     let looking =
         look_at(app, admission, flops, move |observer: &JobObserver| Sampling::of(&cloud, observer));
     app.clouds.sampling(admission.owner, stored, || looking).await
@@ -57,6 +58,6 @@ fn look_at<T: Send + 'static>(
     let (app, admission) = (app.clone(), admission.clone());
     async move {
         let outcome = app.compute.run(&admission, flops, look).await?.0;
-        outcome.map_err(|error| Problem::from_numerics(error, Place::REQUEST))
+        outcome.map_err(|error| Problem::from_numerics(error, Pointers::REQUEST))
     }
 }

@@ -8,7 +8,7 @@ use flate2::write::GzEncoder;
 use super::negotiation::Coding;
 use super::read::limits::SMALLER_BODY;
 use crate::http::problem::slug::Slug;
-use crate::http::problem::{Place, Problem};
+use crate::http::problem::{Pointers, Problem};
 use crate::numerics::observer::Observer;
 
 /// Levels for random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, 2 leaves 46 % at 127 MB/s, 6 as much at half the
@@ -83,7 +83,7 @@ pub fn decompress(
     }
     let packed = || Packed { bytes: &bytes, observer };
     let refused = |error: io::Error| match observer.checkpoint() {
-        Err(cancelled) => Problem::from_numerics(cancelled, Place::REQUEST),
+        Err(cancelled) => Problem::from_numerics(cancelled, Pointers::REQUEST),
         Ok(()) => Problem::new(Slug::MalformedBody, format!("the body is not {}: {error}", coding.name())),
     };
     let open = || -> io::Result<Box<dyn Read + '_>> {

@@ -1,17 +1,17 @@
-//! A function on space: the kernel expansion whose weights solve the fit of some values.
+//! A function on space: the expansion whose weights solve the fit of some values.
 
 use std::sync::Arc;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::{GramFactor, Solution};
+use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::{JetOrder, Jets, check_smooth_at};
 
-/// `u(x) = Σ_j λ_j k(x, x_j)`: interpolates the values at α = 0, regresses them at α > 0.
+/// `u(x) = Σ_j λ_j k(x, z_j)` over the centres of its solver: interpolates the values at α = 0, regresses them at α > 0.
 #[derive(Clone)]
 pub struct Interpolant {
-    pub factor: Arc<GramFactor>,
+    pub solver: Arc<Solver>,
     pub solution: Arc<Solution>,
 }
 
@@ -20,13 +20,9 @@ impl Interpolant {
     ///
     /// # Errors
     /// Those of [`Solution::of`].
-    pub fn fit(
-        factor: Arc<GramFactor>,
-        values: &[f64],
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let solution = Arc::new(Solution::of(&factor, values, observer)?);
-        Ok(Self { factor, solution })
+    pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let solution = Arc::new(Solution::of(&solver, values, observer)?);
+        Ok(Self { solver, solution })
     }
 
     /// Fits the constant 1: the paper's signature function u_X, whose level 1 is the surface (with α > 0, the level that is
@@ -35,9 +31,9 @@ impl Interpolant {
     ///
     /// # Errors
     /// Those of [`Solution::of`].
-    pub fn signature(factor: Arc<GramFactor>, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let ones = vec![1.0; factor.n_points()];
-        Self::fit(factor, &ones, observer)
+    pub fn signature(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let ones = vec![1.0; solver.n_points()];
+        Self::fit(solver, &ones, observer)
     }
 
     /// Evaluates at queries `[m, d]`.
@@ -51,12 +47,12 @@ impl Interpolant {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Jets, NumericsError> {
-        let (cloud, kernel) = (self.factor.cloud(), self.factor.kernel());
+        let (cloud, kernel) = (self.solver.cloud(), self.solver.kernel());
         cloud.check_same_dimension(queries)?;
         if order != JetOrder::Value {
             check_smooth_at(cloud, kernel, queries)?;
         }
         observer.enter(Stage::Evaluate);
-        Jets::evaluate(cloud, kernel, &self.solution.weights, queries, order, observer)
+        self.solver.expansion(&self.solution.weights).at(queries, order, observer)
     }
 }

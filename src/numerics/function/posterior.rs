@@ -8,7 +8,7 @@ use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::{GramFactor, Solution, parallelism};
+use crate::numerics::solver::{Solution, Solver, parallelism};
 use crate::numerics::sums::gram::{fill_cross_gram, fill_lower_gram};
 use crate::numerics::sums::nodes::Nodes;
 use crate::numerics::sums::regularization::Regularization;
@@ -43,27 +43,27 @@ pub struct Covariance {
 /// [`NumericsError::DimensionMismatch`]; [`NumericsError::NotPositiveDefinite`] without a Cholesky factor or with a variance
 /// below −τ; [`NumericsError::Cancelled`].
 pub fn variances(
-    factor: &GramFactor,
+    solver: &Solver,
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Variances, NumericsError> {
-    let n = factor.n_points();
-    factor.cloud().check_same_dimension(queries)?;
-    let k0 = factor.kernel().at_zero();
-    let nodes = Nodes::of(factor.cloud());
+    let n = solver.n_points();
+    solver.cloud().check_same_dimension(queries)?;
+    let k0 = solver.kernel().at_zero();
+    let nodes = Nodes::of(solver.cloud());
     let mut buffer = vec![0.0; n * QUERIES_PER_BLOCK.min(queries.n_points())];
     let mut variances = Variances { latent: Vec::with_capacity(queries.n_points()), clamped: Vec::new() };
     for rows in queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension()) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
         let columns = &mut buffer[..n * block.n_points()];
-        whitened_cross_gram(factor, &nodes, &block, columns, observer)?;
+        whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
         let explained: Vec<f64> =
             columns.par_chunks_exact(n).map(|column| ColRef::from_slice(column).squared_norm_l2()).collect();
         for (k, explained) in explained.into_iter().enumerate() {
             let query = variances.latent.len();
             let variance = k0 - explained;
             if variance.is_nan() || variance < 0.0 {
-                check_is_rounding(factor, &nodes, query, block.point(k), variance, observer)?;
+                check_is_rounding(solver, &nodes, query, block.point(k), variance, observer)?;
                 variances.clamped.push(query);
             }
             variances.latent.push(variance.max(0.0));
@@ -78,22 +78,22 @@ pub fn variances(
 /// # Errors
 /// Those of [`variances`].
 pub fn covariance(
-    factor: &GramFactor,
+    solver: &Solver,
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Covariance, NumericsError> {
-    let (n, m) = (factor.n_points(), queries.n_points());
-    factor.cloud().check_same_dimension(queries)?;
-    let nodes = Nodes::of(factor.cloud());
+    let (n, m) = (solver.n_points(), queries.n_points());
+    solver.cloud().check_same_dimension(queries)?;
+    let nodes = Nodes::of(solver.cloud());
     let mut v = vec![0.0; n * m];
     let rows = queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension());
     for (rows, columns) in rows.zip(v.chunks_mut(QUERIES_PER_BLOCK * n)) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
-        whitened_cross_gram(factor, &nodes, &block, columns, observer)?;
+        whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
     }
     observer.enter(Stage::Evaluate);
     let mut covariance = vec![0.0; m * m];
-    fill_lower_gram(queries, factor.kernel(), &Regularization::Uniform(0.0), &mut covariance, m, observer)?;
+    fill_lower_gram(queries, solver.kernel(), &Regularization::Uniform(0.0), &mut covariance, m, observer)?;
     let v = MatRef::from_column_major_slice(&v, n, m);
     let mut lower = MatMut::from_column_major_slice_mut(&mut covariance, m, m);
     for first in (0..m).step_by(QUERIES_PER_BLOCK) {
@@ -113,7 +113,7 @@ pub fn covariance(
     for query in 0..m {
         let variance = &mut covariance[query * (m + 1)];
         if variance.is_nan() || *variance < 0.0 {
-            check_is_rounding(factor, &nodes, query, queries.point(query), *variance, observer)?;
+            check_is_rounding(solver, &nodes, query, queries.point(query), *variance, observer)?;
             clamped.push(query);
             *variance = 0.0;
         }
@@ -126,48 +126,48 @@ pub fn covariance(
 /// # Errors
 /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
 pub fn log_marginal_likelihood(
-    factor: &GramFactor,
+    solver: &Solver,
     solution: &Solution,
     values: &[f64],
 ) -> Result<f64, NumericsError> {
-    let normalization = factor.n_points() as f64 * (2.0 * std::f64::consts::PI).ln();
-    Ok(-0.5 * (dot(values, &solution.weights) + factor.log_determinant()? + normalization))
+    let normalization = solver.n_points() as f64 * (2.0 * std::f64::consts::PI).ln();
+    Ok(-0.5 * (dot(values, &solution.weights) + solver.log_determinant()? + normalization))
 }
 
 /// `columns ← L⁻¹ k(X, Q)`, one column per query.
 fn whitened_cross_gram(
-    factor: &GramFactor,
+    solver: &Solver,
     nodes: &Nodes,
     queries: &Cloud,
     columns: &mut [f64],
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
     observer.enter(Stage::Evaluate);
-    fill_cross_gram(nodes, factor.kernel(), queries, columns, observer)?;
+    fill_cross_gram(nodes, solver.kernel(), queries, columns, observer)?;
     observer.enter(Stage::Solve);
-    let (n, m) = (factor.n_points(), queries.n_points());
-    factor.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m))
+    let (n, m) = (solver.n_points(), queries.n_points());
+    solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m))
 }
 
 fn check_is_rounding(
-    factor: &GramFactor,
+    solver: &Solver,
     nodes: &Nodes,
     query: usize,
     x: &[f64],
     variance: f64,
     observer: &dyn Observer,
 ) -> Result<(), NumericsError> {
-    let n = factor.n_points();
+    let n = solver.n_points();
     let mut w = vec![0.0; n];
     let at_query = Cloud::new(x.to_vec(), x.len())?;
-    fill_cross_gram(nodes, factor.kernel(), &at_query, &mut w, observer)?;
-    factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut w, n, 1));
+    fill_cross_gram(nodes, solver.kernel(), &at_query, &mut w, observer)?;
+    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut w, n, 1));
     let norm_squared: f64 = w.par_iter().map(|w| w * w).sum();
-    let tolerance = 4.0 * f64::EPSILON * (factor.kernel().at_zero() + factor.norm1() * norm_squared);
+    let tolerance = 4.0 * f64::EPSILON * (solver.kernel().at_zero() + solver.norm1() * norm_squared);
     if -variance <= tolerance {
         Ok(())
     } else {
-        Err(factor.not_positive_definite(NotDefinite::NegativeVariance { query, variance }))
+        Err(solver.not_positive_definite(NotDefinite::NegativeVariance { query, variance }))
     }
 }
 
@@ -176,30 +176,32 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::numerics::kernel::tests::all_families;
     use crate::numerics::kernel::{Family, Kernel};
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::testing::fibonacci_sphere;
+    use crate::numerics::solver::System;
+    use crate::numerics::testing::{all_families, fibonacci_sphere};
 
-    fn factor(cloud: &Cloud, family: Family, alpha: f64) -> GramFactor {
+    fn solver(cloud: &Cloud, family: Family, alpha: f64) -> Solver {
         let kernel = Kernel::new(family, 0.9, 2.0).unwrap();
         let alpha = Regularization::uniform(alpha).unwrap();
-        GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap()
+        System::new(Arc::new(cloud.clone()), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))
+            .unwrap()
     }
 
     #[test]
     fn one_observation_has_the_textbook_posterior() {
         let cloud = Cloud::new(vec![0.0], 1).unwrap();
-        let factor = factor(&cloud, Family::Gauss, 0.5);
+        let solver = solver(&cloud, Family::Gauss, 0.5);
         let queries = Cloud::new(vec![0.0, 0.9], 1).unwrap();
         let k = 2.0 * (-1.0f64).exp();
         let expected = [2.0 - 4.0 / 2.5, 2.0 - k * k / 2.5];
-        let found = variances(&factor, &queries, &Unobserved).unwrap();
+        let found = variances(&solver, &queries, &Unobserved).unwrap();
         assert!(found.latent.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-15));
-        let covariance = covariance(&factor, &queries, &Unobserved).unwrap().latent;
+        let covariance = covariance(&solver, &queries, &Unobserved).unwrap().latent;
         assert!((covariance[1] - (k - 2.0 * k / 2.5)).abs() < 1e-15);
-        let solution = Solution::of(&factor, &[3.0], &Unobserved).unwrap();
-        let likelihood = log_marginal_likelihood(&factor, &solution, &[3.0]).unwrap();
+        let solution = Solution::of(&solver, &[3.0], &Unobserved).unwrap();
+        let likelihood = log_marginal_likelihood(&solver, &solution, &[3.0]).unwrap();
         let expected = -0.5 * (9.0 / 2.5 + 2.5f64.ln() + (2.0 * std::f64::consts::PI).ln());
         assert!((likelihood - expected).abs() < 1e-15);
     }
@@ -211,10 +213,10 @@ mod tests {
         let queries: Vec<f64> = (0..900).map(|i| 1.4 * (0.37 * i as f64).sin()).collect();
         let queries = Cloud::new(queries, 3).unwrap();
         for family in all_families() {
-            let factor = factor(&cloud, family, 1e-4);
-            let variances = variances(&factor, &queries, &Unobserved).unwrap().latent;
-            let covariance = covariance(&factor, &queries, &Unobserved).unwrap().latent;
-            let k0 = factor.kernel().at_zero();
+            let solver = solver(&cloud, family, 1e-4);
+            let variances = variances(&solver, &queries, &Unobserved).unwrap().latent;
+            let covariance = covariance(&solver, &queries, &Unobserved).unwrap().latent;
+            let k0 = solver.kernel().at_zero();
             for (query, &variance) in variances.iter().enumerate() {
                 assert!((variance - covariance[query * 301]).abs() < 1e-13 * k0, "{family:?}");
                 assert!(variance >= 0.0 && variance <= k0 * (1.0 + 1e-15), "{family:?}");
@@ -227,21 +229,21 @@ mod tests {
         let cloud = fibonacci_sphere(30);
         let queries = Cloud::new(vec![1e40, 0.0, 0.0, 0.0, 1e100, 0.0], 3).unwrap();
         for family in all_families().into_iter().filter(|&f| f != Family::InverseMultiquadric) {
-            let factor = factor(&cloud, family, 1e-6);
-            let found = variances(&factor, &queries, &Unobserved).unwrap();
-            assert_eq!(found.latent, [factor.kernel().at_zero(); 2], "{family:?}");
+            let solver = solver(&cloud, family, 1e-6);
+            let found = variances(&solver, &queries, &Unobserved).unwrap();
+            assert_eq!(found.latent, [solver.kernel().at_zero(); 2], "{family:?}");
         }
     }
 
     #[test]
     fn at_observed_points_without_noise_the_variance_is_zero_and_clamping_is_reported() {
         let cloud = fibonacci_sphere(150);
-        let factor = factor(&cloud, Family::Gauss, 0.0);
-        let found = variances(&factor, &cloud, &Unobserved).unwrap();
+        let solver = solver(&cloud, Family::Gauss, 0.0);
+        let found = variances(&solver, &cloud, &Unobserved).unwrap();
         assert!(found.latent.iter().all(|&v| (0.0..1e-9).contains(&v)));
         assert!(!found.clamped.is_empty());
         assert!(found.clamped.iter().all(|&query| found.latent[query] == 0.0));
-        let covariance = covariance(&factor, &cloud, &Unobserved).unwrap();
+        let covariance = covariance(&solver, &cloud, &Unobserved).unwrap();
         assert!(!covariance.clamped.is_empty());
         assert!((0..150).all(|query| covariance.latent[query * 151] >= 0.0));
     }

@@ -107,4 +107,4 @@ fn inverse_square(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

@@ -5,22 +5,7 @@ use pulp::WithSimd;
 use super::*;
 use crate::numerics::machine::instruction_set::InstructionSet;
 use crate::numerics::machine::registers::{BLOCK, Block, Pack};
-
-/// Every family at parameters that a user might choose.
-pub(crate) fn all_families() -> Vec<Family> {
-    let mut families = vec![
-        Family::Gauss,
-        Family::Laplace { epsilon: 1.0 },
-        Family::Laplace { epsilon: 0.01 },
-        Family::Laplace { epsilon: 0.0 },
-        Family::Wendland { smoothness: WendlandSmoothness::C2 },
-        Family::Wendland { smoothness: WendlandSmoothness::C4 },
-        Family::Wendland { smoothness: WendlandSmoothness::C6 },
-        Family::InverseMultiquadric,
-    ];
-    families.extend((0..=MAX_MATERN_ORDER).map(|order| Family::Matern { order }));
-    families
-}
+use crate::numerics::testing::all_families;
 
 /// φ, φ′, φ″ of a kernel at every point of a block, as the loops get them.
 struct Profiles<'a>(&'a Kernel, f64);

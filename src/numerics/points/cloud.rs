@@ -69,6 +69,12 @@ impl Cloud {
         &self.coordinates
     }
 
+    /// Some of its points, in this order.
+    pub(crate) fn select(&self, points: &[usize]) -> Self {
+        let coordinates = points.iter().flat_map(|&point| self.point(point)).copied().collect();
+        Self { coordinates, dimension: self.dimension }
+    }
+
     /// The same cloud without what a parser reserved beyond its points: for clouds that are kept.
     ///
     /// `Vec::shrink_to_fit` may leave a block as it is; a copy is the size of the points.

@@ -11,10 +11,10 @@ use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 
 /// Residual degrees of freedom of the smaller neighbourhood: few, so that it stays within the curvature of coarse clouds.
-const DEGREES_OF_FREEDOM: usize = 2;
+pub(crate) const DEGREES_OF_FREEDOM: usize = 2;
 
 /// Points that are looked at, or up to twice as many: their median scatters by 4 %.
-const MAX_SITES: usize = 1000;
+pub(crate) const MAX_SITES: usize = 1000;
 
 /// Standard deviation of the noise of the points across the surface they sample, unit L; 0 where none shows, and for
 /// clouds too small to tell.
@@ -62,15 +62,6 @@ pub fn estimate_noise(
     let correction = (1.0 - 2.0 / (9.0 * DEGREES_OF_FREEDOM as f64)).powi(3);
     let variance = median(variances.into_iter().flatten().collect());
     Ok(variance.map_or(0.0, |variance| (variance.max(0.0) / correction).sqrt()))
-}
-
-/// Flops of [`estimate_noise`]: searches, and two quadrics each by orthogonal factorization.
-pub fn noise_flops_needed(n_points: usize, dimension: usize) -> f64 {
-    let (n, sites) = (n_points as f64, n_points.min(2 * MAX_SITES) as f64);
-    let visited = n.min(200.0 * 2f64.powi(dimension.min(60) as i32));
-    let (n_columns, d) = (n_coefficients(dimension.max(2)) as f64, dimension as f64);
-    let n_rows = 2.0 * (n_columns + DEGREES_OF_FREEDOM as f64);
-    sites * (visited * (3.0 * d + 10.0) + 6.0 * n_rows * n_columns * n_columns)
 }
 
 #[cfg(test)]

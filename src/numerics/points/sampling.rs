@@ -43,14 +43,6 @@ impl Sampling {
         Ok(Self { neighbours, spacings, scales: Scales::of(cloud, nearest, means) })
     }
 
-    /// Flops of [`Sampling::of`]: every search visits a few leaves, in many dimensions most of the cloud.
-    pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
-        let n = n_points as f64;
-        let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
-        // Distance, comparison and descent.
-        n * visited * (3.0 * dimension as f64 + 10.0)
-    }
-
     pub fn neighbours(&self) -> &Neighbours {
         &self.neighbours
     }

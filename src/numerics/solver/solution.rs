@@ -2,7 +2,7 @@
 
 use faer::MatMut;
 
-use super::GramFactor;
+use super::Solver;
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::{Observer, Stage};
@@ -19,7 +19,7 @@ const MAX_BACKWARD_ERROR: f64 = 1e-13;
 /// `Λ = (K + αI)⁻¹ Y` with its residual and norms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// Λ, `[n]`.
+    /// Λ, one for each centre of the solver's expansions: `[n]`, or `[r]` for the fallback.
     pub weights: Vec<f64>,
     /// `‖Y − (K + αI)Λ‖₂ / ‖Y‖₂`, 0 for Y = 0.
     pub relative_residual: f64,
@@ -34,14 +34,14 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Solves for values `[n]`, checks the residual against the matrix itself (not its factor), and refines once where that
+    /// Solves for values `[n]`, checks the residual against the matrix itself (not its solver), and refines once where that
     /// helps.
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::NotPositiveDefinite`] if the
     /// residual exceeds 1e-5 or the backward error 1e-13, [`NumericsError::Cancelled`].
-    pub fn of(factor: &GramFactor, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
-        Ok(Self::with_jets(factor, values, JetOrder::Value, observer)?.0)
+    pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+        Ok(Self::with_jets(solver, values, JetOrder::Value, observer)?.0)
     }
 
     /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
@@ -49,20 +49,20 @@ impl Solution {
     /// # Errors
     /// Those of [`Solution::of`], and [`NumericsError::Overflow`] of derivatives.
     pub fn with_jets(
-        factor: &GramFactor,
+        solver: &Solver,
         values: &[f64],
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<(Self, Jets), NumericsError> {
-        factor.cloud().check_one_per_point(values)?;
+        solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
-        let candidate = |weights| Candidate::new(factor, values, weights, order, observer);
+        let candidate = |weights| Candidate::new(solver, values, weights, order, observer);
         let is_one = values.iter().all(|&value| value == 1.0);
-        let weights = if is_one { factor.weights_of_one().to_vec() } else { solve(factor, values) };
+        let weights = if is_one { solver.weights_of_one().to_vec() } else { solve(solver, values) };
         let mut best = candidate(weights)?;
         let mut refined = false;
         if best.relative_residual(values) > REFINE_ABOVE {
-            let correction = solve(factor, &best.residual);
+            let correction = solve(solver, &best.residual);
             let weights = best.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
             match candidate(weights) {
                 Ok(next) if next.relative_residual(values) < best.relative_residual(values) => {
@@ -72,7 +72,7 @@ impl Solution {
                 Ok(_) | Err(_) => {}
             }
         }
-        best.accept(factor, values, refined)
+        best.accept(solver, values, refined)
     }
 
     /// Bytes held on the heap.
@@ -81,14 +81,14 @@ impl Solution {
     }
 }
 
-fn solve(factor: &GramFactor, values: &[f64]) -> Vec<f64> {
+fn solve(solver: &Solver, values: &[f64]) -> Vec<f64> {
     let mut weights = values.to_vec();
     let n = weights.len();
-    factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
+    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, 1));
     weights
 }
 
-/// Weights with `KΛ`, evaluated afresh from the kernel, and the residual.
+/// Weights at all points with `KΛ`, evaluated afresh from the kernel, and the residual.
 struct Candidate {
     weights: Vec<f64>,
     jets: Jets,
@@ -97,7 +97,7 @@ struct Candidate {
 
 impl Candidate {
     fn new(
-        factor: &GramFactor,
+        solver: &Solver,
         values: &[f64],
         weights: Vec<f64>,
         order: JetOrder,
@@ -106,10 +106,10 @@ impl Candidate {
         if weights.iter().any(|w| !w.is_finite()) {
             return Err(NumericsError::WeightsOverflow);
         }
-        let cloud = factor.cloud();
-        let jets = Jets::evaluate(cloud, factor.kernel(), &weights, cloud, order, observer)?;
+        let at_centres = solver.at_centres(&weights);
+        let jets = solver.expansion(&at_centres).at(solver.cloud(), order, observer)?;
         let residual = (0..values.len())
-            .map(|i| values[i] - jets.value(i) - factor.regularization().at(i) * weights[i])
+            .map(|i| values[i] - jets.value(i) - solver.regularization().at(i) * weights[i])
             .collect();
         Ok(Self { weights, jets, residual })
     }
@@ -121,26 +121,26 @@ impl Candidate {
 
     fn accept(
         self,
-        factor: &GramFactor,
+        solver: &Solver,
         values: &[f64],
         refined: bool,
     ) -> Result<(Solution, Jets), NumericsError> {
         let relative_residual = self.relative_residual(values);
         let residual_max = norm_max(&self.residual);
-        let scale = factor.norm1() * norm_max(&self.weights) + norm_max(values);
+        let scale = solver.norm1() * norm_max(&self.weights) + norm_max(values);
         let backward_error = if scale == 0.0 { 0.0 } else { residual_max / scale };
         if relative_residual.is_nan() || relative_residual > MAX_RELATIVE_RESIDUAL {
-            return Err(factor.not_positive_definite(NotDefinite::Residual { relative_residual }));
+            return Err(solver.not_positive_definite(NotDefinite::Residual { relative_residual }));
         }
         if backward_error.is_nan() || backward_error > MAX_BACKWARD_ERROR {
-            return Err(factor.not_positive_definite(NotDefinite::BackwardError { backward_error }));
+            return Err(solver.not_positive_definite(NotDefinite::BackwardError { backward_error }));
         }
         let at_points = self.jets.values();
         let native_norm_squared = self.weights.iter().zip(&at_points).map(|(w, u)| w * u).sum();
         let misfits: Vec<f64> = at_points.iter().zip(values).map(|(u, y)| u - y).collect();
         let misfit = norm2(&misfits);
         let solution = Solution {
-            weights: self.weights,
+            weights: solver.at_centres(&self.weights),
             relative_residual,
             residual_max,
             native_norm_squared,

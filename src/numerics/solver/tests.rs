@@ -1,23 +1,27 @@
+use faer::Mat;
+
 use super::*;
 use crate::numerics::kernel::Family;
-use crate::numerics::kernel::tests::all_families;
-use crate::numerics::observer::Unobserved;
-use crate::numerics::testing::{circle, fibonacci_sphere};
+use crate::numerics::observer::{Stage, Unobserved};
+use crate::numerics::points::cloud::squared_distance;
+use crate::numerics::testing::{all_families, circle, fibonacci_sphere};
 
-fn factor(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> GramFactor {
+fn dense(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Solver {
     let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
     let regularization = Regularization::uniform(alpha).unwrap();
-    GramFactor::factorize(Arc::new(cloud.clone()), kernel, regularization, &Unobserved).unwrap()
+    System::new(Arc::new(cloud.clone()), kernel, regularization)
+        .and_then(|system| Solver::dense(system, &Unobserved))
+        .unwrap()
 }
 
 #[test]
 fn the_recursive_factorization_solves_beyond_one_leaf() {
     // 1,300 points: three levels of recursion, an odd split, a padded stride.
     let cloud = fibonacci_sphere(1300);
-    let factor = factor(&cloud, Family::Matern { order: 1 }, 0.3, 1e-3);
+    let solver = dense(&cloud, Family::Matern { order: 1 }, 0.3, 1e-3);
     let values: Vec<f64> = cloud.points().map(|x| x[2]).collect();
-    let solution = Solution::of(&factor, &values, &Unobserved).unwrap();
-    assert_eq!(factor.method(), Method::Cholesky);
+    let solution = Solution::of(&solver, &values, &Unobserved).unwrap();
+    assert_eq!(solver.method(), Method::Cholesky);
     assert!(solution.relative_residual < 1e-13, "{}", solution.relative_residual);
     assert!(!solution.refined);
 }
@@ -27,8 +31,8 @@ fn every_kernel_interpolates_at_alpha_zero() {
     let cloud = fibonacci_sphere(60);
     let values: Vec<f64> = cloud.points().map(|x| x[0] - 2.0 * x[1] * x[2]).collect();
     for family in all_families() {
-        let factor = factor(&cloud, family, 0.8, 0.0);
-        let solution = Solution::of(&factor, &values, &Unobserved).unwrap();
+        let solver = dense(&cloud, family, 0.8, 0.0);
+        let solution = Solution::of(&solver, &values, &Unobserved).unwrap();
         assert!(solution.misfit < 1e-9, "{family:?}: {}", solution.misfit);
     }
 }
@@ -37,13 +41,13 @@ fn every_kernel_interpolates_at_alpha_zero() {
 fn the_fallback_serves_what_cholesky_cannot() {
     // Gauss on 512 points of the sphere at α = 0 has condition 1e19 (numerics.md, Fit 2).
     let cloud = fibonacci_sphere(512);
-    let factor = factor(&cloud, Family::Gauss, 1.0, 0.0);
-    assert_eq!(factor.method(), Method::PivotedCholesky);
-    assert!(factor.rank() < 512 && factor.rank() > 100, "{}", factor.rank());
+    let solver = dense(&cloud, Family::Gauss, 1.0, 0.0);
+    assert_eq!(solver.method(), Method::PivotedCholesky);
+    assert!(solver.rank() < 512 && solver.rank() > 100, "{}", solver.rank());
     let values: Vec<f64> = cloud.points().map(|x| x[2] * x[0]).collect();
-    let solution = Solution::of(&factor, &values, &Unobserved).unwrap();
+    let solution = Solution::of(&solver, &values, &Unobserved).unwrap();
     assert!(solution.relative_residual < 1e-6, "{}", solution.relative_residual);
-    assert!(factor.log_determinant().is_err());
+    assert!(solver.log_determinant().is_err());
 }
 
 #[test]
@@ -63,11 +67,11 @@ fn the_fallback_asks_before_it_takes_all_of_its_matrix() {
             answer
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let factor = GramFactor::factorize_in(workspace, cloud.clone(), kernel, alpha.clone(), &Unobserved);
-        (factor, asked)
+        let solver = System::new(cloud.clone(), kernel, alpha.clone())
+            .and_then(|system| Solver::dense_in(workspace, system, &Unobserved));
+        (solver, asked)
     };
-    let all = GramFactor::n_bytes_needed_at_most(200).unwrap();
-    assert!(all > GramFactor::n_bytes_needed(200).unwrap());
+    let all = 200 * 200 * size_of::<f64>();
     let (refused, asked) = attempt(0.3, false);
     assert!(matches!(refused, Err(NumericsError::OutOfMemory { n_bytes }) if n_bytes == all));
     assert_eq!(asked, [all]);
@@ -84,13 +88,13 @@ fn the_transposed_solve_is_the_transpose() {
     // Cholesky; the fallback with more and with fewer pivots than other points.
     for (length_scale, ranks) in [(0.3, 90..91), (5.0, 46..90), (20.0, 1..45)] {
         let cloud = fibonacci_sphere(90);
-        let factor = factor(&cloud, Family::Gauss, length_scale, 0.0);
-        assert!(ranks.contains(&factor.rank()), "ℓ = {length_scale}: {}", factor.rank());
+        let solver = dense(&cloud, Family::Gauss, length_scale, 0.0);
+        assert!(ranks.contains(&solver.rank()), "ℓ = {length_scale}: {}", solver.rank());
         let vector = |s: f64| (0..90).map(|i| (s * i as f64).sin()).collect::<Vec<f64>>();
         let (y, g) = (vector(0.9), vector(0.4));
         let (mut wy, mut wtg) = (y.clone(), g.clone());
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut wy, 90, 1));
-        factor.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut wtg, 90, 1));
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut wy, 90, 1));
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut wtg, 90, 1));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (left, right) = (dot(&g, &wy), dot(&wtg, &y));
         let scale = dot(&wy, &wy).sqrt() * 10.0;
@@ -103,7 +107,8 @@ fn coinciding_points_need_regularization() {
     let cloud = Cloud::new(vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 2).unwrap();
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let outcome = |regularization: Regularization| {
-        GramFactor::factorize(Arc::new(cloud.clone()), kernel, regularization, &Unobserved)
+        System::new(Arc::new(cloud.clone()), kernel, regularization)
+            .and_then(|system| Solver::dense(system, &Unobserved))
             .map(|f| f.method())
     };
     let refusal = Err(NumericsError::DuplicatePoints { points: vec![0, 2] });
@@ -117,14 +122,16 @@ fn coinciding_points_need_regularization() {
 fn values_that_no_expansion_can_reach_are_refused_with_a_remedy() {
     // A wide Gauss kernel cannot follow alternating values in float64.
     let cloud = circle(200);
-    let factor = factor(&cloud, Family::Gauss, 4.0, 0.0);
+    let solver = dense(&cloud, Family::Gauss, 4.0, 0.0);
     let values: Vec<f64> = (0..200).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
-    match Solution::of(&factor, &values, &Unobserved) {
+    match Solution::of(&solver, &values, &Unobserved) {
         Err(NumericsError::NotPositiveDefinite { minimum_alpha, .. }) => {
             assert!(minimum_alpha > 0.0 && minimum_alpha < 1e-7);
-            let kernel = *factor.kernel();
+            let kernel = *solver.kernel();
             let remedy = Regularization::uniform(minimum_alpha).unwrap();
-            let again = GramFactor::factorize(Arc::new(cloud), kernel, remedy, &Unobserved).unwrap();
+            let again = System::new(Arc::new(cloud), kernel, remedy)
+                .and_then(|system| Solver::dense(system, &Unobserved))
+                .unwrap();
             assert!(Solution::of(&again, &values, &Unobserved).is_ok());
         }
         other => panic!("{other:?}"),
@@ -142,7 +149,8 @@ fn a_cancelled_factorization_stops() {
     }
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let cloud = Arc::new(fibonacci_sphere(50));
-    let outcome = GramFactor::factorize(cloud, kernel, Regularization::Uniform(1.0), &Cancelled);
+    let outcome = System::new(cloud, kernel, Regularization::Uniform(1.0))
+        .and_then(|system| Solver::dense(system, &Cancelled));
     assert!(matches!(outcome, Err(NumericsError::Cancelled)));
 }
 
@@ -166,8 +174,9 @@ fn the_fallback_stops_at_every_checkpoint() {
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let outcome = |checkpoint: usize| {
         let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
-        let factor = GramFactor::factorize(cloud.clone(), kernel, Regularization::Uniform(0.0), &observer);
-        (factor.map(|f| f.method()), observer.n_checkpoints.into_inner())
+        let solver = System::new(cloud.clone(), kernel, Regularization::Uniform(0.0))
+            .and_then(|system| Solver::dense(system, &observer));
+        (solver.map(|f| f.method()), observer.n_checkpoints.into_inner())
     };
     let (method, n_checkpoints) = outcome(usize::MAX);
     assert_eq!(method, Ok(Method::PivotedCholesky));
@@ -185,17 +194,17 @@ fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let noise: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { 0.5 } else { 0.0 }).collect();
     let regularization = Regularization::per_point(noise.clone()).unwrap();
-    let factor = GramFactor::factorize(Arc::new(cloud.clone()), kernel, regularization, &Unobserved).unwrap();
+    let solver = System::new(Arc::new(cloud.clone()), kernel, regularization)
+        .and_then(|system| Solver::dense(system, &Unobserved))
+        .unwrap();
     let weights: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { (i as f64).cos() } else { 0.0 }).collect();
     let values: Vec<f64> = (0..200)
         .map(|i| {
-            let k = |j: usize| {
-                (-crate::numerics::points::cloud::squared_distance(cloud.point(i), cloud.point(j))).exp()
-            };
+            let k = |j: usize| (-squared_distance(cloud.point(i), cloud.point(j))).exp();
             (0..200).map(|j| k(j) * weights[j]).sum::<f64>() + noise[i] * weights[i]
         })
         .collect();
-    let solution = Solution::of(&factor, &values, &Unobserved).unwrap();
+    let solution = Solution::of(&solver, &values, &Unobserved).unwrap();
     assert!(solution.relative_residual < 1e-14, "{}", solution.relative_residual);
 }
 
@@ -204,7 +213,7 @@ fn the_reciprocal_condition_is_one_for_the_identity() {
     // Points far apart in a compactly supported kernel: K is the identity.
     let cloud = Cloud::new((0..30).map(|i| 10.0 * f64::from(i)).collect(), 1).unwrap();
     let kernel_family = Family::Wendland { smoothness: crate::numerics::kernel::WendlandSmoothness::C2 };
-    assert!((factor(&cloud, kernel_family, 1.0, 0.0).reciprocal_condition() - 1.0).abs() < 1e-14);
+    assert!((dense(&cloud, kernel_family, 1.0, 0.0).reciprocal_condition() - 1.0).abs() < 1e-14);
 }
 
 #[test]
@@ -217,16 +226,18 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
     poisoned.fill(f64::NAN);
     drop(poisoned);
     let workspace = Workspace { spare: &spare, may_take: &mut |_| unreachable!("it is well conditioned") };
-    let recycled =
-        GramFactor::factorize_in(workspace, cloud.clone(), kernel, alpha.clone(), &Unobserved).unwrap();
-    let fresh = GramFactor::factorize(cloud, kernel, alpha, &Unobserved).unwrap();
+    let recycled = System::new(cloud.clone(), kernel, alpha.clone())
+        .and_then(|system| Solver::dense_in(workspace, system, &Unobserved))
+        .unwrap();
+    let fresh =
+        System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved)).unwrap();
     assert_eq!(recycled.reciprocal_condition(), fresh.reciprocal_condition());
     assert_eq!(recycled.log_determinant(), fresh.log_determinant());
     for n_columns in [1, 2, 70] {
-        let solve = |factor: &GramFactor| {
+        let solve = |solver: &Solver| {
             let mut columns = Mat::from_fn(1300, n_columns, |i, j| (0.1 * (i * (j + 1)) as f64).sin());
-            factor.solve_in_place(columns.as_mut());
-            factor.whiten_in_place(columns.as_mut()).unwrap();
+            solver.solve_in_place(columns.as_mut());
+            solver.whiten_in_place(columns.as_mut()).unwrap();
             columns
         };
         assert_eq!(solve(&recycled), solve(&fresh));
@@ -239,11 +250,11 @@ fn the_reciprocal_condition_is_within_a_factor_three_of_the_true_one() {
     let cloud = fibonacci_sphere(n);
     for family in all_families() {
         for alpha in [1e-6, 1e-2] {
-            let factor = factor(&cloud, family, 0.6, alpha);
+            let solver = dense(&cloud, family, 0.6, alpha);
             let mut inverse = Mat::<f64>::identity(n, n);
-            factor.solve_in_place(inverse.as_mut());
+            solver.solve_in_place(inverse.as_mut());
             let norm1 = (0..n).map(|j| inverse.col(j).norm_l1()).fold(0.0, f64::max);
-            let ratio = factor.reciprocal_condition() * factor.norm1() * norm1;
+            let ratio = solver.reciprocal_condition() * solver.norm1() * norm1;
             assert!((1.0 - 1e-6..3.0).contains(&ratio), "{family:?}, {alpha}: {ratio}");
         }
     }

@@ -126,9 +126,8 @@ impl<S: Simd> Pairs<S> for Values<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::kernel::tests::all_families;
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::testing::fibonacci_sphere;
+    use crate::numerics::testing::{all_families, fibonacci_sphere};
 
     #[test]
     fn the_gram_matrix_is_the_cross_gram_of_the_cloud_with_itself_plus_alpha() {

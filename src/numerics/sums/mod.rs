@@ -1,5 +1,6 @@
 //! Loops over pairs of points: Gram matrices, and sums of kernels with their derivatives.
 
+pub mod expansion;
 pub mod gram;
 pub mod jets;
 pub mod nodes;

@@ -59,7 +59,7 @@ const FAR_SPACINGS: f64 = 3.0;
 
 /// T1: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
 fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) -> bool {
-    let length_scale = signature.factor.kernel().length_scale();
+    let length_scale = signature.solver.kernel().length_scale();
     let (value, slope) = jets.magnitudes(query);
     let rounding = f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
     length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding

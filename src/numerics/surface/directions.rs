@@ -32,7 +32,7 @@ impl Directions {
         quadrics: &LocalQuadrics,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let n = signature.function().factor.n_points();
+        let n = signature.function().solver.n_points();
         let (normals, has_sign) = match signature.jets() {
             Some(jets) => along_gradients(signature, jets, sampling, quadrics),
             None => along_quadrics(signature, sampling, quadrics, observer)?,
@@ -75,7 +75,7 @@ fn along_quadrics(
     observer: &dyn Observer,
 ) -> Result<(Vec<f64>, Vec<bool>), NumericsError> {
     let function = signature.function();
-    let cloud = function.factor.cloud();
+    let cloud = function.solver.cloud();
     let (n, d) = (cloud.n_points(), cloud.dimension());
     let at = |side: f64| -> Result<Jets, NumericsError> {
         let mut moved = cloud.coordinates().to_vec();

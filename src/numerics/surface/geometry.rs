@@ -164,7 +164,7 @@ mod tests {
     use crate::numerics::kernel::{Family, Kernel};
     use crate::numerics::machine::vector::dot;
     use crate::numerics::observer::Unobserved;
-    use crate::numerics::solver::GramFactor;
+    use crate::numerics::solver::{Solver, System};
     use crate::numerics::sums::regularization::Regularization;
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
@@ -172,8 +172,10 @@ mod tests {
         let kernel = Kernel::new(Family::Laplace { epsilon: 1.0 }, length_scale, 1.0).unwrap();
         let cloud = Arc::new(cloud.clone());
         let alpha = Regularization::Uniform(0.0);
-        let factor = GramFactor::factorize(cloud.clone(), kernel, alpha, &Unobserved).unwrap();
-        let signature = Interpolant::signature(Arc::new(factor), &Unobserved).unwrap();
+        let solver = System::new(cloud.clone(), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))
+            .unwrap();
+        let signature = Interpolant::signature(Arc::new(solver), &Unobserved).unwrap();
         let surface = Surface::of(signature, None, &Unobserved).unwrap();
         let request = GeometryRequest { orientation, ..GeometryRequest::CURVATURES };
         Geometry::of(&surface, queries, &request, &Unobserved).unwrap()

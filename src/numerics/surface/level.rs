@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::observer::Observer;
-use crate::numerics::solver::{GramFactor, Solution};
+use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// What answers at a query.
@@ -29,11 +29,11 @@ impl Signature {
     ///
     /// # Errors
     /// Those of [`Solution::with_jets`].
-    pub fn fit(factor: Arc<GramFactor>, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let has_kink = factor.kernel().has_kink();
+    pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let has_kink = solver.kernel().has_kink();
         let order = if has_kink { JetOrder::Value } else { JetOrder::HessianWithMagnitudes };
-        let (solution, jets) = Solution::with_jets(&factor, &vec![1.0; factor.n_points()], order, observer)?;
-        let function = Interpolant { factor, solution: Arc::new(solution) };
+        let (solution, jets) = Solution::with_jets(&solver, &vec![1.0; solver.n_points()], order, observer)?;
+        let function = Interpolant { solver, solution: Arc::new(solution) };
         Ok(Self { function, jets: (!has_kink).then_some(jets) })
     }
 
@@ -42,10 +42,10 @@ impl Signature {
     /// # Errors
     /// Those of [`Interpolant::at`].
     pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let factor = &function.factor;
-        let jets = match factor.kernel().has_kink() {
+        let solver = &function.solver;
+        let jets = match solver.kernel().has_kink() {
             true => None,
-            false => Some(function.at(factor.cloud(), JetOrder::HessianWithMagnitudes, observer)?),
+            false => Some(function.at(solver.cloud(), JetOrder::HessianWithMagnitudes, observer)?),
         };
         Ok(Self { function, jets })
     }

@@ -27,15 +27,13 @@ use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::patch::Patch;
 use crate::numerics::points::quadric::n_quadric_neighbours;
 use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::numerics::solver::MAX_INVERSE_DIAGONAL;
 use crate::numerics::sums::jets::Jets;
 use degeneracy::is_too_rough;
 use directions::Directions;
 use level::{Level, Signature};
 use orientation::Oriented;
 pub use orientation::SurfaceOrientation;
-
-/// Points up to which the diagonal of the inverse is computed: it costs three factorizations.
-const MAX_LEFT_OUT: usize = 512;
 
 /// A surface with local quadrics and consistently oriented normals at the points, d ≥ 2.
 ///
@@ -60,7 +58,7 @@ impl Surface {
         given: Option<&Cloud>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let sampling = Arc::new(Sampling::of(signature.factor.cloud(), observer)?);
+        let sampling = Arc::new(Sampling::of(signature.solver.cloud(), observer)?);
         Self::over(sampling, Signature::of(signature, observer)?, given, observer)
     }
 
@@ -74,15 +72,15 @@ impl Surface {
         given: Option<&Cloud>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let factor = signature.function().factor.clone();
-        let cloud = factor.cloud();
+        let solver = signature.function().solver.clone();
+        let cloud = solver.cloud();
         if cloud.dimension() < 2 {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
         let (quadrics, _) = LocalQuadrics::of(cloud, sampling.neighbours(), cloud, observer)?;
         let directions = Directions::of(&signature, &sampling, &quadrics, observer)?;
         let oriented = Oriented::of(cloud, &sampling, directions, &quadrics, given);
-        let is_too_rough = is_too_rough(factor.kernel(), sampling.scales());
+        let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
         let (level, left_out_misses) = (Level::Signature(signature), OnceLock::new());
         Ok(Self { level, sampling, quadrics, oriented, is_too_rough, radius, left_out_misses })
@@ -99,7 +97,7 @@ impl Surface {
     }
 
     pub fn cloud(&self) -> &Cloud {
-        self.signature().factor.cloud()
+        self.signature().solver.cloud()
     }
 
     pub fn orientation(&self) -> SurfaceOrientation {
@@ -152,12 +150,12 @@ impl Surface {
     }
 
     fn compute_left_out_misses(&self) -> Option<Vec<f64>> {
-        let factor = &self.signature().factor;
+        let solver = &self.signature().solver;
         // A repeated observation is predicted by its copy.
-        if factor.n_points() > MAX_LEFT_OUT || count_duplicates(factor.cloud()) > 0 {
+        if solver.n_points() > MAX_INVERSE_DIAGONAL || count_duplicates(solver.cloud()) > 0 {
             return None;
         }
-        let diagonal = factor.inverse_diagonal()?;
+        let diagonal = solver.inverse_diagonal().ok()?;
         Some(self.signature().solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
     }
 
@@ -206,24 +204,11 @@ impl Surface {
         if along > 0.0 { 1.0 } else { -1.0 }
     }
 
-    /// Bytes that [`Surface::of`] takes at most for n points, those of its work included.
-    pub fn n_bytes_needed(n_points: usize, dimension: usize) -> usize {
-        // Jets, normals and the quadric with its coefficients at every point, as small vectors that the allocator rounds up,
-        // and once more while they are collected: 4.5 kB in three dimensions, as tests/it/memory.rs has measured.
-        n_points.saturating_mul(1500 + 400 * dimension * dimension)
-    }
-
-    /// Flops of [`Surface::of`]: the sums at the points, and two searches and a quadric at each.
-    pub fn flops_needed(n_points: usize, dimension: usize) -> f64 {
-        let (n, n_columns) = (n_points as f64, (dimension * (dimension + 1) / 2) as f64);
-        60.0 * n * n + 2.0 * Sampling::flops_needed(n_points, dimension) + 40.0 * n * n_columns.powi(3)
-    }
-
     /// Bytes held on the heap beside the factor.
     pub fn n_bytes(&self) -> usize {
         let n = self.cloud().n_points();
         // Asked for later, if at all.
-        let left_out_misses = if n <= MAX_LEFT_OUT { block_bytes(n * size_of::<f64>()) } else { 0 };
+        let left_out_misses = if n <= MAX_INVERSE_DIAGONAL { block_bytes(n * size_of::<f64>()) } else { 0 };
         self.level().n_bytes()
             + self.sampling.n_bytes()
             + self.quadrics.n_bytes()

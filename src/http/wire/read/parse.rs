@@ -8,7 +8,7 @@ use super::limits::ParseContext;
 use super::members::object;
 use super::plain_json;
 use crate::http::problem::slug::Slug;
-use crate::http::problem::{Place, Problem};
+use crate::http::problem::{Pointers, Problem};
 use crate::numerics::error::NumericsError;
 
 /// Lists and objects within each other, as `serde_json` has it.
@@ -85,7 +85,7 @@ fn nests_too_deep(text: &[u8]) -> bool {
 
 fn stopped(stop: Stop, guard: &Guard<'_>, context: &ParseContext<'_>) -> Problem {
     match stop {
-        Stop::Cancelled => Problem::from_numerics(NumericsError::Cancelled, Place::REQUEST),
+        Stop::Cancelled => Problem::from_numerics(NumericsError::Cancelled, Pointers::REQUEST),
         Stop::TooLarge(excess) => context.too_large(excess, &guard.pointer()),
     }
 }

@@ -1,9 +1,8 @@
 use super::*;
 use crate::numerics::kernel::Family;
-use crate::numerics::kernel::tests::all_families;
 use crate::numerics::machine::instruction_set::InstructionSet;
 use crate::numerics::observer::Unobserved;
-use crate::numerics::testing::fibonacci_sphere;
+use crate::numerics::testing::{all_families, fibonacci_sphere};
 
 /// 100 points, so that the last block is padded, in a dimension other than 3, with weights of both signs.
 fn expansion(d: usize) -> (Cloud, Vec<f64>, Cloud) {

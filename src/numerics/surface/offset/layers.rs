@@ -16,7 +16,7 @@ use crate::numerics::observer::Unobserved;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::patch::Patch;
 use crate::numerics::points::quadric::n_coefficients;
-use crate::numerics::solver::GramFactor;
+use crate::numerics::solver::{Solver, System};
 use crate::numerics::sums::jets::JetOrder;
 use crate::numerics::sums::regularization::Regularization;
 
@@ -78,8 +78,9 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
     let nodes = Arc::new(Cloud::new(nodes, d)?);
     let fit = |alpha| {
         let alpha = Regularization::Uniform(alpha);
-        let factor = GramFactor::factorize(nodes.clone(), kernel, alpha, &Unobserved)?;
-        Interpolant::fit(Arc::new(factor), &data, &Unobserved)
+        let solver = System::new(nodes.clone(), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))?;
+        Interpolant::fit(Arc::new(solver), &data, &Unobserved)
     };
     let model = fit(ALPHAS[0]).or_else(|_| fit(ALPHAS[1])).or_else(|_| fit(ALPHAS[2]))?;
     let origin = Cloud::new(vec![0.0; d], d)?;

@@ -19,7 +19,7 @@ use crate::numerics::machine::registers::{BLOCK, Block, Pack};
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::GramFactor;
+use crate::numerics::solver::Solver;
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
 
@@ -76,11 +76,11 @@ pub fn laplace_beltrami(
 /// [`NumericsError::Cancelled`].
 pub fn surface_gradient_matrices(
     geometry: &Geometry,
-    factor: &Arc<GramFactor>,
+    solver: &Arc<Solver>,
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    operator_matrix(geometry, factor, queries, Operator::SurfaceGradient, observer)
+    operator_matrix(geometry, solver, queries, Operator::SurfaceGradient, observer)
 }
 
 /// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
@@ -90,11 +90,11 @@ pub fn surface_gradient_matrices(
 /// [`NumericsError::Cancelled`].
 pub fn laplace_beltrami_matrix(
     geometry: &Geometry,
-    factor: &Arc<GramFactor>,
+    solver: &Arc<Solver>,
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    operator_matrix(geometry, factor, queries, Operator::LaplaceBeltrami, observer)
+    operator_matrix(geometry, solver, queries, Operator::LaplaceBeltrami, observer)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -120,12 +120,12 @@ impl Operator {
 /// [`NumericsError::Cancelled`].
 fn operator_matrix(
     geometry: &Geometry,
-    factor: &Arc<GramFactor>,
+    solver: &Arc<Solver>,
     queries: &Cloud,
     operator: Operator,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    let (cloud, kernel) = (factor.cloud(), factor.kernel());
+    let (cloud, kernel) = (solver.cloud(), solver.kernel());
     cloud.check_same_dimension(queries)?;
     check_smooth_at(cloud, kernel, queries)?;
     observer.enter(Stage::Evaluate);
@@ -146,7 +146,7 @@ fn operator_matrix(
     for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {
         observer.checkpoint()?;
         let count = rows.len() / n;
-        factor.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
     }
     // Without branches, so that it is vectorised.
     let is_finite = |row: &[f64]| row.iter().fold(true, |all, x| all & x.is_finite());

@@ -1,20 +1,24 @@
 use super::*;
-use crate::numerics::kernel::tests::all_families;
 use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Unobserved;
+use crate::numerics::solver::System;
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
-use crate::numerics::testing::{circle, fibonacci_sphere};
+use crate::numerics::testing::{all_families, circle, fibonacci_sphere};
 
-fn factor(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Arc<GramFactor> {
+fn solver(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Arc<Solver> {
     let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
     let alpha = Regularization::uniform(alpha).unwrap();
-    Arc::new(GramFactor::factorize(Arc::new(cloud.clone()), kernel, alpha, &Unobserved).unwrap())
+    Arc::new(
+        System::new(Arc::new(cloud.clone()), kernel, alpha)
+            .and_then(|system| Solver::dense(system, &Unobserved))
+            .unwrap(),
+    )
 }
 
-fn geometry(factor: &Arc<GramFactor>, queries: &Cloud) -> Geometry {
-    let signature = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
+fn geometry(solver: &Arc<Solver>, queries: &Cloud) -> Geometry {
+    let signature = Interpolant::signature(solver.clone(), &Unobserved).unwrap();
     let surface = Surface::of(signature, None, &Unobserved).unwrap();
     let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
     Geometry::of(&surface, queries, &request, &Unobserved).unwrap()
@@ -27,10 +31,10 @@ fn largest(errors: impl Iterator<Item = f64>) -> f64 {
 #[test]
 fn the_laplacian_of_cosine_on_the_circle_is_minus_cosine() {
     let cloud = circle(40);
-    let factor = factor(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
+    let solver = solver(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
     let cosine: Vec<f64> = cloud.points().map(|x| x[0]).collect();
-    let interpolant = Interpolant::fit(factor.clone(), &cosine, &Unobserved).unwrap();
-    let found = laplace_beltrami(&geometry(&factor, &cloud), &interpolant, &cloud, &Unobserved).unwrap();
+    let interpolant = Interpolant::fit(solver.clone(), &cosine, &Unobserved).unwrap();
+    let found = laplace_beltrami(&geometry(&solver, &cloud), &interpolant, &cloud, &Unobserved).unwrap();
     assert!(largest(found.iter().zip(&cosine).map(|(f, c)| f + c)) < 1e-6);
 }
 
@@ -38,11 +42,11 @@ fn the_laplacian_of_cosine_on_the_circle_is_minus_cosine() {
 fn the_laplacian_of_the_coordinates_of_a_sphere_is_minus_twice_them() {
     // Laplace ε = 1 on 256 points reaches 4e-5 for a function with ten times the derivatives (errata.md).
     let cloud = fibonacci_sphere(256);
-    let factor = factor(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
-    let geometry = geometry(&factor, &cloud);
+    let solver = solver(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
+    let geometry = geometry(&solver, &cloud);
     for axis in 0..3 {
         let values: Vec<f64> = cloud.points().map(|x| x[axis]).collect();
-        let interpolant = Interpolant::fit(factor.clone(), &values, &Unobserved).unwrap();
+        let interpolant = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
         let found = laplace_beltrami(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
         assert!(largest(found.iter().zip(&values).map(|(f, v)| f + 2.0 * v)) < 1e-4);
     }
@@ -54,12 +58,12 @@ fn matrices_times_values_are_the_operators_applied() {
     let queries = fibonacci_sphere(31);
     let values: Vec<f64> = cloud.points().map(|x| x[0] * x[1] + x[2]).collect();
     for family in all_families().into_iter().filter(|&f| !Kernel::new(f, 1.0, 1.0).unwrap().has_kink()) {
-        let factor = factor(&cloud, family, 1.0, 1e-8);
-        let geometry = geometry(&factor, &queries);
-        let interpolant = Interpolant::fit(factor.clone(), &values, &Unobserved).unwrap();
+        let solver = solver(&cloud, family, 1.0, 1e-8);
+        let geometry = geometry(&solver, &queries);
+        let interpolant = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
 
         let applied = laplace_beltrami(&geometry, &interpolant, &queries, &Unobserved).unwrap();
-        let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, &Unobserved).unwrap();
+        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, &Unobserved).unwrap();
         let product: Vec<f64> = matrix.chunks(90).map(|row| dot(row, &values)).collect();
         // Weights reach Y/α^{1/2}·…: cancellation of the row sums costs up to six digits here.
         let scale = largest(applied.iter().copied()).max(1.0);
@@ -67,7 +71,7 @@ fn matrices_times_values_are_the_operators_applied() {
         assert!(error < 1e-7 * scale, "{family:?}: {error:e}");
 
         let applied = surface_gradient(&geometry, &interpolant, &queries, &Unobserved).unwrap();
-        let matrices = surface_gradient_matrices(&geometry, &factor, &queries, &Unobserved).unwrap();
+        let matrices = surface_gradient_matrices(&geometry, &solver, &queries, &Unobserved).unwrap();
         for (row, component) in matrices.chunks(90).enumerate() {
             let (axis, query) = (row / 31, row % 31);
             let error = (dot(component, &values) - applied[query * 3 + axis]).abs();
@@ -79,9 +83,9 @@ fn matrices_times_values_are_the_operators_applied() {
 #[test]
 fn one_fit_for_both_annihilates_constants() {
     let cloud = fibonacci_sphere(120);
-    let factor = factor(&cloud, Family::Matern { order: 3 }, 1.0, 1e-10);
-    let geometry = geometry(&factor, &cloud);
-    let constant = Interpolant::signature(factor.clone(), &Unobserved).unwrap();
+    let solver = solver(&cloud, Family::Matern { order: 3 }, 1.0, 1e-10);
+    let geometry = geometry(&solver, &cloud);
+    let constant = Interpolant::signature(solver.clone(), &Unobserved).unwrap();
     let gradients = surface_gradient(&geometry, &constant, &cloud, &Unobserved).unwrap();
     let laplacians = laplace_beltrami(&geometry, &constant, &cloud, &Unobserved).unwrap();
     assert!(largest(gradients.into_iter()) < 1e-12);
@@ -92,8 +96,8 @@ fn one_fit_for_both_annihilates_constants() {
 fn with_different_kernels_the_laplacian_of_a_constant_tends_to_zero() {
     let error = |n: usize| {
         let cloud = fibonacci_sphere(n);
-        let surface = factor(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
-        let data = factor(&cloud, Family::Matern { order: 3 }, 1.0, 0.0);
+        let surface = solver(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
+        let data = solver(&cloud, Family::Matern { order: 3 }, 1.0, 0.0);
         let constant = Interpolant::signature(data, &Unobserved).unwrap();
         let found = laplace_beltrami(&geometry(&surface, &cloud), &constant, &cloud, &Unobserved).unwrap();
         largest(found.into_iter())
@@ -106,10 +110,10 @@ fn with_different_kernels_the_laplacian_of_a_constant_tends_to_zero() {
 #[test]
 fn the_surface_gradient_is_tangent() {
     let cloud = fibonacci_sphere(150);
-    let factor = factor(&cloud, Family::InverseMultiquadric, 1.0, 1e-9);
-    let geometry = geometry(&factor, &cloud);
+    let solver = solver(&cloud, Family::InverseMultiquadric, 1.0, 1e-9);
+    let geometry = geometry(&solver, &cloud);
     let values: Vec<f64> = cloud.points().map(|x| x[2]).collect();
-    let interpolant = Interpolant::fit(factor, &values, &Unobserved).unwrap();
+    let interpolant = Interpolant::fit(solver, &values, &Unobserved).unwrap();
     let gradients = surface_gradient(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
     for (query, gradient) in gradients.chunks(3).enumerate() {
         let x = cloud.point(query);

@@ -1,18 +1,26 @@
-//! What the surface gradient and the Laplace–Beltrami operator share: checked work, and its diagnostics.
+//! What operations on surfaces share: checked work, its price, and its diagnostics.
 
 use std::sync::Arc;
 
-use super::surface::{check_is_surface, geometry_request, numbers_at_query};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Fit, Geometry, OrientationChoice};
+use crate::http::fields::{Diagnostics, Fit, Geometry, OrientationChoice, SurfaceChoice};
 use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
 use crate::http::serve::fitted::{Fits, SurfaceGeometry};
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::Planner;
 use crate::http::wire::read::points::Points;
+use crate::numerics::defaults::Purpose;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::surface::geometry::GeometryRequest;
+use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, work_price};
+use crate::numerics::surface::geometry::{GeometryRequest, Orientation, SurfaceModel};
+
+/// A checked request for normals or curvatures.
+pub struct GeometryWork {
+    pub queries: Arc<Cloud>,
+    pub request: GeometryRequest,
+}
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {
@@ -49,6 +57,28 @@ impl MatrixWork {
     }
 }
 
+/// Plans normals or curvatures, with so many numbers of answer per query.
+///
+/// # Errors
+/// A [`Problem`] with a pointer to the field.
+pub fn plan_geometry(
+    planner: &Planner<'_>,
+    fit: Fit,
+    queries: Option<Points>,
+    request: GeometryRequest,
+    purpose: Purpose,
+    numbers_per_query: impl Fn(usize) -> usize,
+) -> Result<Plan<GeometryWork>, Problem> {
+    let mut main = planner.fit(fit, purpose)?;
+    check_is_surface(&main.stored.cloud)?;
+    let queries = planner.queries(queries, &mut [&mut main])?;
+    let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+    let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
+    let asked = Asked::Geometry { always_offset: request.model == SurfaceModel::Offset };
+    let cost = Cost { work: work_price(asked, n, m, d), n_numbers, n_held: m * d };
+    Ok(Plan { main, surface: None, work: GeometryWork { queries, request }, cost })
+}
+
 /// Plans an operator applied to values, with so many numbers of answer per query.
 ///
 /// # Errors
@@ -68,12 +98,11 @@ pub fn plan_applied(
     let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let m = queries.n_points();
     let d = queries.dimension();
-    let n = main.n_points() + surface.n_points();
+    let asked = Asked::Operator { n_surface_points: surface.n_points() };
     let cost = Cost {
-        flops: 60.0 * n as f64 * (n + m) as f64,
+        work: work_price(asked, main.n_points(), m, d),
         n_numbers: planner.check_answer(m.checked_mul(numbers_per_query(d)))?,
-        n_scratch: 8 * n + (numbers_at_query(d) + 1 + d + d * d) * m,
-        n_held: n + m * d,
+        n_held: main.n_points() + surface.n_points() + m * d,
     };
     Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, cost })
 }
@@ -96,10 +125,11 @@ pub fn plan_matrix(
     let n = main.stored.cloud.n_points();
     let (m, d) = (queries.n_points(), queries.dimension());
     let n_rows = m.checked_mul(rows_per_query(d));
+    let asked =
+        Asked::OperatorMatrix { n_surface_points: surface.n_points(), n_rows: n_rows.unwrap_or(usize::MAX) };
     let cost = Cost {
         n_numbers: planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?,
-        flops: 2.0 * (n as f64).powi(2) * n_rows.unwrap_or(0) as f64,
-        n_scratch: 8 * n + numbers_at_query(d) * m,
+        work: work_price(asked, n, m, d),
         n_held: m * d,
     };
     Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, cost })
@@ -109,4 +139,34 @@ pub fn plan_matrix(
 fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
     let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
     geometry_request(surface, Some(OrientationChoice::Gradient), true)
+}
+
+/// What a request asks of the geometry of its surface.
+pub fn geometry_request(
+    surface: Option<SurfaceChoice>,
+    orientation: Option<OrientationChoice>,
+    checks_curvatures: bool,
+) -> GeometryRequest {
+    GeometryRequest {
+        orientation: match orientation.unwrap_or_default() {
+            OrientationChoice::Outward => Orientation::Outward,
+            OrientationChoice::Gradient => Orientation::Gradient,
+        },
+        model: match surface.unwrap_or_default() {
+            SurfaceChoice::Auto => SurfaceModel::Auto,
+            SurfaceChoice::Signature => SurfaceModel::Signature,
+            SurfaceChoice::Offset => SurfaceModel::Offset,
+        },
+        checks_curvatures,
+        max_offsets: MAX_OFFSETS,
+    }
+}
+
+/// Refuses geometry in dimension 1 before anything is computed.
+fn check_is_surface(cloud: &Cloud) -> Result<(), Problem> {
+    if cloud.dimension() >= 2 {
+        return Ok(());
+    }
+    let detail = "the geometry of a hypersurface needs points of dimension 2 or more, found 1";
+    Err(Problem::of_field(Slug::InvalidCloud, "/cloud/points", detail))
 }

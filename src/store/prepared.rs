@@ -1,4 +1,4 @@
-//! Factorizations and the weights solved with them.
+//! What fits are served from, and the weights solved with it.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
@@ -7,46 +7,53 @@ use std::time::Duration;
 use super::Owner;
 use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
 use super::fair_cache::FairCache;
-use super::key::{CloudId, FactorKey, ValuesKey};
+use super::key::{CloudId, FitKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
 use crate::numerics::machine::heap::{arc_payload, block_bytes};
 use crate::numerics::machine::pages::SpareBuffer;
-use crate::numerics::solver::{GramFactor, Solution};
+use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::surface::Surface;
 
-/// The share of the cache that weights may take: they are n numbers beside the n² of a factor.
+/// The share of the cache that weights may take: they are n numbers beside the n² of a dense solver.
 const WEIGHTS_SHARE: usize = 16;
 
-/// A factorization with the surface of its cloud, once that was asked for, and the time it took. It holds the memory that it
-/// was made in for as long as anybody holds it, kept or not.
-pub struct StoredFactor {
-    pub factor: Arc<GramFactor>,
+/// What is kept under a [`FitKey`].
+pub enum Prepared {
+    /// A system made ready.
+    Solver(Arc<Solver>),
+}
+
+/// What a fit is served from, with the surface of its cloud, once that was asked for, and the time it took. It holds the memory
+/// that it was made in for as long as anybody holds it, kept or not.
+pub struct PreparedFit {
+    prepared: Prepared,
     pub gram_time: Duration,
     pub factor_time: Duration,
-    surface: OnceLock<StoredSurface>,
+    surface: OnceLock<PreparedSurface>,
     memory: Arc<Reservation>,
 }
 
-/// A surface with the memory that it takes, and that of the factor which it was made from: it may be that of an equal one
+/// A surface with the memory that it takes, and that of the solver which it was made from: it may be that of an equal one
 /// which was let go since.
 #[derive(Clone)]
-struct StoredSurface {
+struct PreparedSurface {
     surface: Arc<Surface>,
     memory: Arc<Reservation>,
-    _factor_memory: Arc<Reservation>,
+    _solver_memory: Arc<Reservation>,
 }
 
-impl StoredFactor {
-    /// Gives back what of the memory the finished factor does not take.
-    pub fn new(
-        factor: GramFactor,
-        gram_time: Duration,
-        factor_time: Duration,
-        mut memory: Reservation,
-    ) -> Self {
-        memory.shrink_to(factor.n_bytes());
-        let (factor, memory) = (Arc::new(factor), Arc::new(memory));
-        Self { factor, gram_time, factor_time, surface: OnceLock::new(), memory }
+impl PreparedFit {
+    /// Gives back what of the memory the finished solver does not take.
+    pub fn new(solver: Solver, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
+        memory.shrink_to(solver.n_bytes());
+        let (prepared, memory) = (Prepared::Solver(Arc::new(solver)), Arc::new(memory));
+        Self { prepared, gram_time, factor_time, surface: OnceLock::new(), memory }
+    }
+
+    /// The system made ready.
+    pub fn solver(&self) -> &Arc<Solver> {
+        let Prepared::Solver(solver) = &self.prepared;
+        solver
     }
 
     /// The surface of the signature function, once it was asked for.
@@ -56,8 +63,8 @@ impl StoredFactor {
 
     /// Bytes held on the heap, those of the surface once there is one.
     fn n_bytes(&self) -> usize {
-        let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<GramFactor>());
-        own + self.factor.n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
+        let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Solver>());
+        own + self.solver().n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
     }
 
     /// Bytes that are given back when it is dropped.
@@ -66,7 +73,7 @@ impl StoredFactor {
     }
 }
 
-/// Where a factor came from, in the terms of RFC 9211.
+/// Where what is prepared came from, in the terms of RFC 9211.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CacheOutcome {
     Hit,
@@ -78,10 +85,10 @@ pub enum CacheOutcome {
     NotStored,
 }
 
-/// Bytes that a [`FactorStore`] may take.
+/// Bytes that a [`PreparedStore`] may take.
 #[derive(Debug, Clone, Copy)]
-pub struct FactorBytes {
-    /// What factors and weights that are kept may take.
+pub struct PreparedBytes {
+    /// What solvers, surfaces and weights that are kept may take.
     pub kept: usize,
     /// What is kept for the next factorization, beside the budget.
     pub spare: usize,
@@ -91,13 +98,13 @@ pub struct FactorBytes {
     pub n_owners: usize,
 }
 
-/// Factorizations and weights within one byte budget, that of the work that is done with them included. `E` is what a
+/// What is prepared, and weights, within one byte budget, that of the work that is done with them included. `E` is what a
 /// computation may fail with.
-pub struct FactorStore<E> {
-    factors: Arc<FairCache<FactorKey, Arc<StoredFactor>>>,
-    solutions: FairCache<(FactorKey, ValuesKey), Arc<KeptSolution>>,
-    flights: SingleFlight<FactorKey, (Arc<StoredFactor>, bool), E>,
-    surfaces: SingleFlight<FactorKey, StoredSurface, E>,
+pub struct PreparedStore<E> {
+    fits: Arc<FairCache<FitKey, Arc<PreparedFit>>>,
+    solutions: FairCache<(FitKey, ValuesKey), Arc<KeptSolution>>,
+    flights: SingleFlight<FitKey, (Arc<PreparedFit>, bool), E>,
+    surfaces: SingleFlight<FitKey, PreparedSurface, E>,
     budget: Budget,
     spare: Arc<SpareBuffer>,
 }
@@ -107,11 +114,11 @@ struct KeptSolution {
     memory: Reservation,
 }
 
-impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
-    pub fn new(bytes: FactorBytes) -> Self {
+impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
+    pub fn new(bytes: PreparedBytes) -> Self {
         let solutions = bytes.kept / WEIGHTS_SHARE;
         Self {
-            factors: Arc::new(FairCache::new(bytes.kept - solutions)),
+            fits: Arc::new(FairCache::new(bytes.kept - solutions)),
             solutions: FairCache::new(solutions),
             flights: SingleFlight::new(),
             surfaces: SingleFlight::new(),
@@ -120,7 +127,12 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         }
     }
 
-    /// The memory of factors that were let go.
+    /// Bytes that one owner may have for work at most.
+    pub fn memory(&self) -> usize {
+        self.budget.largest()
+    }
+
+    /// The memory of solvers that were let go.
     pub fn spare(&self) -> &Arc<SpareBuffer> {
         &self.spare
     }
@@ -154,17 +166,17 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         self.budget.try_reserve(owner, n_bytes)
     }
 
-    /// The factor of `key`, if it is kept.
-    pub fn get(&self, key: FactorKey) -> Option<Arc<StoredFactor>> {
-        self.factors.get(key.owner, &key)
+    /// What is prepared for `key`, if it is kept.
+    pub fn get(&self, key: FitKey) -> Option<Arc<PreparedFit>> {
+        self.fits.get(key.owner, &key)
     }
 
     /// Lets go of the least recently used: first of the owner's own, where the owner is over the share, then of whoever has most.
     fn make_room(&self, shortage: Shortage) {
         let let_go = |owner: Option<Owner>, mut n_bytes: usize| {
             while n_bytes > 0 {
-                let factor = self.factors.evict(owner, |factor| Arc::strong_count(factor) == 1);
-                let freed = factor.map(|factor| factor.n_reserved()).or_else(|| {
+                let fit = self.fits.evict(owner, |fit| Arc::strong_count(fit) == 1);
+                let freed = fit.map(|fit| fit.n_reserved()).or_else(|| {
                     let kept = self.solutions.evict(owner, |kept| Arc::strong_count(kept) == 1)?;
                     Some(kept.memory.n_bytes())
                 });
@@ -176,40 +188,40 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         let_go(None, shortage.of_all.saturating_sub(shortage.of_owner));
     }
 
-    /// Returns the factor of `key`, computing it at most once however many ask, and where it came from. Whoever begins does
+    /// Returns what is prepared for `key`, computing it at most once however many ask, and where it came from. Whoever begins does
     /// it in `memory`, which goes back if another has begun; without memory nothing is begun, and `None` says that it is
     /// needed.
     ///
     /// # Errors
-    /// Those of `factorize`; they are not kept.
-    pub async fn get_or_factorize<F>(
+    /// Those of `prepare`; they are not kept.
+    pub async fn get_or_prepare<F>(
         &self,
-        key: FactorKey,
+        key: FitKey,
         memory: Option<Reservation>,
-        factorize: impl FnOnce(Reservation) -> F,
-    ) -> Result<Option<(Arc<StoredFactor>, CacheOutcome)>, E>
+        prepare: impl FnOnce(Reservation) -> F,
+    ) -> Result<Option<(Arc<PreparedFit>, CacheOutcome)>, E>
     where
-        F: Future<Output = Result<StoredFactor, E>> + Send + 'static,
+        F: Future<Output = Result<PreparedFit, E>> + Send + 'static,
     {
-        if let Some(found) = self.factors.get(key.owner, &key) {
+        if let Some(found) = self.fits.get(key.owner, &key) {
             return Ok(Some((found, CacheOutcome::Hit)));
         }
         let Some(memory) = memory else {
             let Some(outcome) = self.flights.join_if_under_way(&key).await else { return Ok(None) };
             return Ok(Some((outcome?.0, CacheOutcome::Collapsed)));
         };
-        let factors = self.factors.clone();
+        let fits = self.fits.clone();
         let (boarding, outcome) = self
             .flights
             .join(key, || {
-                let computation = factorize(memory);
+                let computation = prepare(memory);
                 async move {
                     // A flight may have landed between the look-up and this one's beginning.
-                    if let Some(found) = factors.get(key.owner, &key) {
+                    if let Some(found) = fits.get(key.owner, &key) {
                         return Ok((found, true));
                     }
                     let stored = Arc::new(computation.await?);
-                    let is_kept = factors.insert(key.owner, key, stored.clone(), stored.n_bytes());
+                    let is_kept = fits.insert(key.owner, key, stored.clone(), stored.n_bytes());
                     Ok((stored, is_kept))
                 }
             })
@@ -223,15 +235,15 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         Ok(Some((stored, outcome)))
     }
 
-    /// Returns the surface of a factor, making it at most once however many ask, in `memory`, which goes with the work and
+    /// Returns the surface of a fit, making it at most once however many ask, in `memory`, which goes with the work and
     /// of which the surface keeps what it takes. Without memory it is not begun, and `None` says that it is needed.
     ///
     /// # Errors
     /// Those of `make`; they are not kept.
     pub async fn get_or_make_surface<F>(
         &self,
-        key: FactorKey,
-        stored: &StoredFactor,
+        key: FitKey,
+        stored: &PreparedFit,
         memory: Option<Reservation>,
         make: impl FnOnce(Reservation) -> F,
     ) -> Result<Option<Arc<Surface>>, E>
@@ -247,14 +259,18 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
                 Some(outcome) => outcome?,
             },
             Some(memory) => {
-                let factor_memory = stored.memory.clone();
+                let solver_memory = stored.memory.clone();
                 let begin = || {
                     let making = make(memory);
                     async move {
                         let (surface, mut memory) = making.await?;
                         let surface = Arc::new(surface);
                         memory.shrink_to(surface.n_bytes());
-                        Ok(StoredSurface { surface, memory: Arc::new(memory), _factor_memory: factor_memory })
+                        Ok(PreparedSurface {
+                            surface,
+                            memory: Arc::new(memory),
+                            _solver_memory: solver_memory,
+                        })
                     }
                 };
                 self.surfaces.join(key, begin).await.1?
@@ -262,28 +278,28 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         };
         let surface = found.surface.clone();
         if stored.surface.set(found).is_ok() {
-            self.factors.reweigh(key.owner, key, stored.n_bytes());
+            self.fits.reweigh(key.owner, key, stored.n_bytes());
         }
         Ok(Some(surface))
     }
 
-    /// What asking for a factor, and for its surface where `with_surface`, would have to make now.
-    pub fn missing(&self, key: FactorKey, with_surface: bool) -> Missing {
-        let factor = match self.factors.get(key.owner, &key) {
+    /// What asking for a solver, and for its surface where `with_surface`, would have to make now.
+    pub fn missing(&self, key: FitKey, with_surface: bool) -> Missing {
+        let solver = match self.fits.get(key.owner, &key) {
             Some(stored) if stored.surface.get().is_some() || !with_surface => return Missing::default(),
             Some(_) => false,
             None => !self.flights.is_under_way(&key),
         };
-        Missing { factor, surface: with_surface && !self.surfaces.is_under_way(&key) }
+        Missing { solver, surface: with_surface && !self.surfaces.is_under_way(&key) }
     }
 
     /// The weights of values solved before.
-    pub fn solution(&self, key: FactorKey, values: ValuesKey) -> Option<Arc<Solution>> {
+    pub fn solution(&self, key: FitKey, values: ValuesKey) -> Option<Arc<Solution>> {
         self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone())
     }
 
     /// Keeps weights if there is memory for them that nobody waits for.
-    pub fn keep_solution(&self, key: FactorKey, values: ValuesKey, solution: Arc<Solution>) {
+    pub fn keep_solution(&self, key: FitKey, values: ValuesKey, solution: Arc<Solution>) {
         let own = block_bytes(arc_payload::<KeptSolution>()) + block_bytes(arc_payload::<Solution>());
         let n_bytes = own + solution.n_bytes();
         if let Some(memory) = self.budget.try_reserve(key.owner, n_bytes) {
@@ -292,9 +308,9 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
         }
     }
 
-    /// Bytes of all factors and weights that are kept, and of the memory for the next factorization.
+    /// Bytes of all solvers, surfaces and weights that are kept, and of the memory for the next factorization.
     pub fn n_bytes(&self) -> usize {
-        self.factors.n_bytes() + self.solutions.n_bytes() + self.spare.n_bytes()
+        self.fits.n_bytes() + self.solutions.n_bytes() + self.spare.n_bytes()
     }
 
     /// Bytes of the budget that are held, by what is kept and by work.
@@ -304,7 +320,7 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
 
     /// Forgets everything that was computed from a cloud.
     pub fn forget_cloud(&self, owner: Owner, id: CloudId) {
-        self.factors.remove_if(owner, |key| key.cloud_id == id);
+        self.fits.remove_if(owner, |key| key.cloud_id == id);
         self.solutions.remove_if(owner, |(key, _)| key.cloud_id == id);
     }
 }
@@ -312,7 +328,7 @@ impl<E: Clone + Send + Sync + 'static> FactorStore<E> {
 /// What a request would have to make.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Missing {
-    pub factor: bool,
+    pub solver: bool,
     pub surface: bool,
 }
 

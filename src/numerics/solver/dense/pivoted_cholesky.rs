@@ -109,8 +109,9 @@ impl PivotedCholesky {
         factorize_in_place(inner, 0.0, observer)?.map_err(|_| NumericsError::WeightsOverflow)
     }
 
-    pub(super) fn rank(&self) -> usize {
-        self.rank
+    /// The points on which weights stand, `[r]`.
+    pub(super) fn pivots(&self) -> &[usize] {
+        &self.order[..self.rank]
     }
 
     pub(super) fn n_bytes(&self) -> usize {

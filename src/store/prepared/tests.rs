@@ -5,32 +5,36 @@ use super::*;
 use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Unobserved;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::System;
+use crate::numerics::solver::choose::choose;
 use crate::numerics::sums::regularization::Regularization;
 
-type Store = FactorStore<&'static str>;
+type Store = PreparedStore<&'static str>;
 
 fn store(budget: usize) -> Store {
-    Store::new(FactorBytes { kept: budget, spare: 0, budget, n_owners: 1 })
+    Store::new(PreparedBytes { kept: budget, spare: 0, budget, n_owners: 1 })
 }
 
-fn key(alpha: f64) -> FactorKey {
+fn key(alpha: f64) -> FitKey {
     let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let id = CloudId::of(&cloud, None);
-    FactorKey::of_dense(Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
+    FitKey::of_dense(Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
 }
 
-async fn factorize(n: usize, memory: Reservation) -> Result<StoredFactor, &'static str> {
+async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'static str> {
     let cloud = Arc::new(Cloud::new((0..n).map(|i| i as f64).collect(), 1).unwrap());
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
-    let factor = GramFactor::factorize(cloud, kernel, Regularization::Uniform(1.0), &Unobserved).unwrap();
-    Ok(StoredFactor::new(factor, Duration::ZERO, Duration::ZERO, memory))
+    let factor = System::new(cloud, kernel, Regularization::Uniform(1.0))
+        .and_then(|system| Solver::dense(system, &Unobserved))
+        .unwrap();
+    Ok(PreparedFit::new(factor, Duration::ZERO, Duration::ZERO, memory))
 }
 
 async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
     let memory =
-        store.reserve(Owner(0), GramFactor::n_bytes_needed(n).unwrap(), || true).await.unwrap().unwrap();
-    let found = store.get_or_factorize(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
+        store.reserve(Owner(0), choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
+    let found = store.get_or_prepare(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
     found.unwrap().unwrap().1
 }
 
@@ -53,7 +57,7 @@ async fn a_failure_does_not_poison_the_key_and_gives_its_memory_back() {
         drop(memory);
         Err("no")
     };
-    let failed = store.get_or_factorize(key(1.0), Some(memory), failing).await;
+    let failed = store.get_or_prepare(key(1.0), Some(memory), failing).await;
     assert_eq!((failed.err(), store.n_reserved()), (Some("no"), 0));
     assert_eq!(outcome_of(&store, 1.0, 10).await, CacheOutcome::Stored);
 }
@@ -61,15 +65,15 @@ async fn a_failure_does_not_poison_the_key_and_gives_its_memory_back() {
 #[tokio::test]
 async fn without_memory_nothing_is_begun() {
     let store = store(1 << 20);
-    let found = store.get_or_factorize(key(1.0), None, |memory| factorize(10, memory)).await;
+    let found = store.get_or_prepare(key(1.0), None, |memory| factorize(10, memory)).await;
     assert!(found.unwrap().is_none());
-    assert_eq!(store.missing(key(1.0), false), Missing { factor: true, surface: false });
+    assert_eq!(store.missing(key(1.0), false), Missing { solver: true, surface: false });
 }
 
 #[tokio::test]
 async fn factors_beyond_the_budget_are_computed_each_time() {
     // 100 points take half of 100² numbers, 40 KB, and the budget of factors keeps 15 parts of 16.
-    let bytes = FactorBytes { kept: 32 << 10, spare: 0, budget: 1 << 20, n_owners: 1 };
+    let bytes = PreparedBytes { kept: 32 << 10, spare: 0, budget: 1 << 20, n_owners: 1 };
     let store = Store::new(bytes);
     assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
     assert_eq!(outcome_of(&store, 1.0, 100).await, CacheOutcome::NotStored);
@@ -82,11 +86,11 @@ async fn what_is_kept_makes_room_for_work_unless_it_is_in_use() {
     for alpha in [1.0, 2.0, 3.0] {
         outcome_of(&store, alpha, 100).await;
     }
-    let in_use = store.get_or_factorize(key(1.0), None, |memory| factorize(100, memory)).await;
+    let in_use = store.get_or_prepare(key(1.0), None, |memory| factorize(100, memory)).await;
     let in_use = in_use.unwrap().unwrap().0;
     // A factor takes 40 KB and what the allocator adds: there is room for one beside the work, not for three.
     let work = store.reserve(Owner(0), 280 << 10, || true).await.unwrap().unwrap();
-    let is_missing = |alpha| store.missing(key(alpha), false).factor;
+    let is_missing = |alpha| store.missing(key(alpha), false).solver;
     assert_eq!([1.0, 2.0].map(is_missing), [false, true]);
     drop(in_use);
     drop(work);
@@ -113,15 +117,15 @@ async fn a_flight_is_paid_for_until_its_work_has_ended_whoever_has_left() {
     let store = store(1 << 20);
     let (end, ended) = oneshot::channel::<()>();
     let memory = store.reserve(Owner(0), 4000, || true).await.unwrap().unwrap();
-    let mut beginner = Box::pin(store.get_or_factorize(key(1.0), Some(memory), working(ended)));
+    let mut beginner = Box::pin(store.get_or_prepare(key(1.0), Some(memory), working(ended)));
     assert!(futures_util::poll!(&mut beginner).is_pending());
-    let mut joined = Box::pin(store.get_or_factorize(key(1.0), None, |memory| factorize(10, memory)));
+    let mut joined = Box::pin(store.get_or_prepare(key(1.0), None, |memory| factorize(10, memory)));
     assert!(futures_util::poll!(&mut joined).is_pending());
     drop(beginner);
     assert_eq!(store.n_reserved(), 4000);
     assert!(futures_util::poll!(&mut joined).is_pending());
     drop(joined);
-    assert_eq!((store.n_reserved(), store.missing(key(1.0), false).factor), (4000, true));
+    assert_eq!((store.n_reserved(), store.missing(key(1.0), false).solver), (4000, true));
     end.send(()).unwrap();
     while store.n_reserved() > 0 {
         tokio::task::yield_now().await;
@@ -132,7 +136,7 @@ async fn a_flight_is_paid_for_until_its_work_has_ended_whoever_has_left() {
 async fn a_surface_is_paid_for_until_its_work_has_ended() {
     let store = store(1 << 20);
     let memory = store.reserve(Owner(0), 4000, || true).await.unwrap().unwrap();
-    let found = store.get_or_factorize(key(1.0), Some(memory), |memory| factorize(10, memory)).await;
+    let found = store.get_or_prepare(key(1.0), Some(memory), |memory| factorize(10, memory)).await;
     let stored = found.unwrap().unwrap().0;
     let before = store.n_reserved();
     let (end, ended) = oneshot::channel::<()>();

@@ -1,0 +1,62 @@
+//! What a request leaves to the service or decides, by words.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How the linear system is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverChoice {
+    /// The service chooses.
+    #[default]
+    Auto,
+    /// Cholesky factorization of the full matrix: n³/3 flops, 4n² bytes.
+    Dense,
+}
+
+/// What to do with points that coincide when alpha is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DuplicatePolicy {
+    /// Answer 422 `duplicate-points`.
+    #[default]
+    Refuse,
+    /// Average their values; columns of matrices split the weight equally.
+    Merge,
+}
+
+/// Which function's level surface is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceChoice {
+    /// `signature`, and `offset` where its gradient vanishes or, for curvatures, is weak.
+    #[default]
+    Auto,
+    /// The interpolant of the constant 1.
+    Signature,
+    /// An interpolant of signed distances on two offset layers, fitted to the points near each query. It needs no derivatives
+    /// of `kernel`.
+    Offset,
+}
+
+/// The function whose level surface was used at a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceUsed {
+    /// The interpolant of the constant 1.
+    Signature,
+    /// The interpolant of signed distances on two offset layers.
+    Offset,
+}
+
+/// Which way normals point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OrientationChoice {
+    /// To the side of the cloud's normals where it has some; else out of closed surfaces, against the gradient of the
+    /// signature function, with signs repaired where neighbours contradict it. A sphere has positive curvatures.
+    #[default]
+    Outward,
+    /// Along the gradient of the signature function, whatever its sign; with the offset model, the opposite of `outward`.
+    Gradient,
+}

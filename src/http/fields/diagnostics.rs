@@ -1,0 +1,160 @@
+//! What an answer says of itself.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::kernel::KernelUsed;
+use super::schemas::CloudIdSchema;
+use crate::http::problem::Problem;
+use crate::http::wire::write::answer::{Member, Parts};
+use crate::http::wire::write::array::finite;
+
+/// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`, `conjugate_gradients` and `local` are reserved: no
+/// answer has them yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FactorizationUsed {
+    /// Cholesky, exact up to rounding.
+    Cholesky,
+    /// Rank-revealing pivoted Cholesky and least squares on its pivots, where Cholesky fails in float64.
+    PivotedCholesky,
+    /// Reserved for a symmetric indefinite factorization.
+    BunchKaufman,
+    /// Reserved for LU with partial pivoting.
+    PartialPivotingLu,
+    /// Reserved for iterative solvers.
+    ConjugateGradients,
+    /// Reserved for local patches.
+    Local,
+}
+
+/// The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has them yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverUsed {
+    /// A factorization of the full matrix.
+    Dense,
+    /// Reserved for a low-rank factorization.
+    Landmark,
+    /// Reserved for preconditioned conjugate gradients.
+    Iterative,
+    /// Reserved for local patches.
+    Local,
+}
+
+/// What a warning is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WarningCode {
+    /// Digits of the weights are lost: their relative error may reach machine precision over the reciprocal condition.
+    IllConditioned,
+    /// A step of iterative refinement reduced the residual.
+    Refined,
+    /// Points that coincide were merged.
+    DuplicatesMerged,
+    /// Variances that came out negative within rounding are served as 0.
+    VarianceClamped,
+    /// The offset model served where the signature function could not.
+    OffsetModelUsed,
+    /// The gradient of the signature function pointed inward at some points; `outward` is the repaired side.
+    OrientationRepaired,
+    /// The cloud is open, so that outward has no meaning.
+    OpenCloud,
+    /// The kernel's cusp is seen at the points of the cloud.
+    KernelTooRough,
+    /// Curvatures are not confirmed by the points around the query.
+    DisagreesWithNeighbours,
+    /// Queries lie far from the cloud.
+    FarFromCloud,
+}
+
+/// Something that was changed, or that limits the accuracy of the answer.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Warning {
+    /// What it is about.
+    pub code: WarningCode,
+    /// The same in words, with numbers.
+    pub detail: String,
+}
+
+/// What an answer says of itself: the numbers used, how the system was solved, and how well.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Diagnostics {
+    /// The id of the cloud, to refer to it in later requests.
+    #[schema(value_type = CloudIdSchema)]
+    pub cloud_id: String,
+    /// Points of the cloud, n.
+    pub n_points: usize,
+    /// Queries answered, m.
+    pub n_queries: usize,
+    /// Coordinates of each point, d.
+    pub dimension: usize,
+    /// The kernel used, in full.
+    pub kernel: KernelUsed,
+    /// What was added to the diagonal; absent with `noise_variances`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub alpha: Option<f64>,
+    /// The solver used.
+    pub solver: SolverUsed,
+    /// How the matrix was factorized.
+    pub factorization: FactorizationUsed,
+    /// Numerical rank of the matrix.
+    pub rank: usize,
+    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
+    #[serde(serialize_with = "finite")]
+    pub reciprocal_condition: f64,
+    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+    #[serde(serialize_with = "finite")]
+    pub relative_residual: f64,
+    /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+    #[serde(serialize_with = "finite")]
+    pub native_norm_squared: f64,
+    /// |u(X) − Y|, unit of the values.
+    #[serde(serialize_with = "finite")]
+    pub misfit: f64,
+    /// Points that were merged into an earlier one.
+    pub n_merged_duplicates: usize,
+    /// What was changed or limits the accuracy.
+    pub warnings: Vec<Warning>,
+    /// The same for the fit of the surface, in answers about values on a surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, no_recursion)]
+    pub geometry: Option<Box<Diagnostics>>,
+}
+
+impl Member for Diagnostics {
+    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.add_json(name, &self)
+    }
+}
+
+/// Why a query is degenerate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DegenerateReason {
+    /// The gradient of the signature function vanishes, and the offset model was not asked or has no answer: the entry is
+    /// null.
+    VanishingGradient,
+    /// The points around the query do not confirm its curvatures; the number is served.
+    UnderResolved,
+    /// The kernel's cusp at the points shows in the curvatures, which may be off by factors; the number is served.
+    KernelTooRough,
+    /// The query is farther from the cloud than three spacings; the number is served.
+    FarFromCloud,
+    /// The offset model would cost more than is admitted; the entry is null.
+    UnaffordableRescue,
+}
+
+/// A query where geometry has no meaning, or less accuracy than it seems.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Degenerate {
+    /// The position of the query.
+    pub query: usize,
+    /// Why.
+    pub reason: DegenerateReason,
+    /// |∇| of the function that was asked there: 1/length for the signature function, about 1 for the offset model, 0
+    /// where that has no answer.
+    #[serde(serialize_with = "finite")]
+    pub gradient_norm: f64,
+}

@@ -1,0 +1,132 @@
+//! `POST /v1/curvatures`.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+
+use super::surfaces::{GeometryWork, geometry_request, plan_geometry};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Degenerate, Diagnostics, OrientationChoice, SurfaceChoice, SurfaceUsed, request};
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::members::{present, present_word};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::numerics::defaults::Purpose;
+use crate::store::Owner;
+
+request! {
+    /// A cloud that samples a hypersurface, and where its curvatures are wanted.
+    pub struct CurvaturesRequest {
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// Which function's level surface is meant; `auto` if absent.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub surface: Option<SurfaceChoice>,
+        /// Which way normals point, and with them the sign of curvatures; `outward` if absent.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub orientation: Option<OrientationChoice>,
+    }
+}
+
+answer! {
+    /// Curvatures of the surface at the queries.
+    pub struct CurvaturesResponse {
+        /// The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        principal_curvatures: Array,
+        /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
+        #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
+        principal_directions: Array,
+        /// Their average at each query, 1/length; null where there are none.
+        #[schema(value_type = Vec<Option<f64>>)]
+        mean_curvatures: Array,
+        /// Their product at each query, 1/length to the d − 1; null where there are none.
+        #[schema(value_type = Vec<Option<f64>>)]
+        gaussian_curvatures: Array,
+        /// The normal at each query, of length 1; null where there is none.
+        #[schema(value_type = Vec<Option<Vec<f64>>>)]
+        normals: Array,
+        /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        #[schema(value_type = Vec<f64>)]
+        gradient_norms: Array,
+        /// The signature function at each query: 1 on the surface, usually more inside a closed one.
+        #[schema(value_type = Vec<f64>)]
+        levels: Array,
+        /// The function whose level surface was used at each query; `signature` where there is no answer.
+        surfaces: Vec<SurfaceUsed>,
+        /// The queries where geometry has no meaning (null), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Compute curvatures
+///
+/// Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator S = σPD²uP/|∇u| of
+/// the level surface of the signature function u, or of an offset model of the nearest points where the gradient of u
+/// vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around a query
+/// do not confirm are flagged.
+#[utoipa::path(
+    post,
+    path = "/v1/curvatures",
+    operation_id = "compute_curvatures",
+    tag = "geometry",
+    request_body = CurvaturesRequest,
+    responses((status = 200, description = "Curvatures at the queries", body = CurvaturesResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_curvatures(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<CurvaturesRequest>(app, owner, request).await
+}
+
+impl Operation for CurvaturesRequest {
+    type Work = GeometryWork;
+    type Answer = CurvaturesResponse;
+    const HAS_SURFACE: bool = true;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
+        let fit = self.take_fit();
+        let request = geometry_request(self.surface, self.orientation, true);
+        plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + d + 3)
+    }
+
+    fn compute(
+        work: GeometryWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<CurvaturesResponse, Problem> {
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let geometry = &surface.geometry;
+        let (m, d) = (geometry.n_queries(), geometry.dimension());
+        let curvatures = geometry.curvatures(observer).map_err(|error| fits.surface().refused(error))?;
+        Ok(CurvaturesResponse {
+            principal_curvatures: surface.per_query(curvatures.principal, &[m, d - 1]),
+            principal_directions: surface.per_query(curvatures.directions, &[m, d - 1, d]),
+            mean_curvatures: surface.per_query(curvatures.mean, &[m]),
+            gaussian_curvatures: surface.per_query(curvatures.gaussian, &[m]),
+            normals: surface.per_query(geometry.normals().to_vec(), &[m, d]),
+            gradient_norms: Array::new(geometry.gradient_norms().to_vec(), &[m]),
+            levels: Array::new(geometry.levels().to_vec(), &[m]),
+            surfaces: surface.surfaces(),
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits),
+        })
+    }
+}

@@ -1,0 +1,210 @@
+//! Which solver serves what is asked, and what that costs: the one place that knows bytes and flops.
+//!
+//! Pure: sizes in, prices out. The routes say what they want, and whoever admits, queues or refuses asks here. Flops are those
+//! of a large factorization, so that all prices compare: a sum over pairs takes longer for each of its operations.
+
+use super::dense::Dense;
+use super::kind::SolverKind;
+use crate::numerics::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
+use crate::numerics::points::quadric::n_coefficients;
+
+/// Why a solver was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// It is exact, and its matrix fits into memory.
+    Fits,
+    /// Nothing smaller is there: it serves if it is there already, and else is refused for its memory.
+    NothingSmaller,
+}
+
+/// Bytes and flops.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Price {
+    pub n_bytes: usize,
+    pub flops: f64,
+}
+
+/// What making a system and its surface ready takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    pub solver: SolverKind,
+    pub reason: Reason,
+    /// Of the solver, as nearly always; `usize::MAX` bytes for what cannot be counted.
+    pub expected: Price,
+    /// Of the solver at most.
+    pub at_most: Price,
+    /// Of the surface with its quadrics and normals.
+    pub surface: Price,
+}
+
+/// Chooses the solver of a system of n points in d dimensions, with so many bytes of memory.
+pub fn choose(n_points: usize, dimension: usize, memory: usize) -> Choice {
+    let n = n_points as f64;
+    let bytes = |n_numbers: Option<usize>| {
+        // O(n) numbers beside the matrix: the points in blocks, and vectors of the estimate of the condition.
+        let beside = n_points.checked_mul(dimension.saturating_add(10));
+        let n_numbers = n_numbers.zip(beside).and_then(|(matrix, beside)| matrix.checked_add(beside));
+        n_numbers.and_then(|n_numbers| n_numbers.checked_mul(size_of::<f64>())).unwrap_or(usize::MAX)
+    };
+    // n³/3 for Cholesky, and where that fails up to 0.54 n³ more for the fallback, at rank 2n/3.
+    let expected = Price { n_bytes: bytes(Dense::n_numbers_needed(n_points)), flops: n.powi(3) / 3.0 };
+    let at_most = Price { n_bytes: bytes(Dense::n_numbers_needed_at_most(n_points)), flops: n.powi(3) };
+    let reason = if expected.n_bytes <= memory { Reason::Fits } else { Reason::NothingSmaller };
+    let surface = surface_price(n_points, dimension);
+    Choice { solver: SolverKind::Dense, reason, expected, at_most, surface }
+}
+
+/// The sums at the points, two searches and a quadric at each. Jets, normals and quadrics are kept; while they are made, half as
+/// much again is there beside the lists of neighbours.
+fn surface_price(n_points: usize, dimension: usize) -> Price {
+    let (n, n_columns) = (n_points as f64, n_coefficients(dimension) as f64);
+    let flops = 60.0 * n * n + 2.0 * sampling_flops(n_points, dimension) + 40.0 * n * n_columns.powi(3);
+    // 4.5 kB in three dimensions were measured when quadrics were small vectors (tests/it/memory.rs); now it is a bound.
+    Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops }
+}
+
+/// Flops of [`crate::numerics::points::sampling::Sampling::of`]: every search visits a few leaves, in many dimensions most of the
+/// cloud.
+pub fn sampling_flops(n_points: usize, dimension: usize) -> f64 {
+    let n = n_points as f64;
+    let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
+    // Distance, comparison and descent.
+    n * visited * (3.0 * dimension as f64 + 10.0)
+}
+
+/// Flops of [`crate::numerics::points::noise::estimate_noise`]: searches, and two quadrics each by orthogonal factorization.
+pub fn noise_flops(n_points: usize, dimension: usize) -> f64 {
+    let (n, sites) = (n_points as f64, n_points.min(2 * MAX_SITES) as f64);
+    let visited = n.min(200.0 * 2f64.powi(dimension.min(60) as i32));
+    let (n_columns, d) = (n_coefficients(dimension.max(2)) as f64, dimension as f64);
+    let n_rows = 2.0 * (n_columns + DEGREES_OF_FREEDOM as f64);
+    sites * (visited * (3.0 * d + 10.0) + 6.0 * n_rows * n_columns * n_columns)
+}
+
+/// Queries of which variances are held at once.
+pub const VARIANCES_AT_ONCE: usize = 512;
+
+/// Queries at which one request may ask the offset model: as much work as a factorization of 8,500 points.
+pub const MAX_OFFSETS: usize = 20_000;
+
+/// What the offset model costs at one query: 0.12 ms of one core.
+const FLOPS_PER_OFFSET: f64 = 1e7;
+
+/// Queries, in a hundred, at which the signature function gives way to the offset model, or curvatures wait for it to confirm
+/// them: which and how many is known only afterwards. On smooth clouds without noise it is none, on the bunny two.
+const RESCUED_PERCENT: usize = 2;
+
+/// What is asked of a prepared fit, beside its solver and surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// A function through new values, with derivatives or without.
+    Function,
+    /// The same as a Gaussian process.
+    Posterior { variances: bool, covariance: bool },
+    /// Normals or curvatures; `always_offset` asks the offset model everywhere.
+    Geometry { always_offset: bool },
+    /// An operator on the surface of `n_surface_points`, applied to values.
+    Operator { n_surface_points: usize },
+    /// The same as a matrix with so many rows per query.
+    OperatorMatrix { n_surface_points: usize, n_rows: usize },
+}
+
+/// What answering m queries takes, beside the numbers of the answer.
+pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: usize) -> Price {
+    let (n, m, d) = (n_points as f64, n_queries as f64, dimension as f64);
+    let (at_points, at_queries) = (8 * n_points, n_queries.saturating_mul(numbers_at_query(dimension)));
+    let jets = n_queries.saturating_mul(1 + dimension + dimension * dimension);
+    let (flops, n_numbers) = match asked {
+        Asked::Function => (40.0 * n * (n + m), at_points.saturating_add(jets)),
+        Asked::Posterior { variances, covariance } => {
+            let whitened = match (covariance, variances) {
+                (true, _) => n_queries,
+                (false, true) => n_queries.min(VARIANCES_AT_ONCE),
+                (false, false) => 0,
+            };
+            let flops = 40.0 * n * (n + m)
+                + if whitened > 0 { n * n * m } else { 0.0 }
+                + if covariance { n * m * m } else { 0.0 };
+            let n_numbers = whitened.saturating_add(8).saturating_mul(n_points);
+            (flops, n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)))
+        }
+        Asked::Geometry { always_offset } => {
+            let offsets = if always_offset { n_queries } else { n_queries * RESCUED_PERCENT / 100 };
+            let flops = 60.0 * n * (n + m) + 30.0 * m * d.powi(3) + offset_flops(offsets);
+            (flops, (4 * n_points).saturating_add(at_queries))
+        }
+        Asked::Operator { n_surface_points } => {
+            let n_all = n_points + n_surface_points;
+            let flops =
+                60.0 * n_all as f64 * (n_all as f64 + m) + offset_flops(n_queries * RESCUED_PERCENT / 100);
+            (flops, (8 * n_all).saturating_add(at_queries).saturating_add(jets))
+        }
+        Asked::OperatorMatrix { n_surface_points, n_rows } => {
+            let rescues = offset_flops(n_queries * RESCUED_PERCENT / 100);
+            let flops = 2.0 * n * n * n_rows as f64 + 60.0 * n_surface_points as f64 * m + rescues;
+            (flops, at_points.saturating_add(at_queries))
+        }
+    };
+    Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
+}
+
+fn offset_flops(n_queries: usize) -> f64 {
+    FLOPS_PER_OFFSET * n_queries.min(MAX_OFFSETS) as f64
+}
+
+/// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, and what is said about it.
+fn numbers_at_query(dimension: usize) -> usize {
+    20 + 6 * dimension * dimension
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_takes_half_its_square_and_the_fallback_all_of_it() {
+        let choice = choose(20_000, 3, 4 << 30);
+        assert_eq!((choice.solver, choice.reason), (SolverKind::Dense, Reason::Fits));
+        let square = 20_000usize.pow(2) * 8;
+        assert!((square / 2..square * 52 / 100).contains(&choice.expected.n_bytes), "{choice:?}");
+        assert!((square..square * 101 / 100).contains(&choice.at_most.n_bytes));
+        assert!(
+            (choice.expected.flops - 8e12 / 3.0).abs() < 1e3 && choice.at_most.flops > choice.expected.flops
+        );
+        assert_eq!(choose(20_000, 3, 1 << 30).reason, Reason::NothingSmaller);
+    }
+
+    #[test]
+    fn what_cannot_be_counted_costs_everything() {
+        assert_eq!(choose(usize::MAX / 2, 3, usize::MAX).at_most.n_bytes, usize::MAX);
+        let price = work_price(Asked::Posterior { variances: true, covariance: true }, 1 << 40, 1 << 40, 3);
+        assert_eq!(price.n_bytes, usize::MAX);
+    }
+
+    #[test]
+    fn more_of_anything_never_costs_less() {
+        let all = |n: usize| {
+            [
+                Asked::Function,
+                Asked::Posterior { variances: false, covariance: false },
+                Asked::Posterior { variances: true, covariance: false },
+                Asked::Posterior { variances: true, covariance: true },
+                Asked::Geometry { always_offset: false },
+                Asked::Geometry { always_offset: true },
+                Asked::Operator { n_surface_points: n },
+                Asked::OperatorMatrix { n_surface_points: n, n_rows: n },
+            ]
+        };
+        let sizes = [1, 10, 600, 30_000];
+        for (few, many) in sizes.iter().zip(&sizes[1..]) {
+            for (a, b) in all(*few).into_iter().zip(all(*many)) {
+                for d in [1, 3, 16] {
+                    let (small, large) = (work_price(a, *few, *few, d), work_price(b, *many, *many, d));
+                    assert!(small.flops < large.flops && small.n_bytes < large.n_bytes, "{a:?}");
+                }
+            }
+            let (small, large) = (choose(*few, 3, 0), choose(*many, 3, 0));
+            assert!(small.expected.flops < large.expected.flops && small.surface.flops < large.surface.flops);
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! The solvers by name, and what not all of them have.
+
+/// The solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SolverKind {
+    /// A factorization of the whole matrix.
+    Dense,
+}
+
+/// What a solver is asked for, where not every solver has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// The diagonal of `(K + αI)⁻¹`.
+    InverseDiagonal,
+}

@@ -1,0 +1,32 @@
+//! A function as a sum over centres.
+
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::Kernel;
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::jets::{JetOrder, Jets};
+
+/// `u(x) = Σ_j λ_j k(x, z_j)`: the centres z are all points of a system, or those that its solver gives weights.
+#[derive(Clone, Copy)]
+pub struct Expansion<'a> {
+    /// `[r, d]`
+    pub centres: &'a Cloud,
+    pub kernel: &'a Kernel,
+    /// λ, `[r]`, unit of the values over that of the kernel.
+    pub weights: &'a [f64],
+}
+
+impl Expansion<'_> {
+    /// u and its derivatives at queries `[m, d]`; whether the kernel has them there is for the caller to know.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn at(
+        self,
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Jets, NumericsError> {
+        Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer)
+    }
+}
