@@ -1,4 +1,4 @@
-"""`POST /v1/normals`: cold against LAPACK's factorization alone, warm against the evaluation alone."""
+"""`POST /v1/normals`: cold against LAPACK's factorization alone, warm against the evaluation alone; curvatures of small clouds."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -14,12 +14,15 @@ LAPLACE = {"family": "laplace", "epsilon": 1, "length_scale": 0.2}
 DEFAULT_ALPHA = 1e-10
 COLD = Bound("ratio", "≤", 1.3)
 WARM = Bound("ratio", "≤", 1.5)
+BEYOND = Bound("figure", "≤", 25)
+SMALL = Bound("ratio", "≤", 3)
 
 
 def measure(setting: Setting) -> Iterable[Row]:
     n = setting.size(4000)
     yield from cold(setting, n)
     yield from warm(setting, n)
+    yield small_curvatures(setting, 256)
 
 
 def cold(setting: Setting, n: int) -> Iterable[Row]:
@@ -33,12 +36,15 @@ def cold(setting: Setting, n: int) -> Iterable[Row]:
     with setting.gramian() as server, setting.lapack(n, MATERN["length_scale"], DEFAULT_ALPHA) as lapack:
         client = server.client()
         last: dict[str, Answer] = {}
+        beyond: dict[str, list[float]] = {what: [] for what in kinds}
 
         def ask(index: int, what: str, kernel: dict[str, Any] | None, forgets: bool, round_number: int) -> float:
             last[what] = client.post("/v1/normals", request(n, 0.01 * round_number + 0.002 * index, kernel))
             if forgets:
                 client.forget(last[what])
-            return last[what].seconds
+            spent = last[what].seconds
+            beyond[what].append(spent - last[what].stages["gram"] - last[what].stages["factor"])
+            return spent
 
         tasks = {
             what: lambda number, i=index, w=what, k=kernel, f=forgets: ask(i, w, k, f, number)
@@ -52,6 +58,8 @@ def cold(setting: Setting, n: int) -> Iterable[Row]:
         remark = "last round: " + stages(last[what]) + ("" if forgets else "; a buffer that was never touched before")
         bound = COLD if forgets else None
         yield Row(f"cold, n = m = {n:,}, {what}", Figure.of(times[what]), Figure.of(dpotrf), bound, remark)
+    rest = Figure.of(Times(tuple(beyond["no kernel given"][1:])))
+    yield Row(f"cold, n = m = {n:,}, no kernel given: beyond factorization and Gram matrix", rest, bound=BEYOND)
 
 
 def warm(setting: Setting, n: int) -> Iterable[Row]:
@@ -93,6 +101,29 @@ def warm(setting: Setting, n: int) -> Iterable[Row]:
         evaluation,
         remark="sums, local fits, signs and flags, without the body",
     )
+
+
+def small_curvatures(setting: Setting, n: int) -> Row:
+    """A cloud that costs next to nothing to factorize: what is left is what surrounds it."""
+    last: list[Answer] = []
+    alone: list[float] = []
+    with setting.gramian() as server:
+        client = server.client()
+
+        def ask(round_number: int) -> float:
+            points = sphere(n, 0.01 * round_number)
+            answer = client.post("/v1/curvatures", {"cloud": {"points": points}})
+            used = answer.json()["diagnostics"]
+            body = {"cloud": {"points": points}, "values": points[:, 2].copy(), "derivatives": 2}
+            sums = client.post("/v1/interpolation", {**body, "kernel": used["kernel"], "alpha": used["alpha"]})
+            alone.append(answer.stages["gram"] + answer.stages["factor"] + sums.stages["evaluate"])
+            last.append(answer)
+            return answer.seconds
+
+        times = alternate(setting.rounds(12), {"ours": ask})
+    remark = "reference: its factorization, and value, gradient and Hessian at the points; last round: " + stages(last[-1])
+    reference = Figure.of(Times(tuple(alone[1:])))
+    return Row(f"curvatures, cold, n = m = {n:,}, no kernel given", Figure.of(times["ours"]), reference, SMALL, remark)
 
 
 def request(n: int, angle: float, kernel: dict[str, Any] | None) -> dict[str, Any]:

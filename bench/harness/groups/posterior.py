@@ -15,6 +15,7 @@ from ..server import Answer, Client, Server, encode
 from ..setting import Setting
 from ..timing import Times, alternate
 
+NEW_VALUES = Bound("ratio", "≤", 5)
 KERNEL = {"family": "matern", "nu": 2.5, "length_scale": 0.2}
 PATH, ECHO = "/v1/posterior", "/echo"
 HEADERS = {"Content-Type": "application/json"}
@@ -102,7 +103,7 @@ def new_values(setting: Setting, server: Server, n: int) -> Row:
         f"`solve` stage, residual included; reference: the triangle read twice at {bytes_per_second / 1e9:.1f} GB/s, "
         f"the rate of OpenBLAS ddot over 512 MiB; the request {min(answer.seconds for answer in answers) * 1e3:.1f} ms"
     )
-    return Row(f"new values, n = {n:,}: the solve", Figure.of(times["ours"]), Figure(streamed.best * 1e3, "ms"), None, remark)
+    return Row(f"new values, n = {n:,}: the solve", Figure.of(times["ours"]), Figure(streamed.best * 1e3, "ms"), NEW_VALUES, remark)
 
 
 def one_query(client: Client, n: int) -> dict[str, Any]:

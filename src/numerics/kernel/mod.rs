@@ -21,6 +21,9 @@ pub use matern::MAX_MATERN_ORDER;
 pub(crate) use profile::Pairs;
 pub use wendland::WendlandSmoothness;
 
+/// What `2|φ′|√q = ℓ|∇k|/variance` never exceeds, in any family: Wendland's of smoothness 6 comes to 2.8.
+pub(crate) const MAX_SLOPE: f64 = 4.0;
+
 /// A family with its length scale ℓ (unit L) and variance (unit V²), all checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kernel {

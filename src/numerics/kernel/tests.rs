@@ -163,3 +163,16 @@ fn the_inverse_square_of_the_length_is_rounded_once() {
         assert!((kernel.inverse_square_length() * tiny * tiny - 1.0).abs() <= 2.0 * f64::EPSILON);
     }
 }
+
+#[test]
+fn profiles_decrease_and_their_slopes_are_bounded() {
+    for family in all_families() {
+        let kernel = Kernel::new(family, 1.0, 1.0).unwrap();
+        for step in 1..2000 {
+            let q = (0.005 * f64::from(step)).powi(2);
+            let [phi, slope, _] =
+                InstructionSet::best().dispatch(Profiles(&kernel, q)).map(|block| block.0[0]);
+            assert!(phi <= kernel.at_zero() && -2.0 * slope * q.sqrt() <= MAX_SLOPE, "{family:?} at {q}");
+        }
+    }
+}

@@ -39,8 +39,9 @@ fn rotate(a: &mut [f64], v: &mut [f64], k: usize, p: usize, q: usize) -> bool {
         return false;
     }
     let theta = (aqq - app) / (2.0 * apq);
-    let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-    let c = 1.0 / t.hypot(1.0);
+    // Where θ² leaves float64, the angle is 0.
+    let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let c = 1.0 / (t * t + 1.0).sqrt();
     let s = t * c;
     a[p * k + p] = app - t * apq;
     a[q * k + q] = aqq + t * apq;

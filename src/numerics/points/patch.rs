@@ -138,7 +138,7 @@ fn principal_axes(differences: &[f64], d: usize) -> (Small, f64) {
     let mut covariance = zeros(d * d);
     for v in differences.chunks_exact(d) {
         for a in 0..d {
-            for b in 0..d {
+            for b in a..d {
                 covariance[a * d + b] += (v[a] - mean[a]) * (v[b] - mean[b]);
             }
         }

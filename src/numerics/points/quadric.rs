@@ -42,17 +42,18 @@ impl Quadric {
         if n < p {
             return None;
         }
-        let mut rows = PatchNumbers::with_capacity(n * p);
+        let mut columns = PatchNumbers::from_elem(1.0, n * p);
         let mut heights = PatchNumbers::with_capacity(n);
-        for t in patch.coordinates().chunks_exact(d) {
-            rows.push(1.0);
-            rows.extend_from_slice(&t[..k]);
+        for (i, t) in patch.coordinates().chunks_exact(d).enumerate() {
+            let mut monomials = columns[n..].iter_mut().skip(i).step_by(n);
+            let mut put = |x: f64| monomials.next().into_iter().for_each(|slot| *slot = x);
+            t[..k].iter().for_each(|&x| put(x));
             for a in 0..k {
-                rows.extend((a..k).map(|b| if a == b { 0.5 * t[a] * t[a] } else { t[a] * t[b] }));
+                (a..k).for_each(|b| put(if a == b { 0.5 * t[a] * t[a] } else { t[a] * t[b] }));
             }
             heights.push(t[k]);
         }
-        let (coefficients, squared_residual) = least_squares(&mut rows, &mut heights, p)?;
+        let (coefficients, squared_residual) = least_squares(&mut columns, &mut heights, p)?;
         let mut hessian = zeros(k * k);
         let mut at = d;
         for a in 0..k {
@@ -71,28 +72,27 @@ impl Quadric {
     }
 }
 
-/// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2), A row-major `[n, p]`.
+/// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2), A `[n, p]` column by column.
 /// Answers c and the squared residual; `None` if A has not full rank.
 fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64)> {
     let n = b.len();
     let mut diagonal = zeros(p);
     for j in 0..p {
-        let length = (j..n).map(|i| a[i * p + j] * a[i * p + j]).sum::<f64>().sqrt();
-        let alpha = if a[j * p + j] > 0.0 { -length } else { length };
-        let pivot = a[j * p + j] - alpha;
+        let (left, right) = a.split_at_mut((j + 1) * n);
+        let reflector = &mut left[j * n + j..];
+        let length = long_dot(reflector, reflector).sqrt();
+        let alpha = if reflector[0] > 0.0 { -length } else { length };
+        reflector[0] -= alpha;
         diagonal[j] = alpha;
         // vᵀv/2 = −α·pivot for v = x − αe₁.
-        let half_square = -alpha * pivot;
+        let half_square = -alpha * reflector[0];
         if half_square == 0.0 {
             return None;
         }
-        a[j * p + j] = pivot;
-        for column in j + 1..p {
-            let along = (j..n).map(|i| a[i * p + j] * a[i * p + column]).sum::<f64>() / half_square;
-            (j..n).for_each(|i| a[i * p + column] -= along * a[i * p + j]);
+        for column in right.chunks_exact_mut(n).chain([&mut *b]) {
+            let along = long_dot(reflector, &column[j..]) / half_square;
+            column[j..].iter_mut().zip(&*reflector).for_each(|(x, v)| *x -= along * v);
         }
-        let along = (j..n).map(|i| a[i * p + j] * b[i]).sum::<f64>() / half_square;
-        (j..n).for_each(|i| b[i] -= along * a[i * p + j]);
     }
     let largest = diagonal.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
     if diagonal.iter().any(|r| r.abs() <= RANK_TOLERANCE * largest) {
@@ -100,8 +100,22 @@ fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64)>
     }
     let mut c = Small::from_slice(&b[..p]);
     for j in (0..p).rev() {
-        let known: f64 = (j + 1..p).map(|column| a[j * p + column] * c[column]).sum();
+        let known: f64 = (j + 1..p).map(|column| a[column * n + j] * c[column]).sum();
         c[j] = (c[j] - known) / diagonal[j];
     }
     Some((c, b[p..].iter().map(|r| r * r).sum()))
+}
+
+/// A scalar product in four sums, none of which waits for the others.
+fn long_dot(a: &[f64], b: &[f64]) -> f64 {
+    let (fours_a, rest_a) = a.as_chunks::<4>();
+    let (fours_b, rest_b) = b.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (x, y) in fours_a.iter().zip(fours_b) {
+        for lane in 0..4 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

@@ -1,10 +1,11 @@
 //! A function as a sum over centres.
 
+use super::jets::{JetOrder, Jets};
+use super::symmetric::kernel_times;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// `u(x) = Σ_j λ_j k(x, z_j)`: the centres z are all points of a system, or those that its solver gives weights.
 #[derive(Clone, Copy)]
@@ -28,5 +29,20 @@ impl Expansion<'_> {
         observer: &dyn Observer,
     ) -> Result<Jets, NumericsError> {
         Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer)
+    }
+
+    /// u at queries alone, `[m]`; where they are the centres themselves, by half of the pairs.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub(crate) fn values_at(
+        self,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        match std::ptr::eq(queries, self.centres) {
+            true => kernel_times(self.centres, self.kernel, self.weights, observer),
+            false => Ok(self.at(queries, JetOrder::Value, observer)?.values()),
+        }
     }
 }

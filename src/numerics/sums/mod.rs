@@ -5,3 +5,4 @@ pub mod gram;
 pub mod jets;
 pub mod nodes;
 pub mod regularization;
+pub(crate) mod symmetric;

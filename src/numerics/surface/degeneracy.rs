@@ -1,11 +1,14 @@
 //! Where geometry has no meaning, or less accuracy than it seems: the criteria of docs/numerics.md, Geometry.
 
+use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
-use crate::numerics::kernel::Kernel;
+use crate::numerics::kernel::{Kernel, MAX_SLOPE};
 use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::local_quadrics::LocalQuadric;
 use crate::numerics::points::sampling::Scales;
-use crate::numerics::sums::jets::Jets;
+use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// What is wrong at a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,12 +60,40 @@ const OBLIQUE: f64 = 0.5;
 /// Spacings from the nearest point beyond which a query is far from the cloud.
 const FAR_SPACINGS: f64 = 3.0;
 
-/// T1: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
-fn is_rounding(signature: &Interpolant, jets: &Jets, query: usize) -> bool {
-    let length_scale = signature.solver.kernel().length_scale();
-    let (value, slope) = jets.magnitudes(query);
-    let rounding = f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
-    length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding
+/// T1 at each query: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
+///
+/// The sums of magnitudes take a third of a pass over all pairs. They are at most `Σ|λ_j|` times the greatest values of k and
+/// ℓ|∇k|, which nearly every gradient exceeds; only the others are asked for theirs.
+///
+/// # Errors
+/// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+pub(crate) fn roundings(
+    signature: &Interpolant,
+    queries: &Cloud,
+    jets: &Jets,
+    observer: &dyn Observer,
+) -> Result<Vec<bool>, NumericsError> {
+    let (kernel, solution) = (signature.solver.kernel(), &signature.solution);
+    let length_scale = kernel.length_scale();
+    let is_rounding = |query: usize, magnitudes: f64| {
+        let rounding = f64::EPSILON * magnitudes + solution.residual_max;
+        length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding
+    };
+    let total: f64 = solution.weights.iter().map(|weight| weight.abs()).sum();
+    let at_most = total * (kernel.at_zero() + kernel.variance() * MAX_SLOPE);
+    let mut found: Vec<bool> = (0..jets.n_queries()).map(|query| is_rounding(query, at_most)).collect();
+    let suspects: Vec<usize> = (0..found.len()).filter(|&query| found[query]).collect();
+    if suspects.is_empty() {
+        return Ok(found);
+    }
+    let order = JetOrder::HessianWithMagnitudes;
+    let expansion = signature.solver.expansion(&solution.weights);
+    let with_magnitudes = expansion.at(&queries.select(&suspects), order, observer)?;
+    for (at, query) in suspects.into_iter().enumerate() {
+        let (value, slope) = with_magnitudes.magnitudes(at);
+        found[query] = is_rounding(query, length_scale * slope + value);
+    }
+    Ok(found)
 }
 
 /// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`.
@@ -80,22 +111,19 @@ pub(crate) fn is_far(squared_distance: f64, spacing: f64) -> bool {
     squared_distance > (FAR_SPACINGS * spacing).powi(2)
 }
 
-/// Whether ∇u is no normal at a query: rounding (T1), no direction at the scale of the sampling (T2), or oblique to a
-/// reliable quadric.
-pub(crate) fn vanishes(
-    signature: &Interpolant,
+/// Whether ∇u, which is no rounding (T1), is no normal at a query all the same: no direction at the scale of the sampling (T2), or
+/// oblique to a reliable quadric.
+pub(crate) fn is_no_normal(
     jets: &Jets,
     query: usize,
     spacing: f64,
     quadric: Option<LocalQuadric<'_>>,
 ) -> bool {
     let gradient = jets.gradient(query);
-    if is_rounding(signature, jets, query) || turns_within_spacing(jets, query, spacing) {
-        return true;
-    }
-    quadric
-        .filter(LocalQuadric::is_reliable)
-        .is_some_and(|quadric| dot(gradient, quadric.normal).abs() < OBLIQUE * norm(gradient))
+    let is_oblique =
+        |quadric: &LocalQuadric<'_>| dot(gradient, quadric.normal).abs() < OBLIQUE * norm(gradient);
+    turns_within_spacing(jets, query, spacing)
+        || quadric.filter(LocalQuadric::is_reliable).is_some_and(|quadric| is_oblique(&quadric))
 }
 
 /// Whether second derivatives at the points see a cusp: what rounds it is narrower than the median distance to the nearest point.

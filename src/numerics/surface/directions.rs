@@ -1,6 +1,6 @@
 //! Normals at the points before their signs are made consistent.
 
-use super::degeneracy::vanishes;
+use super::degeneracy::is_no_normal;
 use super::level::Signature;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::norm;
@@ -54,7 +54,7 @@ fn along_gradients(
     let (mut normals, mut has_sign) = (vec![0.0; n * d], vec![false; n]);
     for (point, slot) in normals.chunks_exact_mut(d).enumerate() {
         let quadric = quadrics.at(point);
-        if vanishes(signature.function(), jets, point, sampling.spacing(point), quadric) {
+        if signature.is_rounding(point) || is_no_normal(jets, point, sampling.spacing(point), quadric) {
             quadric.iter().for_each(|quadric| slot.copy_from_slice(quadric.normal));
             continue;
         }

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::degeneracy::roundings;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
 use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::{JetOrder, Jets};
@@ -21,7 +23,14 @@ pub enum Level {
 pub struct Signature {
     function: Interpolant,
     /// Absent for kernels with a kink at the points.
-    jets: Option<Jets>,
+    at_points: Option<AtPoints>,
+}
+
+/// u and its derivatives at the points.
+struct AtPoints {
+    jets: Jets,
+    /// Whether ∇u is rounding (T1), `[n]`.
+    is_rounding: Vec<bool>,
 }
 
 impl Signature {
@@ -30,11 +39,12 @@ impl Signature {
     /// # Errors
     /// Those of [`Solution::with_jets`].
     pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let has_kink = solver.kernel().has_kink();
-        let order = if has_kink { JetOrder::Value } else { JetOrder::HessianWithMagnitudes };
-        let (solution, jets) = Solution::with_jets(&solver, &vec![1.0; solver.n_points()], order, observer)?;
-        let function = Interpolant { solver, solution: Arc::new(solution) };
-        Ok(Self { function, jets: (!has_kink).then_some(jets) })
+        let ones = vec![1.0; solver.n_points()];
+        let (solution, jets) = match solver.kernel().has_kink() {
+            true => (Solution::of(&solver, &ones, observer)?, None),
+            false => Solution::with_jets(&solver, &ones, JetOrder::Hessian, observer)?,
+        };
+        Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)
     }
 
     /// The same of weights that are known.
@@ -45,9 +55,24 @@ impl Signature {
         let solver = &function.solver;
         let jets = match solver.kernel().has_kink() {
             true => None,
-            false => Some(function.at(solver.cloud(), JetOrder::HessianWithMagnitudes, observer)?),
+            false => Some(function.at(solver.cloud(), JetOrder::Hessian, observer)?),
         };
-        Ok(Self { function, jets })
+        Self::with(function, jets, observer)
+    }
+
+    fn with(
+        function: Interpolant,
+        jets: Option<Jets>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let at_points = match jets {
+            None => None,
+            Some(jets) => {
+                let is_rounding = roundings(&function, function.solver.cloud(), &jets, observer)?;
+                Some(AtPoints { jets, is_rounding })
+            }
+        };
+        Ok(Self { function, at_points })
     }
 
     /// u.
@@ -57,11 +82,17 @@ impl Signature {
 
     /// u, ∇u and D²u at the points, where they exist.
     pub(crate) fn jets(&self) -> Option<&Jets> {
-        self.jets.as_ref()
+        self.at_points.as_ref().map(|at_points| &at_points.jets)
+    }
+
+    /// Whether ∇u at a point is rounding; false where there is none.
+    pub(crate) fn is_rounding(&self, point: usize) -> bool {
+        self.at_points.as_ref().is_some_and(|at_points| at_points.is_rounding[point])
     }
 
     /// Bytes held on the heap beside the factor.
     pub(crate) fn n_bytes(&self) -> usize {
-        self.function.solution.n_bytes() + self.jets.as_ref().map_or(0, Jets::n_bytes)
+        let of = |at_points: &AtPoints| at_points.jets.n_bytes() + vec_bytes(&at_points.is_rounding);
+        self.function.solution.n_bytes() + self.at_points.as_ref().map_or(0, of)
     }
 }

@@ -108,15 +108,9 @@ impl Surface {
         &self.sampling
     }
 
-    /// Whether ∇u is no normal at a query where `jets` are u and its derivatives.
-    pub(crate) fn vanishes(
-        &self,
-        jets: &Jets,
-        query: usize,
-        spacing: f64,
-        quadric: Option<LocalQuadric<'_>>,
-    ) -> bool {
-        degeneracy::vanishes(self.signature(), jets, query, spacing, quadric)
+    /// Whether ∇u at each point is rounding; false where there is none.
+    pub(crate) fn is_rounding(&self, point: usize) -> bool {
+        self.level().is_rounding(point)
     }
 
     /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.

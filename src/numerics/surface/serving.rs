@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Surface;
 use super::confirmation::Unconfirmed;
 use super::curvature::principal_curvatures;
-use super::degeneracy::{DegeneracyReason, is_far, is_weak};
+use super::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak, roundings};
 use super::offset::{OffsetJet, offset_jet_at};
 use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::numerics::error::NumericsError;
@@ -82,16 +82,23 @@ pub(crate) fn serve(
 ) -> Result<Served, NumericsError> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
-        SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::HessianWithMagnitudes,
+        SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::Hessian,
     };
     let are_points = queries == surface.cloud();
     let jets = match surface.jets_at_points() {
         Some(jets) if are_points => Cow::Borrowed(jets),
         Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
     };
+    let is_rounding = match &jets {
+        Cow::Borrowed(_) => (0..queries.n_points()).map(|point| surface.is_rounding(point)).collect(),
+        Cow::Owned(jets) if order == JetOrder::Hessian => {
+            roundings(surface.signature(), queries, jets, observer)?
+        }
+        Cow::Owned(_) => Vec::new(),
+    };
     observer.enter(Stage::Evaluate);
     let surroundings = Surroundings::of(surface, queries, are_points, request.checks_curvatures, observer)?;
-    Service { surface, queries, request, jets, surroundings }.serve(observer)
+    Service { surface, queries, request, jets, is_rounding, surroundings }.serve(observer)
 }
 
 /// What lies around the queries.
@@ -143,6 +150,8 @@ struct Service<'a> {
     queries: &'a Cloud,
     request: &'a GeometryRequest,
     jets: Cow<'a, Jets>,
+    /// T1 at each query, where the jets have gradients.
+    is_rounding: Vec<bool>,
     surroundings: Surroundings,
 }
 
@@ -226,7 +235,7 @@ impl Service<'_> {
         let is_on_thread = site.quadric.is_none()
             && site.nearest.squared_distance <= reach * reach
             && self.surface.is_thread(site.x);
-        is_on_thread || self.surface.vanishes(&self.jets, query, site.spacing, quadric)
+        is_on_thread || self.is_rounding[query] || is_no_normal(&self.jets, query, site.spacing, quadric)
     }
 
     /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which
