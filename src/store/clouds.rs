@@ -121,6 +121,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         };
         let (sampling, is_new) = fill(&stored.sampling, &self.samplings, (owner, stored.id), begin).await?;
         if is_new {
+            // A cloud that was kept stays, with the weight that it had where its sampling has no room beside it.
             self.clouds.reweigh(owner, stored.id, stored.n_bytes());
         }
         Ok(sampling)
@@ -230,5 +231,17 @@ mod tests {
         let before = store.n_bytes();
         let again = store.sampling(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
         assert!(again.is_ok() && store.n_bytes() == before && before >= stored.n_bytes());
+    }
+
+    #[tokio::test]
+    async fn a_cloud_stays_that_fills_the_budget_with_its_sampling() {
+        // 8 KB of points, and 18 KB of sampling.
+        let store = CloudStore::<NumericsError>::new(12_000);
+        let (stored, _) = store.register(Owner(0), line(1000, 0.0), None);
+        let cloud = stored.cloud.clone();
+        let compute = || async move { Sampling::of(&cloud, &Unobserved) };
+        store.sampling(Owner(0), &stored, compute).await.unwrap();
+        assert!(stored.n_bytes() > 12_000 && store.get(Owner(0), stored.id).is_some());
+        assert!(store.n_bytes() <= 12_000);
     }
 }
