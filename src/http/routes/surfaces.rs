@@ -13,7 +13,7 @@ use crate::http::serve::planner::Planner;
 use crate::http::wire::read::points::Points;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, work_price};
+use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, Offsets, work_price};
 use crate::numerics::surface::geometry::{GeometryRequest, Orientation, SurfaceModel};
 
 /// A checked request for normals or curvatures.
@@ -74,7 +74,12 @@ pub fn plan_geometry(
     let queries = planner.queries(queries, &mut [&mut main])?;
     let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
     let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
-    let asked = Asked::Geometry { always_offset: request.model == SurfaceModel::Offset };
+    let offsets = match (request.model, request.checks_curvatures) {
+        (SurfaceModel::Offset, _) => Offsets::Everywhere,
+        (SurfaceModel::Auto | SurfaceModel::Signature, true) => Offsets::Confirmations,
+        (SurfaceModel::Auto | SurfaceModel::Signature, false) => Offsets::Rescues,
+    };
+    let asked = Asked::Geometry { offsets };
     let cost = Cost { work: work_price(asked, n, m, d), n_numbers, n_held: m * d };
     Ok(Plan { main, surface: None, work: GeometryWork { queries, request }, cost })
 }
