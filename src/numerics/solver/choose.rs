@@ -95,8 +95,8 @@ const FLOPS_PER_OFFSET: f64 = 1e7;
 pub enum Offsets {
     /// Where the gradient of the signature function vanishes: nowhere on spheres, tori and the bunny, everywhere on a plane.
     Rescues,
-    /// Where quadrics do not confirm curvatures as well: nowhere on spheres of 1,000 points and more, at a tenth of a random torus
-    /// of 3,000, everywhere on one of 1,000, on a sphere of 256, and on the bunny.
+    /// Where quadrics do not confirm curvatures as well. By the time that it takes: nearly nowhere on spheres of 1,000 points and
+    /// more, at some tenth of a random torus of 3,000, nearly everywhere on one of 1,000, on a sphere of 256, and on the bunny.
     Confirmations,
     /// At every query.
     Everywhere,

@@ -12,7 +12,7 @@ use crate::numerics::sums::jets::{JetOrder, Jets};
 /// are huge against the values.
 const REFINE_ABOVE: f64 = 1e-12;
 
-/// Backward errors of Cholesky up to this are rounding: a step in the same precision was seen to take a third to two thirds off a
+/// Backward errors of Cholesky up to this are rounding: a step in the same precision was seen to take a fifth to two thirds off a
 /// residual that is noise (Matérn 5/2, Laplace and Gauss on 500 to 4,000 points, reciprocal conditions down to 3e-14), for
 /// the price of another solve and another pass over all pairs. The least squares of the fallback gain by it all the same: half of
 /// the error of the answers (`tests/conditioning/smooth.rs`).
