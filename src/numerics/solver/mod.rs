@@ -32,11 +32,8 @@ pub use system::System;
 /// match.
 pub enum Solver {
     /// A factorization of the whole matrix.
-    Dense(Box<DenseSolver>),
+    Dense(Box<Dense>),
 }
-
-/// The factorization of the whole matrix, of which only this module knows what it is.
-pub struct DenseSolver(Dense);
 
 /// Points up to which the diagonal of the inverse is computed: it costs three factorizations.
 pub(crate) const MAX_INVERSE_DIAGONAL: usize = 512;
@@ -60,12 +57,12 @@ impl Solver {
         system: System,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        Dense::factorize(workspace, system, observer).map(|dense| Self::Dense(Box::new(DenseSolver(dense))))
+        Dense::factorize(workspace, system, observer).map(|dense| Self::Dense(Box::new(dense)))
     }
 
     fn as_dense(&self) -> &Dense {
-        let Self::Dense(solver) = self;
-        &solver.0
+        let Self::Dense(dense) = self;
+        dense
     }
 
     pub fn system(&self) -> &System {
@@ -105,7 +102,7 @@ impl Solver {
 
     /// Bytes held on the heap, those of the cloud included.
     pub fn n_bytes(&self) -> usize {
-        size_of::<DenseSolver>() + self.as_dense().n_bytes()
+        size_of::<Dense>() + self.as_dense().n_bytes()
     }
 
     /// The function with these weights, one for each of its centres.

@@ -11,7 +11,7 @@ use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 
 /// Strips of rows whose sums are kept apart and added in order, so that the result does not depend on the number of threads.
-const N_STRIPS: usize = 16;
+pub(crate) const N_STRIPS: usize = 16;
 
 /// `Σ_j λ_j k(x_i, x_j)` at every point of the cloud, `[n]`.
 ///

@@ -131,3 +131,43 @@ pub(crate) fn is_too_rough(kernel: &Kernel, scales: &Scales) -> bool {
     let nearest = scales.nearest_range().map_or(0.0, |range| range.median);
     kernel.family().cusp_width().is_some_and(|width| width * kernel.length_scale() < nearest)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::numerics::kernel::Family;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::solver::{Solver, System};
+    use crate::numerics::sums::regularization::Regularization;
+    use crate::numerics::testing::fibonacci_sphere;
+
+    #[test]
+    fn gradients_are_judged_as_if_all_were_asked_for_their_magnitudes() {
+        // The centre, where ∇u vanishes, points of the sphere, and places so far away that k underflows.
+        let places = [[0.0; 3], [1e-14, 0.0, 0.0], [0.6, 0.8, 0.0], [0.5, 0.0, 0.0], [40.0, 0.0, 0.0]];
+        let queries = Cloud::new(places.concat(), 3).unwrap();
+        let mut n_rounding = 0;
+        for (length_scale, alpha) in [(0.5, 1e-3), (1.0, 0.0), (6.0, 1e-9)] {
+            let kernel = Kernel::new(Family::Gauss, length_scale, 1.7).unwrap();
+            let cloud = Arc::new(fibonacci_sphere(150));
+            let system = System::new(cloud, kernel, Regularization::Uniform(alpha)).unwrap();
+            let solver = Arc::new(Solver::dense(system, &Unobserved).unwrap());
+            let signature = Interpolant::signature(solver, &Unobserved).unwrap();
+            let order = JetOrder::HessianWithMagnitudes;
+            let jets = signature.at(&queries, order, &Unobserved).unwrap();
+            let found = roundings(&signature, &queries, &jets, &Unobserved).unwrap();
+            for (query, found) in found.into_iter().enumerate() {
+                let (value, slope) = jets.magnitudes(query);
+                let rounding =
+                    f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
+                let expected = length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding;
+                assert_eq!(found, expected, "query {query}, ℓ = {length_scale}");
+                n_rounding += usize::from(found);
+            }
+        }
+        // The centre at least, and never all.
+        assert!((3..15).contains(&n_rounding), "{n_rounding}");
+    }
+}

@@ -44,7 +44,7 @@ pub struct Workspace<'a> {
 const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
 /// A factorization of `K(X, X) + αI` with the system that it was made from, so that it cannot be used with others.
-pub(super) struct Dense {
+pub struct Dense {
     system: System,
     factorization: Factorization,
     norm1: f64,
