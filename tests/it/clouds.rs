@@ -222,8 +222,8 @@ async fn inline_points_are_registered_on_every_route() {
 
 #[tokio::test]
 async fn the_least_recently_used_cloud_makes_room() {
-    // 1,000 points of dimension 3 weigh some 26 KB, and their sampling 18 KB: there is room for two.
-    let server = Server::with_flags(&["--cloud-bytes", "110000"]).await;
+    // 1,000 points of dimension 3 weigh some 26 KB, and their sampling 42 KB: there is room for two.
+    let server = Server::with_flags(&["--cloud-bytes", "170000"]).await;
     let post = async |shift: f64| {
         let points: Vec<_> = fibonacci_sphere(1000).iter().map(|x| [x[0] + shift, x[1], x[2]]).collect();
         let posted = server.post("/v1/clouds", &json!({"points": points})).await;

@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::facts::{Facts, analytic_length_scale};
-use super::profile::Profile;
+use super::profile::{HUGE, Profile};
 use crate::numerics::machine::registers::Pack;
 use crate::numerics::points::sampling::Scales;
 
@@ -13,8 +13,8 @@ impl Profile for InverseMultiquadric {
     /// φ = (1+q)^{−½}, φ′ = −½(1+q)^{−3/2}, φ″ = ¾(1+q)^{−5/2}.
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let inverse = 1.0 / (1.0 + q);
-        let phi = inverse.sqrt();
+        let (_, phi) = (1.0 + q).at_most(HUGE).sqrt_and_inverse();
+        let inverse = phi * phi;
         let first = -0.5 * phi * inverse;
         [phi, first, -1.5 * first * inverse]
     }

@@ -4,7 +4,7 @@
 use pulp::Simd;
 
 use super::facts::Facts;
-use super::profile::{Profile, TINY};
+use super::profile::{HUGE, Profile, distance_and_inverse};
 use crate::numerics::machine::exp::exp_minus;
 use crate::numerics::machine::registers::Pack;
 use crate::numerics::points::sampling::Scales;
@@ -17,8 +17,7 @@ impl Profile for Laplace {
     /// φ = e^{−t}, φ′ = −e^{−t}/(2t), φ″ = e^{−t}(1/t² + 1/t³)/4.
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let t = (q + self.epsilon).sqrt().at_least(TINY);
-        let inverse = 1.0 / t;
+        let (t, inverse) = distance_and_inverse(q + self.epsilon, HUGE);
         let e = exp_minus(t);
         let first = -0.5 * e * inverse;
         [e, first, -0.5 * first * inverse.mul_add(inverse, inverse)]

@@ -7,7 +7,7 @@ use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
 use super::laplace::Laplace;
-use super::profile::{Pairs, Profile, Profiles, TINY};
+use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
 use crate::numerics::machine::exp::exp_minus;
 use crate::numerics::machine::registers::Pack;
 use crate::numerics::points::sampling::Scales;
@@ -79,18 +79,17 @@ impl Profile for OfAnyOrder {
     }
 }
 
-/// φ, φ′, φ″ with θ_{−1} = 1/s and θ_{−2} = (1 + s)/s³, which only order 1 meets.
+/// φ, φ′, φ″ for an order of 1 or more.
 #[inline(always)]
 fn profile<S: Simd>(q: Pack<S>, order: u8) -> [Pack<S>; 3] {
     let nu = f64::from(order) + 0.5;
-    let s = (2.0 * nu * q).sqrt().at_least(TINY).at_most(FAR);
-    let s_squared = s * s;
-    let inverse = 1.0 / s;
-    // θ_{p−2}, θ_{p−1}, θ_p, raised one by one by θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
-    let mut lowest = (1.0 + s) * inverse * inverse * inverse;
-    let (mut lower, mut theta) = (inverse, Pack::splat(q.simd(), 1.0));
+    let (s, inverse) = distance_and_inverse(2.0 * nu * q, FAR * FAR);
+    let (s_squared, one) = (s * s, Pack::splat(q.simd(), 1.0));
+    // θ_{p−2}, θ_{p−1}, θ_p from p = 1 on, with θ_{−1} = 1/s, which only order 1 meets; raised one by one by
+    // θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
+    let (mut lowest, mut lower, mut theta) = (if order == 1 { inverse } else { one }, one, 1.0 + s);
     let mut at_zero = 1.0;
-    for p in 0..order {
+    for p in 1..order {
         let odd = f64::from(2 * p + 1);
         (lowest, lower, theta) = (lower, theta, s_squared.mul_add(lower, odd * theta));
         at_zero *= odd;

@@ -6,7 +6,7 @@
 use pulp::Simd;
 
 use super::facts::{Facts, SMOOTH_SPACINGS};
-use super::profile::{Pairs, Profile, Profiles, TINY};
+use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
 use crate::numerics::machine::registers::Pack;
 use crate::numerics::points::sampling::Scales;
 
@@ -56,11 +56,11 @@ impl Facts for Wendland {
     }
 }
 
-/// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it.
+/// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it; and 1/r.
 #[inline(always)]
-fn cut_off<S: Simd>(q: Pack<S>) -> (Pack<S>, Pack<S>) {
-    let r = q.sqrt().at_most(1.0);
-    (r, 1.0 - r)
+fn cut_off<S: Simd>(q: Pack<S>) -> (Pack<S>, Pack<S>, Pack<S>) {
+    let (r, inverse) = distance_and_inverse(q, 1.0);
+    (r, 1.0 - r, inverse)
 }
 
 struct C2;
@@ -69,9 +69,9 @@ impl Profile for C2 {
     /// C²: φ = (1−r)⁴(4r+1), φ′ = −10(1−r)³, φ″ = 15(1−r)²/r.
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let (r, w) = cut_off(q);
+        let (r, w, inverse) = cut_off(q);
         let w2 = w * w;
-        [w2 * w2 * (4.0 * r + 1.0), -10.0 * w2 * w, 15.0 * w2 / r.at_least(TINY)]
+        [w2 * w2 * (4.0 * r + 1.0), -10.0 * w2 * w, 15.0 * w2 * inverse]
     }
 }
 
@@ -81,7 +81,7 @@ impl Profile for C4 {
     /// C⁴: φ = (1−r)⁶(35r²+18r+3)/3, φ′ = −(28/3)(1−r)⁵(5r+1), φ″ = 140(1−r)⁴.
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let (r, w) = cut_off(q);
+        let (r, w, _) = cut_off(q);
         let w2 = w * w;
         let w4 = w2 * w2;
         [
@@ -98,7 +98,7 @@ impl Profile for C6 {
     /// C⁶: φ = (1−r)⁸(32r³+25r²+8r+1), φ′ = −11(1−r)⁷(16r²+7r+1), φ″ = 132(1−r)⁶(6r+1).
     #[inline(always)]
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
-        let (r, w) = cut_off(q);
+        let (r, w, _) = cut_off(q);
         let w2 = w * w;
         let w4 = w2 * w2;
         [

@@ -7,7 +7,7 @@
 //! values: what is not compiled into the dispatched function itself falls back to one call per instruction, 50 times
 //! slower.
 
-use std::any::TypeId;
+use std::any::{Any, TypeId};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
@@ -84,6 +84,38 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self.map(|simd, x| simd.sqrt_f64s(x))
     }
 
+    /// √x and 1/√x for x in [1e-200, 1e300], within 1 ulp and 2; what is not used is not computed.
+    ///
+    /// With AVX-512 from an approximation to 14 bits, by a step of Goldschmidt's iteration and a correction of the rounding each
+    /// (Markstein 2004): ten instructions for what the dividing unit takes 40 cycles per register.
+    #[inline(always)]
+    pub(crate) fn sqrt_and_inverse(self) -> (Self, Self) {
+        let Some(approximate) = self.approximate_inverse_sqrt() else {
+            let root = self.sqrt();
+            return (root, 1.0 / root);
+        };
+        let splat = |x| Self::splat(self.simd, x);
+        let (root, minus_half_inverse) = (self * approximate, approximate * -0.5);
+        let error = root.mul_add(minus_half_inverse, splat(0.5));
+        let root = root.mul_add(error, root);
+        let minus_half_inverse = minus_half_inverse.mul_add(error, minus_half_inverse);
+        let root = root.mul_add(root, -self).mul_add(minus_half_inverse, root);
+        // The root is right now, so that the whole error is that of the inverse.
+        let minus_inverse = minus_half_inverse * 2.0;
+        let error = root.mul_add(minus_inverse, splat(1.0));
+        (root, -minus_inverse.mul_add(error, minus_inverse))
+    }
+
+    /// 1/√x to 14 bits, where there is an instruction for it. Decided when compiled.
+    #[inline(always)]
+    fn approximate_inverse_sqrt(self) -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(v4) = (&self.simd as &dyn Any).downcast_ref::<pulp::x86::V4>() {
+            return Some(self.map(|_, x| bytemuck::cast(v4.avx512f._mm512_rsqrt14_pd(bytemuck::cast(x)))));
+        }
+        None
+    }
+
     #[inline(always)]
     pub(crate) fn abs(self) -> Self {
         self.map(|simd, x| simd.abs_f64s(x))
@@ -122,12 +154,13 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self
     }
 
-    /// The sum of the registers, lane by lane.
+    /// A sum and the products with another pack, register by register. The chain of so many additions is shorter than what else
+    /// there is to do for a pack.
     #[inline(always)]
-    pub(crate) fn sum_registers(self) -> Pack<S, 1> {
-        let mut sum = Pack { simd: self.simd, registers: [self.registers[0]] };
-        for register in &self.registers[1..] {
-            sum = sum + Pack { simd: self.simd, registers: [*register] };
+    pub(crate) fn add_products_to(self, other: Self, mut sum: Pack<S, 1>) -> Pack<S, 1> {
+        for i in 0..N {
+            let (a, b) = ([self.registers[i]], [other.registers[i]]);
+            sum = Pack { simd: self.simd, registers: a }.mul_add(Pack { simd: self.simd, registers: b }, sum);
         }
         sum
     }
@@ -187,5 +220,55 @@ impl<S: Simd, const N: usize> Neg for Pack<S, N> {
     #[inline(always)]
     fn neg(self) -> Self {
         self.map(|simd, x| simd.neg_f64s(x))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::WithSimd;
+
+    use super::*;
+    use crate::numerics::machine::instruction_set::InstructionSet;
+
+    /// Square roots of numbers, and their inverses.
+    struct Roots<'a>(&'a [f64]);
+
+    impl WithSimd for Roots<'_> {
+        type Output = Vec<(f64, f64)>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let mut found = Vec::new();
+            for numbers in self.0.chunks(BLOCK) {
+                let (mut roots, mut inverses) = (Block([1.0; BLOCK]), Block::ZERO);
+                roots.0[..numbers.len()].copy_from_slice(numbers);
+                for at in 0..Pack::<S>::PER_BLOCK {
+                    let (root, inverse) = Pack::<S>::load(simd, &roots, at).sqrt_and_inverse();
+                    root.store(&mut roots, at);
+                    inverse.store(&mut inverses, at);
+                }
+                found.extend(roots.0.into_iter().zip(inverses.0).take(numbers.len()));
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn roots_are_right_to_an_ulp_and_their_inverses_to_two() {
+        // A Weyl sequence over every binade of the range, and squares, whose roots are exact.
+        let mantissa = |i: i32| 1.0 + (f64::from(i) * 0.618_033_988_749_894_9).fract();
+        let mut numbers: Vec<f64> =
+            (0..200_000).map(|i| mantissa(i) * 2f64.powi(i % 1659 - 664)).filter(|x| *x < 1e300).collect();
+        numbers.extend((1..5000).map(|i| f64::from(i * i)));
+        for set in InstructionSet::available() {
+            for (&x, (root, inverse)) in numbers.iter().zip(set.dispatch(Roots(&numbers))) {
+                // root² − x to the last bit, in units of the root: an ulp of r is at least ε r/2.
+                let error = root.mul_add(root, -x) / (2.0 * root);
+                assert!(error.abs() <= f64::EPSILON * root, "√{x:e} on {}: off by {error:e}", set.name());
+                // The same of inverse·√x − 1, in relative terms, √x being within half an ulp.
+                let error = inverse.mul_add(x.sqrt(), -1.0);
+                assert!(error.abs() <= 2.0 * f64::EPSILON, "1/√{x:e} on {}: off by {error:e}", set.name());
+            }
+        }
     }
 }

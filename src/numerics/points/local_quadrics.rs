@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::neighbours::{Neighbour, Neighbours};
+use super::neighbourhoods::Neighbourhoods;
+use super::neighbours::Neighbour;
 use super::patch::Patch;
-use super::quadric::{Quadric, n_quadric_neighbours};
+use super::quadric::Quadric;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::eigen::symmetric_eigen;
 use crate::numerics::machine::heap::vec_bytes;
@@ -92,30 +93,27 @@ pub(crate) struct LocalQuadrics {
 }
 
 impl LocalQuadrics {
-    /// Fits the nearest points of a cloud around each query, d ≥ 2; answers the nearest point of each as well.
+    /// Fits the nearest points of a cloud around each query, d ≥ 2, [`super::quadric::n_quadric_neighbours`] of them.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of(
         cloud: &Cloud,
-        neighbours: &Neighbours,
+        neighbourhoods: &Neighbourhoods,
         queries: &Cloud,
         observer: &dyn Observer,
-    ) -> Result<(Self, Vec<Neighbour>), NumericsError> {
+    ) -> Result<Self, NumericsError> {
         let (m, d) = (queries.n_points(), cloud.dimension());
         let width = width(d);
         let (mut rows, mut found) = (vec![0.0; m * width], vec![Found::Nothing; m]);
-        let mut firsts = vec![Neighbour { point: 0, squared_distance: 0.0 }; m];
-        let slots = rows.par_chunks_exact_mut(width).zip(&mut found).zip(&mut firsts);
-        slots.enumerate().try_for_each_init(Vec::new, |nearest, (query, ((row, found), first))| {
+        let slots = rows.par_chunks_exact_mut(width).zip(&mut found);
+        slots.enumerate().try_for_each(|(query, (row, found))| {
             observer.checkpoint()?;
-            let x = queries.point(query);
-            neighbours.nearest_positions_into(cloud, x, n_quadric_neighbours(d), nearest);
-            *first = nearest.first().copied().unwrap_or(*first);
-            *found = fit(cloud, x, nearest, row).unwrap_or(Found::Nothing);
+            let nearest = neighbourhoods.around(query);
+            *found = fit(cloud, queries.point(query), nearest, row).unwrap_or(Found::Nothing);
             Ok(())
         })?;
-        Ok((Self { dimension: d, rows, found }, firsts))
+        Ok(Self { dimension: d, rows, found })
     }
 
     /// The quadric at a position, if its neighbours determine one.
@@ -146,9 +144,9 @@ fn width(dimension: usize) -> usize {
 /// The frame of the principal axes is tilted by cubic terms of the surface; a second fit over the tangent plane of the
 /// first is not.
 fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Option<Found> {
-    let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
+    let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
     let first = Quadric::of(&patch)?;
-    let patch = patch.over(&first.slope);
+    patch.turn_over(&first.slope);
     let quadric = Quadric::of(&patch)?;
     let d = patch.dimension();
     // For the frame's normal the shape operator is minus the Hessian of the height.
@@ -168,6 +166,8 @@ fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Opti
 mod tests {
     use super::*;
     use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::neighbours::Neighbours;
+    use crate::numerics::points::quadric::n_quadric_neighbours;
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     /// One quadric, through so many points.
@@ -201,10 +201,11 @@ mod tests {
     #[test]
     fn spheres_and_circles_have_curvature_one() {
         for cloud in [circle(64), fibonacci_sphere(800)] {
-            let neighbours = Neighbours::of(&cloud);
-            let (quadrics, nearest) = LocalQuadrics::of(&cloud, &neighbours, &cloud, &Unobserved).unwrap();
+            let (tree, count) = (Neighbours::of(&cloud), n_quadric_neighbours(cloud.dimension()));
+            let around = Neighbourhoods::of(&cloud, &tree, &cloud, count, &Unobserved).unwrap();
+            let quadrics = LocalQuadrics::of(&cloud, &around, &cloud, &Unobserved).unwrap();
             for (point, x) in cloud.points().enumerate() {
-                assert_eq!(nearest[point], Neighbour { point, squared_distance: 0.0 });
+                assert_eq!(around.nearest(point), Neighbour { point, squared_distance: 0.0 });
                 let fit = quadrics.at(point).unwrap();
                 assert!(dot(fit.normal, x).abs() > 0.999);
                 assert!(fit.curvatures.iter().all(|k| (k.abs() - 1.0).abs() < 0.05), "{:?}", fit.curvatures);

@@ -7,5 +7,6 @@ pub mod noise;
 pub mod sampling;
 
 pub(crate) mod local_quadrics;
+pub(crate) mod neighbourhoods;
 pub(crate) mod patch;
 pub(crate) mod quadric;

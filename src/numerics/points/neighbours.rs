@@ -4,17 +4,21 @@ use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
 use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::machine::small::{Small, zeros};
 
 /// Points per leaf: scanning 12 points costs about what two more levels of descent do.
 const LEAF_SIZE: usize = 12;
 
 /// A k-d tree over the points of a cloud (Bentley 1975), any dimension.
 ///
-/// Built in O(n log n) by median splits of the widest coordinate; it stores indices only and is asked together with the
-/// cloud it was built from. Ties of distance are broken by the smaller index, so answers do not depend on the tree.
+/// Built in O(n log n) by median splits of the widest coordinate, and asked together with the cloud it was built from. Ties of
+/// distance are broken by the smaller index, so answers do not depend on the tree.
 #[derive(Debug, Clone)]
 pub struct Neighbours {
+    /// Points leaf by leaf.
     order: Vec<u32>,
+    /// Their coordinates in that order, `[n, d]`.
+    coordinates: Vec<f64>,
     nodes: Vec<Node>,
 }
 
@@ -42,31 +46,11 @@ pub struct Neighbour {
 impl Neighbours {
     /// Builds the tree. Clouds beyond 2³² points are out of reach of every solver and of the service's limits.
     pub fn of(cloud: &Cloud) -> Self {
-        let mut tree = Self { order: (0..cloud.n_points() as u32).collect(), nodes: Vec::new() };
-        let mut order = std::mem::take(&mut tree.order);
-        tree.build(cloud, &mut order, 0);
-        tree.order = order;
-        tree
-    }
-
-    fn build(&mut self, cloud: &Cloud, order: &mut [u32], start: usize) {
-        let (axis, extent) = widest_axis(cloud, order);
-        if order.len() <= LEAF_SIZE || extent == 0.0 {
-            self.nodes.push(Node::Leaf { start: start as u32, end: (start + order.len()) as u32 });
-            return;
-        }
-        let coordinate = |point: u32| cloud.point(point as usize)[axis];
-        let middle = order.len() / 2;
-        let (_, &mut median, _) =
-            order.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)));
-        let at = coordinate(median);
-        let this = self.nodes.len();
-        self.nodes.push(Node::Split { axis: axis as u32, at, right: 0 });
-        let (left, right) = order.split_at_mut(middle);
-        self.build(cloud, left, start);
-        let right_child = self.nodes.len() as u32;
-        self.nodes[this] = Node::Split { axis: axis as u32, at, right: right_child };
-        self.build(cloud, right, start + middle);
+        let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
+        let mut nodes = Vec::new();
+        split(cloud, &mut order, 0, &mut nodes);
+        let coordinates = order.iter().flat_map(|&point| cloud.point(point as usize)).copied().collect();
+        Self { order, coordinates, nodes }
     }
 
     /// The `count` nearest points to `x`, nearest first; fewer if the cloud has fewer.
@@ -139,65 +123,107 @@ impl Neighbours {
 
     fn search(&self, cloud: &Cloud, x: &[f64], count: usize, at_least: f64, found: &mut Vec<Neighbour>) {
         found.clear();
-        if count > 0 {
-            self.visit(cloud, x, 0, &mut Search { count, at_least, found });
+        if count == 0 {
+            return;
+        }
+        let (d, reach) = (cloud.dimension(), f64::INFINITY);
+        let mut search = Search { x, count, at_least, offsets: zeros(d), reach, found };
+        match d {
+            2 => self.visit::<2>(0, &mut search),
+            3 => self.visit::<3>(0, &mut search),
+            _ => self.visit::<0>(0, &mut search),
         }
     }
 
-    fn visit(&self, cloud: &Cloud, x: &[f64], node: usize, search: &mut Search<'_>) {
+    /// D is the dimension where the compiler shall know it, else 0.
+    fn visit<const D: usize>(&self, node: usize, search: &mut Search<'_>) {
         match self.nodes[node] {
             Node::Leaf { start, end } => {
-                for &point in &self.order[start as usize..end as usize] {
-                    let point = point as usize;
-                    search.offer(Neighbour {
-                        point,
-                        squared_distance: squared_distance(x, cloud.point(point)),
-                    });
+                let d = if D == 0 { search.x.len() } else { D };
+                let (start, end) = (start as usize, end as usize);
+                let points = self.coordinates[start * d..end * d].chunks_exact(d);
+                for (point, y) in self.order[start..end].iter().zip(points) {
+                    let squared_distance = squared_distance(&search.x[..d], &y[..d]);
+                    search.offer(Neighbour { point: *point as usize, squared_distance });
                 }
             }
             Node::Split { axis, at, right } => {
-                let offset = x[axis as usize] - at;
+                let offset = search.x[axis as usize] - at;
                 let (near, far) =
                     if offset < 0.0 { (node + 1, right as usize) } else { (right as usize, node + 1) };
-                self.visit(cloud, x, near, search);
-                if offset * offset <= search.reach() {
-                    self.visit(cloud, x, far, search);
+                self.visit::<D>(near, search);
+                let before = std::mem::replace(&mut search.offsets[axis as usize], offset);
+                if search.squared_distance_of_cell::<D>() <= search.reach {
+                    self.visit::<D>(far, search);
                 }
+                search.offsets[axis as usize] = before;
             }
         }
     }
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        vec_bytes(&self.order) + vec_bytes(&self.nodes)
+        vec_bytes(&self.order) + vec_bytes(&self.coordinates) + vec_bytes(&self.nodes)
     }
 }
 
+/// Appends the nodes of these points, which come after `start` others.
+fn split(cloud: &Cloud, order: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
+    let (axis, extent) = widest_axis(cloud, order);
+    if order.len() <= LEAF_SIZE || extent == 0.0 {
+        nodes.push(Node::Leaf { start: start as u32, end: (start + order.len()) as u32 });
+        return;
+    }
+    let coordinate = |point: u32| cloud.point(point as usize)[axis];
+    let middle = order.len() / 2;
+    let (_, &mut median, _) =
+        order.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)));
+    let (this, at) = (nodes.len(), coordinate(median));
+    nodes.push(Node::Split { axis: axis as u32, at, right: 0 });
+    let (left, right) = order.split_at_mut(middle);
+    split(cloud, left, start, nodes);
+    nodes[this] = Node::Split { axis: axis as u32, at, right: nodes.len() as u32 };
+    split(cloud, right, start + middle, nodes);
+}
+
 struct Search<'a> {
+    x: &'a [f64],
     count: usize,
     at_least: f64,
+    /// From x to the cell at hand, along each axis (Arya and Mount 1993).
+    offsets: Small,
+    /// Squared distance beyond which nothing can be among the nearest any more.
+    reach: f64,
+    /// Sorted.
     found: &'a mut Vec<Neighbour>,
 }
 
 impl Search<'_> {
-    /// Squared distance beyond which nothing can be among the nearest any more.
-    fn reach(&self) -> f64 {
-        if self.found.len() < self.count {
-            f64::INFINITY
-        } else {
-            self.found[self.count - 1].squared_distance
-        }
+    /// At most that of any point in the cell, to the last bit: rounding is monotonic, and the terms are added in the same order.
+    fn squared_distance_of_cell<const D: usize>(&self) -> f64 {
+        let d = if D == 0 { self.offsets.len() } else { D };
+        self.offsets[..d].iter().map(|offset| offset * offset).sum()
     }
 
     fn offer(&mut self, candidate: Neighbour) {
-        let key = |n: &Neighbour| (n.squared_distance, n.point);
-        if candidate.squared_distance < self.at_least || candidate.squared_distance > self.reach() {
+        if candidate.squared_distance < self.at_least || candidate.squared_distance > self.reach {
             return;
         }
-        let place = self.found.partition_point(|n| key(n) < key(&candidate));
-        if place < self.count {
-            self.found.insert(place, candidate);
-            self.found.truncate(self.count);
+        let key = |n: &Neighbour| (n.squared_distance, n.point);
+        if self.found.len() < self.count {
+            self.found.push(candidate);
+        } else if key(&candidate) < key(&self.found[self.count - 1]) {
+            self.found[self.count - 1] = candidate;
+        } else {
+            return;
+        }
+        let mut place = self.found.len() - 1;
+        while place > 0 && key(&candidate) < key(&self.found[place - 1]) {
+            self.found.swap(place - 1, place);
+            place -= 1;
+        }
+        if self.found.len() == self.count {
+            self.reach = self.found[self.count - 1].squared_distance;
         }
     }
 }

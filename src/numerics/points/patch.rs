@@ -10,8 +10,8 @@ use crate::numerics::machine::vector::{dot, norm, tangent_basis};
 /// Breadth against length under which points lie on a line.
 const THREAD: f64 = 1e-3;
 
-/// Numbers of a patch, on the stack for as many points as the quadric of a surface in space is fitted to.
-pub(super) type PatchNumbers = SmallVec<[f64; 128]>;
+/// Coordinates of a patch, on the stack for as many points as the quadric of a surface in space is fitted to.
+type Coordinates = SmallVec<[f64; 64]>;
 
 /// Points near a position x in an orthonormal frame at x, scaled by their greatest distance from x.
 pub(crate) struct Patch {
@@ -20,7 +20,7 @@ pub(crate) struct Patch {
     /// Least standard deviation along a tangent against the greatest.
     breadth: f64,
     /// Coordinates over `radius`, the last one the height above the tangent plane, `[k, d]`.
-    coordinates: PatchNumbers,
+    coordinates: Coordinates,
     dimension: usize,
     /// Greatest distance of a point from x, unit L.
     pub radius: f64,
@@ -29,23 +29,45 @@ pub(crate) struct Patch {
 impl Patch {
     /// The patch of given points, in the frame of their principal axes; `None` if all of them are at x.
     pub(crate) fn of(cloud: &Cloud, x: &[f64], points: impl IntoIterator<Item = usize>) -> Option<Self> {
-        let d = cloud.dimension();
-        let mut differences = PatchNumbers::new();
-        for point in points {
-            differences.extend(cloud.point(point).iter().zip(x).map(|(p, x)| p - x));
+        match cloud.dimension() {
+            2 => Self::gather::<2>(cloud, x, points),
+            3 => Self::gather::<3>(cloud, x, points),
+            _ => Self::gather::<0>(cloud, x, points),
         }
-        let radius = differences.chunks_exact(d).map(norm).fold(0.0, f64::max);
+    }
+
+    /// D is the dimension where the compiler shall know it, so that it copies no three numbers by a call; else 0.
+    fn gather<const D: usize>(
+        cloud: &Cloud,
+        x: &[f64],
+        points: impl IntoIterator<Item = usize>,
+    ) -> Option<Self> {
+        let d = if D == 0 { cloud.dimension() } else { D };
+        let mut coordinates = Coordinates::new();
+        for point in points {
+            let p = &cloud.point(point)[..d];
+            (0..d).for_each(|c| coordinates.push(p[c] - x[c]));
+        }
+        let radius = coordinates.chunks_exact(d).map(norm).fold(0.0, f64::max);
         if radius == 0.0 {
             return None;
         }
-        differences.iter_mut().for_each(|c| *c /= radius);
-        let (frame, breadth) = principal_axes(&differences, d);
-        let coordinates = in_frame(&frame, &differences, d);
+        coordinates.iter_mut().for_each(|c| *c /= radius);
+        let (frame, breadth) = principal_axes::<D>(&coordinates, d);
+        turn_into::<D>(&frame, &mut coordinates, d);
         Some(Self { frame, breadth, coordinates, dimension: d, radius })
     }
 
-    /// The same points over a plane of this slope `[d−1]`: the frame is rotated so that it becomes the tangent plane.
-    pub(crate) fn over(self, slope: &[f64]) -> Self {
+    /// Rotates the frame so that a plane of this slope `[d−1]` becomes the tangent plane.
+    pub(crate) fn turn_over(&mut self, slope: &[f64]) {
+        match self.dimension {
+            2 => self.turn::<2>(slope),
+            3 => self.turn::<3>(slope),
+            _ => self.turn::<0>(slope),
+        }
+    }
+
+    fn turn<const D: usize>(&mut self, slope: &[f64]) {
         let d = self.dimension;
         let mut normal: Small = slope.iter().map(|s| -s).collect();
         normal.push(1.0);
@@ -55,9 +77,10 @@ impl Patch {
         let mut frame = tangent_basis(&normal);
         frame.extend_from_slice(&normal);
         // The new axes in the old frame turn coordinates in that into the new ones.
-        let turn = in_frame(&self.frame, &frame, d);
-        let coordinates = in_frame(&turn, &self.coordinates, d);
-        Self { frame, coordinates, ..self }
+        let mut turn = frame.clone();
+        turn_into::<D>(&self.frame, &mut turn, d);
+        turn_into::<D>(&turn, &mut self.coordinates, d);
+        self.frame = frame;
     }
 
     pub(crate) fn dimension(&self) -> usize {
@@ -118,18 +141,21 @@ impl Patch {
     }
 }
 
-/// Components of vectors `[k, d]` along the axes of a frame `[d, d]`.
-fn in_frame(frame: &[f64], vectors: &[f64], d: usize) -> PatchNumbers {
-    let mut components = PatchNumbers::with_capacity(vectors.len());
-    for v in vectors.chunks_exact(d) {
-        components.extend(frame.chunks_exact(d).map(|axis| dot(axis, v)));
+/// Turns vectors `[k, d]` into their components along the axes of a frame `[d, d]`.
+fn turn_into<const D: usize>(frame: &[f64], vectors: &mut [f64], d: usize) {
+    let d = if D == 0 { d } else { D };
+    let (mut components, frame) = (zeros(d), &frame[..d * d]);
+    for v in vectors.chunks_exact_mut(d) {
+        let components = &mut components[..d];
+        (0..d).for_each(|axis| components[axis] = (0..d).map(|c| frame[axis * d + c] * v[c]).sum());
+        (0..d).for_each(|axis| v[axis] = components[axis]);
     }
-    components
 }
 
 /// Orthonormal principal axes of differences `[k, d]` about their mean, the direction of least variance last; and the standard
 /// deviation along the last but one against that along the first.
-fn principal_axes(differences: &[f64], d: usize) -> (Small, f64) {
+fn principal_axes<const D: usize>(differences: &[f64], d: usize) -> (Small, f64) {
+    let d = if D == 0 { d } else { D };
     let n = (differences.len() / d) as f64;
     let mut mean = zeros(d);
     for v in differences.chunks_exact(d) {

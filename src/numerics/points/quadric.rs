@@ -3,8 +3,13 @@
 //! A second opinion on normals and curvatures that knows neither kernel nor length scale: it sees the positions of a few
 //! neighbours and nothing else.
 
-use super::patch::{Patch, PatchNumbers};
+use smallvec::SmallVec;
+
+use super::patch::Patch;
 use crate::numerics::machine::small::{Small, zeros};
+
+/// The numbers of a least-squares problem, on the stack for a surface in space.
+type Columns = SmallVec<[f64; 128]>;
 
 /// Neighbours per coefficient of a quadric: 18 for surfaces in space.
 const NEIGHBOURS_PER_COEFFICIENT: usize = 3;
@@ -42,17 +47,22 @@ impl Quadric {
         if n < p {
             return None;
         }
-        let mut columns = PatchNumbers::from_elem(1.0, n * p);
-        let mut heights = PatchNumbers::with_capacity(n);
-        for (i, t) in patch.coordinates().chunks_exact(d).enumerate() {
-            let mut monomials = columns[n..].iter_mut().skip(i).step_by(n);
-            let mut put = |x: f64| monomials.next().into_iter().for_each(|slot| *slot = x);
-            t[..k].iter().for_each(|&x| put(x));
-            for a in 0..k {
-                (a..k).for_each(|b| put(if a == b { 0.5 * t[a] * t[a] } else { t[a] * t[b] }));
-            }
-            heights.push(t[k]);
+        // 1, the tangential coordinates, their products.
+        let mut columns = Columns::from_elem(1.0, n * p);
+        let (linear, products) = columns[n..].split_at_mut(k * n);
+        let coordinate = |axis| patch.coordinates().iter().skip(axis).step_by(d);
+        for (axis, column) in linear.chunks_exact_mut(n).enumerate() {
+            column.iter_mut().zip(coordinate(axis)).for_each(|(slot, t)| *slot = *t);
         }
+        let mut products = products.chunks_exact_mut(n);
+        for (a, left) in linear.chunks_exact(n).enumerate() {
+            for ((b, right), column) in linear.chunks_exact(n).enumerate().skip(a).zip(&mut products) {
+                let factor = if a == b { 0.5 } else { 1.0 };
+                let both = left.iter().zip(right);
+                column.iter_mut().zip(both).for_each(|(slot, (l, r))| *slot = factor * l * r);
+            }
+        }
+        let mut heights: Columns = coordinate(k).copied().collect();
         let (coefficients, squared_residual) = least_squares(&mut columns, &mut heights, p)?;
         let mut hessian = zeros(k * k);
         let mut at = d;

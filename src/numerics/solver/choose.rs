@@ -7,7 +7,6 @@ use super::dense::Dense;
 use super::kind::SolverKind;
 use crate::numerics::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
 use crate::numerics::points::quadric::n_coefficients;
-use crate::numerics::sums::symmetric::N_STRIPS;
 
 /// Why a solver was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,8 +166,8 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
     Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
 }
 
-/// Numbers that a solve for new values takes at a point: values, weights and residuals, and a sum for each strip of the matrix.
-const NUMBERS_AT_POINT: usize = 8 + N_STRIPS;
+/// Numbers that a solve for new values takes at a point: values, weights, sums and residuals.
+const NUMBERS_AT_POINT: usize = 10;
 
 /// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, and what is said about it.
 fn numbers_at_query(dimension: usize) -> usize {

@@ -28,7 +28,10 @@ impl Expansion<'_> {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Jets, NumericsError> {
-        Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer)
+        match std::ptr::eq(queries, self.centres) && order == JetOrder::Hessian {
+            true => Jets::at_points(self.centres, self.kernel, self.weights, observer),
+            false => Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer),
+        }
     }
 
     /// u at queries alone, `[m]`; where they are the centres themselves, by half of the pairs.

@@ -10,9 +10,6 @@ use crate::numerics::machine::registers::{BLOCK, Block, Pack};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 
-/// Strips of rows whose sums are kept apart and added in order, so that the result does not depend on the number of threads.
-pub(crate) const N_STRIPS: usize = 16;
-
 /// `Σ_j λ_j k(x_i, x_j)` at every point of the cloud, `[n]`.
 ///
 /// # Errors
@@ -24,68 +21,96 @@ pub(crate) fn kernel_times(
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
     let (nodes, weights) = (Nodes::of(cloud), blocked(weights));
-    let strip = |first: usize| {
-        let mut sums = vec![Block::ZERO; weights.len()];
-        for row in (first..weights.len()).step_by(N_STRIPS) {
-            observer.checkpoint()?;
-            nodes.dispatch(RowBlock {
-                nodes: &nodes,
-                kernel,
-                weights: &weights,
-                cloud,
-                row,
-                sums: &mut sums,
-            });
-        }
-        Ok(sums)
+    let pair = |a: Share<'_>, b: Option<Share<'_>>| {
+        nodes.dispatch(BlockPair { nodes: &nodes, kernel, weights: &weights, cloud, a, b });
     };
-    let n_strips = N_STRIPS.min(weights.len());
-    let strips: Vec<Vec<Block>> =
-        (0..n_strips).into_par_iter().map(strip).collect::<Result<_, NumericsError>>()?;
-    let at = |point: usize| strips.iter().map(|sums| sums[point / BLOCK].0[point % BLOCK]).sum::<f64>();
-    let products: Vec<f64> = (0..cloud.n_points()).map(|point| kernel.variance() * at(point)).collect();
+    let sums = sum_pairs(weights.len(), 1, pair, observer)?;
+    let sums = sums.iter().flat_map(|block| block.0);
+    let products: Vec<f64> = sums.take(cloud.n_points()).map(|sum| kernel.variance() * sum).collect();
     match products.iter().position(|x| !x.is_finite()) {
         Some(query) => Err(NumericsError::Overflow { query }),
         None => Ok(products),
     }
 }
 
-/// The pairs of the points of one block with those of that block and all behind it.
-struct RowBlock<'a> {
+/// A block of points with its sums.
+pub(crate) type Share<'a> = (usize, &'a mut [Block]);
+
+/// Sums `[n_blocks, n_sums]` over all pairs of blocks: `pair` adds what the points of a block give one another, or those of two
+/// each other, the smaller index first.
+///
+/// Like rounds of a tournament, in each of which every block meets one other: no two tasks write to the same sums, and the
+/// order in which a block meets the others depends on nothing but their number.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`].
+pub(crate) fn sum_pairs(
+    n_blocks: usize,
+    n_sums: usize,
+    pair: impl Fn(Share<'_>, Option<Share<'_>>) + Sync,
+    observer: &dyn Observer,
+) -> Result<Vec<Block>, NumericsError> {
+    let mut sums = vec![Block::ZERO; n_blocks * n_sums];
+    let mut seats: Vec<Option<Share<'_>>> = sums.chunks_exact_mut(n_sums).enumerate().map(Some).collect();
+    seats.par_iter_mut().flatten().for_each(|(block, sums)| pair((*block, sums), None));
+    if seats.len() % 2 == 1 {
+        seats.push(None);
+    }
+    let half = seats.len() / 2;
+    for _ in 1..seats.len() {
+        observer.checkpoint()?;
+        let (left, right) = seats.split_at_mut(half);
+        left.par_iter_mut().zip(right.par_iter_mut().rev()).for_each(|both| {
+            // Of an odd number one sits out.
+            let (Some((a, of_a)), Some((b, of_b))) = both else { return };
+            if a < b { pair((*a, of_a), Some((*b, of_b))) } else { pair((*b, of_b), Some((*a, of_a))) }
+        });
+        // All but the first move on by one.
+        seats[1..].rotate_right(1);
+    }
+    Ok(sums)
+}
+
+/// The pairs of the points of a block with those of another, or with one another.
+struct BlockPair<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
     weights: &'a [Block],
     cloud: &'a Cloud,
-    row: usize,
-    sums: &'a mut [Block],
+    a: Share<'a>,
+    b: Option<Share<'a>>,
 }
 
-impl WithSimd for RowBlock<'_> {
+impl WithSimd for BlockPair<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { nodes, kernel, weights, cloud, row, sums } = self;
-        let start = row * BLOCK;
-        for point in start..cloud.n_points().min(start + BLOCK) {
-            let (x, weight) = (cloud.point(point), weights[row].0[point - start]);
+        let Self { nodes, kernel, weights, cloud, a: (row, own), b } = self;
+        // Within a block both of a pair take their turn: what is mirrored is not wanted.
+        let mut unwanted = Block::ZERO;
+        let (block, mirrored) = match b {
+            Some((block, sums)) => (block, &mut sums[0]),
+            None => (row, &mut unwanted),
+        };
+        for (at, point) in block_points(cloud, row).enumerate() {
             let mut sum = Pack::<S, 1>::splat(simd, 0.0);
-            for block in row..weights.len() {
-                let (others, sum, mirrored) = (&weights[block], &mut sum, &mut sums[block]);
-                let position = (nodes, kernel, x, block);
-                if block == row {
-                    kernel.profiles(Row::<S, false> { simd, position, weight, others, sum, mirrored });
-                } else {
-                    kernel.profiles(Row::<S, true> { simd, position, weight, others, sum, mirrored });
-                }
-            }
-            sums[row].0[point - start] += sum.sum_lanes();
+            let (position, weight) = ((nodes, kernel, cloud.point(point), block), weights[row].0[at]);
+            let (others, sum_here) = (&weights[block], &mut sum);
+            let mirrored = &mut *mirrored;
+            kernel.profiles(Row::<S> { simd, position, weight, others, sum: sum_here, mirrored });
+            own[0].0[at] += sum.sum_lanes();
         }
     }
 }
 
-/// One point with a block: its own sum, and where the block is another than its own that of each point there.
-struct Row<'a, S: Simd, const IS_MIRRORED: bool> {
+/// The points of a block; the last one may have fewer.
+pub(crate) fn block_points(cloud: &Cloud, block: usize) -> std::ops::Range<usize> {
+    block * BLOCK..cloud.n_points().min((block + 1) * BLOCK)
+}
+
+/// One point with a block: its own sum, and that of each point there.
+struct Row<'a, S: Simd> {
     simd: S,
     position: (&'a Nodes, &'a Kernel, &'a [f64], usize),
     weight: f64,
@@ -94,7 +119,7 @@ struct Row<'a, S: Simd, const IS_MIRRORED: bool> {
     mirrored: &'a mut Block,
 }
 
-impl<S: Simd, const IS_MIRRORED: bool> Pairs<S> for Row<'_, S, IS_MIRRORED> {
+impl<S: Simd> Pairs<S> for Row<'_, S> {
     type Others = ();
 
     #[inline(always)]
@@ -106,11 +131,9 @@ impl<S: Simd, const IS_MIRRORED: bool> Pairs<S> for Row<'_, S, IS_MIRRORED> {
     #[inline(always)]
     fn take(&mut self, at: usize, (): (), [phi, ..]: [Pack<S>; 3]) {
         let others = Pack::load(self.simd, self.others, at);
-        *self.sum = *self.sum + (others * phi).sum_registers();
-        if IS_MIRRORED {
-            let own = Pack::splat(self.simd, self.weight);
-            own.mul_add(phi, Pack::load(self.simd, self.mirrored, at)).store(self.mirrored, at);
-        }
+        *self.sum = others.add_products_to(phi, *self.sum);
+        let own = Pack::splat(self.simd, self.weight);
+        own.mul_add(phi, Pack::load(self.simd, self.mirrored, at)).store(self.mirrored, at);
     }
 }
 
@@ -123,8 +146,8 @@ mod tests {
 
     #[test]
     fn products_are_the_values_at_the_points() {
-        // Less than a block, one, one and a point, and more row blocks than strips.
-        for n in [1, 128, 129, 2500] {
+        // Less than a block, one, one and a point, an odd and an even number of blocks.
+        for n in [1, 128, 129, 700, 2500] {
             let cloud = fibonacci_sphere(n);
             let weights: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();
             for family in all_families() {

@@ -3,8 +3,9 @@
 //! A kernel that is too wide or too narrow for the sampling gives smooth, wrong curvatures. Two opinions that do not depend
 //! on it are at hand (T4): a quadric through some neighbours, cheap and coarse, and the offset model on a patch, which costs
 //! as much as a hundred quadrics. Where the quadric agrees, nothing more is asked; where it does not, the patch decides.
-//! Clouds so small that no patch lies on one side of them have a third (T3): whether the signature function would have
-//! predicted the points nearby, had each of them been left out.
+//! Small clouds, of which a patch may see both sides, have a third (T3): whether the signature function would have predicted
+//! the points nearby, had each of them been left out. It is there for all points at the price of a few patches, so where
+//! the quadric agrees by half it is asked before the patch is.
 
 use super::Surface;
 use super::curvature::principal_curvatures;
@@ -19,6 +20,9 @@ const CONFIRMED_BY_PATCH: f64 = 0.10;
 
 /// The same for answers of the patch itself: the quadric is the coarser of the two.
 const CONFIRMED_OFFSET: f64 = 0.20;
+
+/// The difference from the quadric up to which leaving points out is asked before the patch.
+const CONFIRMED_WITH_PREDICTION: f64 = 0.10;
 
 /// Standard error of the curvatures of the quadric, against the largest curvature, beyond which nothing is confirmed: quadric and
 /// patch follow the same noise, and agree by chance.
@@ -38,6 +42,9 @@ const PREDICTED_TURN: f64 = 1.2;
 
 /// T3: the level surface may miss a point that was left out by this fraction of `h_q² κ`.
 const LEFT_OUT_MISS: f64 = 0.01;
+
+/// The same where it stands in for the patch, which is the surer of the two.
+const LEFT_OUT_SURELY: f64 = 0.002;
 
 /// Curvatures at a query, to be confirmed.
 pub(crate) struct Unconfirmed<'a> {
@@ -59,13 +66,19 @@ impl Unconfirmed<'_> {
     /// Whether the points around x confirm the curvatures.
     pub(crate) fn is_confirmed_by(&self, surface: &Surface) -> bool {
         let is_noisy = self.is_noisy(surface);
+        let difference = self.difference_from_quadric(surface).unwrap_or(f64::INFINITY);
         if self.is_offset {
-            let difference = self.difference_from_quadric(surface);
-            return !is_noisy && difference.is_some_and(|difference| difference <= CONFIRMED_OFFSET);
+            return !is_noisy && difference <= CONFIRMED_OFFSET;
         }
         let turn = self.largest() * self.spacing;
         let may_be_seen = turn <= RESOLVED_TURN && !is_noisy;
-        if may_be_seen && self.is_confirmed_by_quadric(surface) {
+        if may_be_seen && self.is_confirmed_by_quadric(difference) {
+            return true;
+        }
+        if may_be_seen
+            && difference <= CONFIRMED_WITH_PREDICTION
+            && self.is_predicted(surface, LEFT_OUT_SURELY)
+        {
             return true;
         }
         if !self.may_use_patch {
@@ -74,7 +87,7 @@ impl Unconfirmed<'_> {
         // Leaving points out needs no gate against noise: it does not predict noise.
         match self.is_confirmed_by_patch(surface) {
             Some(is_confirmed) => is_confirmed && may_be_seen,
-            None => turn <= PREDICTED_TURN && self.is_predicted(surface),
+            None => turn <= PREDICTED_TURN && self.is_predicted(surface, LEFT_OUT_MISS),
         }
     }
 
@@ -89,11 +102,9 @@ impl Unconfirmed<'_> {
         self.curvatures.iter().fold(0.0, |a: f64, k| a.max(k.abs()))
     }
 
-    fn is_confirmed_by_quadric(&self, surface: &Surface) -> bool {
+    fn is_confirmed_by_quadric(&self, difference: f64) -> bool {
         self.quadric.is_some_and(|quadric| quadric.bend() < QUADRIC_BEND)
-            && self
-                .difference_from_quadric(surface)
-                .is_some_and(|difference| difference <= CONFIRMED_BY_QUADRIC)
+            && difference <= CONFIRMED_BY_QUADRIC
     }
 
     fn difference_from_quadric(&self, surface: &Surface) -> Option<f64> {
@@ -116,9 +127,9 @@ impl Unconfirmed<'_> {
         self.curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
     }
 
-    /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ 0.01 |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
+    /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ share · |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
     /// that is left out (Rippa 1999).
-    fn is_predicted(&self, surface: &Surface) -> bool {
+    fn is_predicted(&self, surface: &Surface, share: f64) -> bool {
         let nearest =
             surface.sampling().neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
         // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
@@ -128,7 +139,7 @@ impl Unconfirmed<'_> {
             return false;
         }
         let Some(misses) = surface.left_out_misses() else { return false };
-        let allowed = LEFT_OUT_MISS * self.gradient_norm * self.spacing.powi(2) * self.largest();
+        let allowed = share * self.gradient_norm * self.spacing.powi(2) * self.largest();
         nearest.iter().all(|found| misses[found.point] <= allowed)
     }
 }

@@ -23,6 +23,7 @@ use crate::numerics::machine::vector::dot;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::count_duplicates;
 use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::patch::Patch;
 use crate::numerics::points::quadric::n_quadric_neighbours;
@@ -77,9 +78,11 @@ impl Surface {
         if cloud.dimension() < 2 {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
-        let (quadrics, _) = LocalQuadrics::of(cloud, sampling.neighbours(), cloud, observer)?;
+        let count = n_quadric_neighbours(cloud.dimension());
+        let around = Neighbourhoods::of(cloud, sampling.neighbours(), cloud, count, observer)?;
+        let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
         let directions = Directions::of(&signature, &sampling, &quadrics, observer)?;
-        let oriented = Oriented::of(cloud, &sampling, directions, &quadrics, given);
+        let oriented = Oriented::of(cloud, (&around, sampling.spacings()), directions, &quadrics, given);
         let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
         let (level, left_out_misses) = (Level::Signature(signature), OnceLock::new());

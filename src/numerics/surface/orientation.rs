@@ -15,8 +15,8 @@ use super::directions::Directions;
 use crate::numerics::machine::vector::{dot, unit};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
-use crate::numerics::points::neighbours::{Neighbour, Neighbours};
-use crate::numerics::points::sampling::Sampling;
+use crate::numerics::points::neighbourhoods::Neighbourhoods;
+use crate::numerics::points::neighbours::Neighbour;
 
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
@@ -56,10 +56,11 @@ pub(crate) struct Oriented {
 }
 
 impl Oriented {
-    /// Orients what is known of the normals; `given` are normals of the client, `[n, d]`, of any length but 0, which decide.
+    /// Orients what is known of the normals, among the neighbours of the points with their spacings, `[n]`; `given` are normals of
+    /// the client, `[n, d]`, of any length but 0, which decide.
     pub(crate) fn of(
         cloud: &Cloud,
-        sampling: &Sampling,
+        (around, spacings): (&Neighbourhoods, &[f64]),
         directions: Directions,
         quadrics: &LocalQuadrics,
         given: Option<&Cloud>,
@@ -68,7 +69,7 @@ impl Oriented {
             None => directions,
             Some(given) => Directions { normals: given.points().flat_map(unit).collect(), ..directions },
         };
-        let found = consistent_signs(cloud, sampling.neighbours(), sampling.spacings(), &directions);
+        let found = consistent_signs(cloud, around, spacings, &directions);
         let (is_open, is_consistent) = (found.is_open, found.is_resolved);
         if given.is_some() {
             let how = SurfaceOrientation { n_flipped: 0, is_open, is_given: true };
@@ -103,12 +104,12 @@ struct Signs {
 /// Makes the signs of normals consistent; `spacings` are mean distances to the nearest points, unit L, `[n]`.
 fn consistent_signs(
     cloud: &Cloud,
-    neighbours: &Neighbours,
+    around: &Neighbourhoods,
     spacings: &[f64],
     directions: &Directions,
 ) -> Signs {
     let n = cloud.n_points();
-    let edges = sheet_edges(cloud, neighbours, &directions.normals);
+    let edges = sheet_edges(cloud, around, &directions.normals);
     let mut pieces = SignedForest::new(n);
     for edge in &edges {
         let both_signed = directions.has_sign[edge.a] && directions.has_sign[edge.b];
@@ -172,7 +173,7 @@ struct Edge {
 /// Neighbouring points between which the surface bends like a sphere, up to the sign of the normals.
 ///
 /// On one sheet `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b` for consistent normals; two sheets at a distance t have `D·ν_a ≈ D·ν_b ≈ t`.
-fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<Edge> {
+fn sheet_edges(cloud: &Cloud, around: &Neighbourhoods, normals: &[f64]) -> Vec<Edge> {
     let d = cloud.dimension();
     let edge = |a: usize, found: &Neighbour| {
         let b = found.point;
@@ -186,8 +187,8 @@ fn sheet_edges(cloud: &Cloud, neighbours: &Neighbours, normals: &[f64]) -> Vec<E
         (weight > 0.01).then_some(Edge { a, b, cosine, weight })
     };
     let edges_of = |a: usize| {
-        let nearest = neighbours.nearest_elsewhere(cloud, cloud.point(a), n_neighbours(cloud));
-        nearest.into_iter().filter_map(move |found| edge(a, &found))
+        let elsewhere = around.around(a).iter().filter(|found| found.squared_distance > 0.0);
+        elsewhere.take(n_neighbours(cloud)).filter_map(move |found| edge(a, found))
     };
     (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
 }
@@ -310,7 +311,13 @@ impl SignedForest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::neighbours::Neighbours;
     use crate::numerics::testing::fibonacci_sphere;
+
+    fn around(cloud: &Cloud) -> Neighbourhoods {
+        Neighbourhoods::of(cloud, &Neighbours::of(cloud), cloud, 18, &Unobserved).unwrap()
+    }
 
     fn directions(cloud: &Cloud, normals: Vec<f64>) -> Directions {
         let n = cloud.n_points();
@@ -320,13 +327,13 @@ mod tests {
     #[test]
     fn a_flipped_region_of_a_sphere_is_turned_back() {
         let cloud = fibonacci_sphere(400);
-        let neighbours = Neighbours::of(&cloud);
+        let around = around(&cloud);
         for (height, expected) in [(0.3, 140), (-0.4, 280)] {
             // Normals point inward above the height: less than half of the sphere, and more.
             let sign = |x: &[f64]| if x[2] > height { -1.0 } else { 1.0 };
             let normals = cloud.points().flat_map(|x| x.iter().map(|c| sign(x) * c).collect::<Vec<_>>());
             let directions = directions(&cloud, normals.collect());
-            let signs = consistent_signs(&cloud, &neighbours, &[1.0; 400], &directions);
+            let signs = consistent_signs(&cloud, &around, &[1.0; 400], &directions);
             assert_eq!(signs.n_flipped, expected);
             assert!(cloud.points().zip(&signs.signs).all(|(x, &s)| s == sign(x)));
             assert!(!signs.is_open);
@@ -339,8 +346,7 @@ mod tests {
         let layer = |z: f64| (0..100).flat_map(move |i| [(i % 10) as f64, (i / 10) as f64, z]);
         let cloud = Cloud::new(layer(0.0).chain(layer(0.5)).collect(), 3).unwrap();
         let normals = (0..200).flat_map(|i| [0.0, 0.0, if i < 100 { -1.0 } else { 1.0 }]).collect();
-        let signs =
-            consistent_signs(&cloud, &Neighbours::of(&cloud), &[1.0; 200], &directions(&cloud, normals));
+        let signs = consistent_signs(&cloud, &around(&cloud), &[1.0; 200], &directions(&cloud, normals));
         assert_eq!(signs.n_flipped, 0);
     }
 
@@ -354,7 +360,7 @@ mod tests {
             .collect();
         let mut directions = directions(&cloud, normals);
         directions.has_sign = (0..300).map(|i| i % 3 != 0).collect();
-        let signs = consistent_signs(&cloud, &Neighbours::of(&cloud), &[1.0; 300], &directions);
+        let signs = consistent_signs(&cloud, &around(&cloud), &[1.0; 300], &directions);
         assert_eq!(signs.n_flipped, 0);
         assert!(signs.signs.iter().enumerate().all(|(i, &s)| s == if i % 3 == 0 { -1.0 } else { 1.0 }));
     }

@@ -16,7 +16,9 @@ use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::points::quadric::n_quadric_neighbours;
 use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
@@ -106,7 +108,7 @@ enum Surroundings {
     /// They are the points of the cloud, of which the surface knows.
     OfPoints,
     /// Their nearest points, and quadrics of their own where curvatures are held against them.
-    OfQueries { nearest: Vec<Neighbour>, quadrics: Option<LocalQuadrics> },
+    OfQueries { around: Neighbourhoods, quadrics: Option<LocalQuadrics> },
 }
 
 impl Surroundings {
@@ -122,16 +124,13 @@ impl Surroundings {
             return Ok(Self::OfPoints);
         }
         if checks_curvatures {
-            let (quadrics, nearest) = LocalQuadrics::of(cloud, neighbours, queries, observer)?;
-            return Ok(Self::OfQueries { nearest, quadrics: Some(quadrics) });
+            let count = n_quadric_neighbours(cloud.dimension());
+            let around = Neighbourhoods::of(cloud, neighbours, queries, count, observer)?;
+            let quadrics = Some(LocalQuadrics::of(cloud, &around, queries, observer)?);
+            return Ok(Self::OfQueries { around, quadrics });
         }
-        let find = |found: &mut Vec<Neighbour>, query: usize| {
-            observer.checkpoint()?;
-            neighbours.nearest_positions_into(cloud, queries.point(query), 1, found);
-            Ok(found.first().copied().unwrap_or(Neighbour { point: 0, squared_distance: 0.0 }))
-        };
-        let nearest = (0..queries.n_points()).into_par_iter().map_init(Vec::new, find);
-        Ok(Self::OfQueries { nearest: nearest.collect::<Result<_, NumericsError>>()?, quadrics: None })
+        let around = Neighbourhoods::of(cloud, neighbours, queries, 1, observer)?;
+        Ok(Self::OfQueries { around, quadrics: None })
     }
 }
 
@@ -208,12 +207,12 @@ impl Service<'_> {
             Surroundings::OfPoints => {
                 (Neighbour { point: query, squared_distance: 0.0 }, surface.quadric(query))
             }
-            Surroundings::OfQueries { nearest, quadrics: Some(quadrics) } => {
-                (nearest[query], quadrics.at(query))
+            Surroundings::OfQueries { around, quadrics: Some(quadrics) } => {
+                (around.nearest(query), quadrics.at(query))
             }
             // Normals are held against a quadric to see whether they are oblique; that of the nearest point is good enough.
-            Surroundings::OfQueries { nearest, quadrics: None } => {
-                let nearest = nearest[query];
+            Surroundings::OfQueries { around, quadrics: None } => {
+                let nearest = around.nearest(query);
                 let quadric = surface.quadric(nearest.point);
                 (nearest, quadric.map(|quadric| quadric.seen_from(surface.cloud().point(nearest.point), x)))
             }

@@ -1,5 +1,6 @@
 //! Value, gradient and Hessian of a kernel expansion at many queries, in one fused pass over the points per query.
 
+mod centres;
 mod pass;
 mod tiles;
 
@@ -63,6 +64,38 @@ impl Layout {
             JetOrder::HessianWithMagnitudes => self.magnitudes() + 2,
         }
     }
+
+    /// Sums over the points that a jet with a Hessian is made of: those of its entries, and `Σλφ′`.
+    fn n_sums(self) -> usize {
+        self.magnitudes() + 1
+    }
+
+    /// Turns the sums `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′` into as much of a jet as there is room for: factors
+    /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
+    ///
+    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
+    fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
+        let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
+        let trace = 2.0 * variance * sums[self.magnitudes()] * inverse * inverse;
+        let (mut row, mut column) = (0, 0);
+        for (at, (slot, sum)) in jet.iter_mut().zip(sums).enumerate() {
+            let sum = variance * sum;
+            *slot = match at {
+                0 => sum,
+                at if at < self.hessian() => 2.0 * sum * inverse * inverse,
+                _ => {
+                    let entry = 4.0 * sum * inverse * inverse * inverse * inverse;
+                    let entry = if row == column { entry + trace } else { entry };
+                    column += 1;
+                    if column == self.dimension {
+                        row += 1;
+                        column = row;
+                    }
+                    entry
+                }
+            };
+        }
+    }
 }
 
 impl Jets {
@@ -110,6 +143,27 @@ impl Jets {
                 None => Ok(()),
             }
         })?;
+        Ok(Self { packed, layout })
+    }
+
+    /// [`Jets::evaluate`] at the points of the cloud themselves to the second order, by half of the pairs where that pays.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn at_points(
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let order = JetOrder::Hessian;
+        if cloud.dimension() > centres::MAX_DIMENSION {
+            return Self::evaluate(cloud, kernel, weights, cloud, order, observer);
+        }
+        let nodes = Nodes::of(cloud);
+        let layout = Layout { order, dimension: cloud.dimension() };
+        let expansion = Expansion { nodes: &nodes, kernel, weights: &blocked(weights) };
+        let packed = centres::jets(expansion, cloud, layout, observer)?;
         Ok(Self { packed, layout })
     }
 

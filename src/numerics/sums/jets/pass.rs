@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::tiles::{Sum, WeightedBlock};
+use super::tiles::{ProfileBlock, Sum};
 use super::{JetOrder, Layout};
 use crate::numerics::kernel::{Kernel, Pairs};
 use crate::numerics::machine::registers::{Block, Pack};
@@ -32,53 +32,59 @@ impl WithSimd for Pass<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         match self.layout.order {
-            JetOrder::Value => self.run::<S, 0, false>(simd),
-            JetOrder::Gradient => self.run::<S, 1, false>(simd),
-            JetOrder::Hessian => self.run::<S, 2, false>(simd),
-            JetOrder::HessianWithMagnitudes => self.run::<S, 2, true>(simd),
+            JetOrder::Value => self.run::<S, 0>(simd),
+            JetOrder::Gradient => self.run::<S, 1>(simd),
+            JetOrder::Hessian | JetOrder::HessianWithMagnitudes => self.run::<S, 2>(simd),
         }
     }
 }
 
 impl Pass<'_> {
     #[inline(always)]
-    fn run<S: Simd, const ORDER: usize, const MAGNITUDES: bool>(self, simd: S) {
+    fn run<S: Simd, const ORDER: usize>(self, simd: S) {
         let Self { expansion, queries, first, jets, layout } = self;
+        let (kernel, has_magnitudes) = (expansion.kernel, layout.order == JetOrder::HessianWithMagnitudes);
         let mut sums = Sums::new(simd, layout.dimension);
+        let mut numbers = vec![0.0; layout.n_sums()];
         for (k, jet) in jets.chunks_exact_mut(layout.width()).enumerate() {
             let x = queries.point(first + k);
             sums.clear(simd);
             for block in 0..expansion.weights.len() {
-                let sums = &mut sums;
-                let pairs = Weighted::<S, ORDER, MAGNITUDES> { simd, expansion, block, x, sums };
-                expansion.kernel.profiles(pairs);
-                if ORDER >= 1 {
-                    sums.block.add_to::<S, ORDER>(simd, &mut sums.gradient, &mut sums.hessian);
+                sums.add::<ORDER>(simd, expansion, block, x);
+                if has_magnitudes {
+                    sums.block.add_magnitudes(simd, &expansion.weights[block], &mut sums.magnitudes);
                 }
             }
-            sums.finish::<ORDER, MAGNITUDES>(expansion.kernel, jet);
+            sums.write(&mut numbers);
+            let (jet, magnitudes) = jet.split_at_mut(jet.len() - if has_magnitudes { 2 } else { 0 });
+            layout.finish(kernel, &numbers, jet);
+            if let [value, slope] = magnitudes {
+                let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
+                *value = variance * sums.magnitudes[0].sum_lanes();
+                *slope = 2.0 * variance * sums.magnitudes[1].sum_lanes() * inverse * inverse;
+            }
         }
     }
 }
 
 /// What a pass has summed up for a query, and the block at hand.
-struct Sums<S: Simd> {
+pub(super) struct Sums<S: Simd> {
     /// `Σλφ`.
     value: Sum<S>,
     /// `Σλφ′`, which enters the whole diagonal of the Hessian.
     trace: Sum<S>,
-    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
+    /// `Σ|λ|φ` and `Σ|λφ′||D|`.
     magnitudes: [Sum<S>; 2],
     /// `Σλφ′D_a`.
     gradient: Vec<Sum<S>>,
     /// `Σλφ″D_aD_b`, a ≤ b, row by row.
     hessian: Vec<Sum<S>>,
-    block: WeightedBlock,
+    pub(super) block: ProfileBlock,
 }
 
 impl<S: Simd> Sums<S> {
     #[inline(always)]
-    fn new(simd: S, d: usize) -> Self {
+    pub(super) fn new(simd: S, d: usize) -> Self {
         let zero = Sum::splat(simd, 0.0);
         Self {
             value: zero,
@@ -86,58 +92,51 @@ impl<S: Simd> Sums<S> {
             magnitudes: [zero; 2],
             gradient: vec![zero; d],
             hessian: vec![zero; d * (d + 1) / 2],
-            block: WeightedBlock::zero(d),
+            block: ProfileBlock::zero(d),
         }
     }
 
     #[inline(always)]
-    fn clear(&mut self, simd: S) {
+    pub(super) fn clear(&mut self, simd: S) {
         let zero = Sum::splat(simd, 0.0);
         (self.value, self.trace, self.magnitudes) = (zero, zero, [zero; 2]);
         self.gradient.fill(zero);
         self.hessian.fill(zero);
     }
 
-    /// Turns the sums into a jet: factors `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
-    ///
-    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
+    /// Adds what the points of a block give x.
     #[inline(always)]
-    fn finish<const ORDER: usize, const MAGNITUDES: bool>(&self, kernel: &Kernel, jet: &mut [f64]) {
-        let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
-        let mut jet = jet.iter_mut();
-        let mut put = |number: f64| {
-            if let Some(slot) = jet.next() {
-                *slot = number;
-            }
-        };
-        put(variance * self.value.sum_lanes());
-        if ORDER == 0 {
-            return;
+    pub(super) fn add<const ORDER: usize>(
+        &mut self,
+        simd: S,
+        expansion: Expansion<'_>,
+        block: usize,
+        x: &[f64],
+    ) {
+        expansion.kernel.profiles(Weighted::<S, ORDER> { simd, expansion, block, x, sums: self });
+        if ORDER >= 1 {
+            let weights = &expansion.weights[block];
+            self.block.add_to::<S, ORDER>(simd, weights, &mut self.gradient, &mut self.hessian);
         }
-        for sum in &self.gradient {
-            put(2.0 * (variance * sum.sum_lanes()) * inverse * inverse);
-        }
-        if ORDER == 1 {
-            return;
-        }
+    }
+
+    /// Writes the sums in the order of [`Layout::finish`].
+    #[inline(always)]
+    pub(super) fn write(&self, numbers: &mut [f64]) {
         let d = self.gradient.len();
-        let trace_term = 2.0 * variance * self.trace.sum_lanes() * inverse * inverse;
-        let mut packed = self.hessian.iter();
-        for a in 0..d {
-            for (b, sum) in (a..d).zip(&mut packed) {
-                let entry = 4.0 * (variance * sum.sum_lanes()) * inverse * inverse * inverse * inverse;
-                put(if a == b { entry + trace_term } else { entry });
-            }
+        numbers[0] = self.value.sum_lanes();
+        for (number, sum) in numbers[1..].iter_mut().zip(&self.gradient) {
+            *number = sum.sum_lanes();
         }
-        if MAGNITUDES {
-            put(variance * self.magnitudes[0].sum_lanes());
-            put(variance * self.magnitudes[1].sum_lanes() * 2.0 * inverse);
+        for (number, sum) in numbers[1 + d..].iter_mut().zip(&self.hessian) {
+            *number = sum.sum_lanes();
         }
+        numbers[1 + d + self.hessian.len()] = self.trace.sum_lanes();
     }
 }
 
-/// Computes a block's differences and weighted profiles, and adds up what needs no difference.
-struct Weighted<'a, S: Simd, const ORDER: usize, const MAGNITUDES: bool> {
+/// Computes a block's differences and profiles, and adds up what needs no difference.
+struct Weighted<'a, S: Simd, const ORDER: usize> {
     simd: S,
     expansion: Expansion<'a>,
     block: usize,
@@ -145,11 +144,11 @@ struct Weighted<'a, S: Simd, const ORDER: usize, const MAGNITUDES: bool> {
     sums: &'a mut Sums<S>,
 }
 
-impl<S: Simd, const ORDER: usize, const MAGNITUDES: bool> Pairs<S> for Weighted<'_, S, ORDER, MAGNITUDES> {
-    type Others = Pack<S>;
+impl<S: Simd, const ORDER: usize> Pairs<S> for Weighted<'_, S, ORDER> {
+    type Others = ();
 
     #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
+    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
         let Expansion { nodes, kernel, .. } = self.expansion;
         let differences = &mut self.sums.block.differences;
         let q = nodes.scaled_distances(self.simd, (self.block, at), self.x, kernel, |c, difference| {
@@ -157,25 +156,21 @@ impl<S: Simd, const ORDER: usize, const MAGNITUDES: bool> Pairs<S> for Weighted<
                 difference.store(&mut differences[c], at);
             }
         });
-        (q, q)
+        (q, ())
     }
 
     #[inline(always)]
-    fn take(&mut self, at: usize, q: Pack<S>, [phi, slope, bend]: [Pack<S>; 3]) {
+    fn take(&mut self, at: usize, (): (), [phi, slope, bend]: [Pack<S>; 3]) {
         let weight = Pack::load(self.simd, &self.expansion.weights[self.block], at);
         let sums = &mut *self.sums;
-        sums.value = sums.value + (weight * phi).sum_registers();
+        sums.value = weight.add_products_to(phi, sums.value);
         if ORDER >= 1 {
-            (weight * slope).store(&mut sums.block.first, at);
+            slope.store(&mut sums.block.profiles[1], at);
         }
         if ORDER >= 2 {
-            sums.trace = sums.trace + (weight * slope).sum_registers();
-            (weight * bend).store(&mut sums.block.second, at);
-        }
-        if MAGNITUDES {
-            let weight = weight.abs();
-            sums.magnitudes[0] = sums.magnitudes[0] + (weight * phi).sum_registers();
-            sums.magnitudes[1] = sums.magnitudes[1] - (weight * slope * q.sqrt()).sum_registers();
+            sums.trace = weight.add_products_to(slope, sums.trace);
+            phi.store(&mut sums.block.profiles[0], at);
+            bend.store(&mut sums.block.profiles[2], at);
         }
     }
 }
