@@ -37,8 +37,7 @@ fn main() {
         let (factor, factorize) = timed(|| Arc::new(factorize(&cloud)));
         let (_, matrix) = timed(|| laplace_beltrami(&factor));
         let (_, variance) = timed(|| variances(&factor, &queries, &Unobserved).unwrap());
-        let passes =
-            [("pass_gradient", JetOrder::Gradient), ("pass_hessian", JetOrder::HessianWithMagnitudes)];
+        let passes = [("pass_gradient", JetOrder::Gradient), ("pass_hessian", JetOrder::Hessian)];
         let mut times = vec![
             ("laplace_beltrami", factorize + matrix),
             ("variances", factorize + variance),

@@ -190,7 +190,8 @@ impl ProfileBlock {
                 square = difference.mul_add(difference, square);
             }
             magnitudes[0] = weight.mul_add(phi, magnitudes[0]);
-            magnitudes[1] = (-(weight * slope)).mul_add(square.sqrt(), magnitudes[1]);
+            let (distance, _) = square.at_least(1e-200).at_most(1e300).sqrt_and_inverse();
+            magnitudes[1] = (-(weight * slope)).mul_add(distance, magnitudes[1]);
         }
     }
 }
