@@ -140,7 +140,7 @@ fn neighbours() {
     measured(|| Neighbours::of(&cloud).spacings(&cloud));
 }
 
-/// Tree, local fits, jets with magnitudes and orientation.
+/// Tree, local fits, jets at the points and orientation.
 fn surface() {
     let signature = fits::signature(&fits::factorize(&fibonacci_sphere(600), kernel(MATERN), 1e-6));
     measured(|| Surface::of(signature, None, &Unobserved)).unwrap();

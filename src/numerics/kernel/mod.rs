@@ -18,7 +18,7 @@ use pulp::Simd;
 use super::error::NumericsError;
 pub use family::Family;
 pub use matern::MAX_MATERN_ORDER;
-pub(crate) use profile::Pairs;
+pub(crate) use profile::{HUGE, Pairs, distance_and_inverse};
 pub use wendland::WendlandSmoothness;
 
 /// What `2|φ′|√q = ℓ|∇k|/variance` never exceeds, in any family: Wendland's of smoothness 6 comes to 2.8.

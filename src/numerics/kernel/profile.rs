@@ -8,12 +8,15 @@ use crate::numerics::machine::registers::Pack;
 /// unbounded at 0 divide by at least this, so that they stay finite and D = 0 annihilates them there.
 pub(super) const TINY: f64 = 1e-100;
 
-/// Squared scaled distance beyond which no profile is seen.
-pub(super) const HUGE: f64 = 1e300;
+/// Squared scaled distance beyond which profiles do not change any more in a way that shows.
+pub(crate) const HUGE: f64 = 1e300;
 
 /// √q and 1/√q for q up to a bound of at most [`HUGE`], the root at least [`TINY`].
 #[inline(always)]
-pub(super) fn distance_and_inverse<S: Simd>(q: Pack<S>, at_most: f64) -> (Pack<S>, Pack<S>) {
+pub(crate) fn distance_and_inverse<S: Simd, const N: usize>(
+    q: Pack<S, N>,
+    at_most: f64,
+) -> (Pack<S, N>, Pack<S, N>) {
     q.at_least(TINY * TINY).at_most(at_most).sqrt_and_inverse()
 }
 

@@ -262,12 +262,13 @@ mod tests {
         numbers.extend((1..5000).map(|i| f64::from(i * i)));
         for set in InstructionSet::available() {
             for (&x, (root, inverse)) in numbers.iter().zip(set.dispatch(Roots(&numbers))) {
-                // root² − x to the last bit, in units of the root: an ulp of r is at least ε r/2.
+                // root² − x to the last bit, in units of the root.
                 let error = root.mul_add(root, -x) / (2.0 * root);
-                assert!(error.abs() <= f64::EPSILON * root, "√{x:e} on {}: off by {error:e}", set.name());
-                // The same of inverse·√x − 1, in relative terms, √x being within half an ulp.
-                let error = inverse.mul_add(x.sqrt(), -1.0);
-                assert!(error.abs() <= 2.0 * f64::EPSILON, "1/√{x:e} on {}: off by {error:e}", set.name());
+                assert!(error.abs() <= root.next_up() - root, "√{x:e} on {}: off by {error:e}", set.name());
+                // inverse²·x − 1 by the root and what that lacks: inverse·root is rounded once, ε/4 of an ulp at most.
+                let product = inverse.mul_add(root, -1.0) - inverse * error;
+                let allowed = 2.0 * (inverse.next_up() - inverse) / inverse;
+                assert!(product.abs() <= allowed, "1/√{x:e} on {}: off by {product:e}", set.name());
             }
         }
     }

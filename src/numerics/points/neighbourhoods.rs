@@ -48,3 +48,24 @@ impl Neighbourhoods {
         self.found[query * self.count]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::observer::Unobserved;
+
+    fn around(coordinates: &[f64], count: usize) -> Vec<Vec<usize>> {
+        let cloud = Cloud::new(coordinates.to_vec(), 1).unwrap();
+        let found = Neighbourhoods::of(&cloud, &Neighbours::of(&cloud), &cloud, count, &Unobserved).unwrap();
+        (0..cloud.n_points()).map(|point| found.around(point).iter().map(|n| n.point).collect()).collect()
+    }
+
+    #[test]
+    fn every_position_is_seen_once_and_no_more_than_there_are() {
+        assert_eq!(around(&[0.0, 1.0, 3.0], 2), [[0, 1], [1, 0], [2, 1]]);
+        assert_eq!(around(&[0.0, 1.0, 3.0], 18), [[0, 1, 2], [1, 0, 2], [2, 1, 0]]);
+        // Copies see, and are seen by their first.
+        assert_eq!(around(&[0.0, 2.0, 2.0, 2.0], 18), [[0, 1], [1, 0], [1, 0], [1, 0]]);
+        assert_eq!(around(&[5.0, 5.0], 18), [[0], [0]]);
+    }
+}

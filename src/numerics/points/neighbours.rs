@@ -297,6 +297,21 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn nearest_agrees_with_a_scan_to_the_last_bit(
+            d in 1usize..5,
+            coordinates in prop::collection::vec(-1.0f64..1.0, 60..400),
+            query in prop::collection::vec(-1.5f64..1.5, 5),
+            count in 1usize..20,
+        ) {
+            let n = coordinates.len() / d;
+            let cloud = Cloud::new(coordinates[..n * d].to_vec(), d).unwrap();
+            let tree = Neighbours::of(&cloud);
+            prop_assert_eq!(tree.nearest(&cloud, &query[..d], count), brute_force(&cloud, &query[..d], count));
+        }
+    }
+
     #[test]
     fn coinciding_points_are_not_neighbours_elsewhere() {
         let cloud = Cloud::new(vec![0.0, 0.0, 3.0], 1).unwrap();

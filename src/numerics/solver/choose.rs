@@ -6,7 +6,7 @@
 use super::dense::Dense;
 use super::kind::SolverKind;
 use crate::numerics::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
-use crate::numerics::points::quadric::n_coefficients;
+use crate::numerics::points::quadric::{n_coefficients, n_quadric_neighbours};
 
 /// Why a solver was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,8 +132,8 @@ pub enum Asked {
 /// What answering m queries takes, beside the numbers of the answer.
 pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: usize) -> Price {
     let (n, m, d) = (n_points as f64, n_queries as f64, dimension as f64);
-    let (at_points, at_queries) =
-        (NUMBERS_AT_POINT * n_points, n_queries.saturating_mul(numbers_at_query(dimension)));
+    let at_points = n_points.saturating_mul(numbers_at_point(dimension));
+    let at_queries = n_queries.saturating_mul(numbers_at_query(dimension));
     let jets = n_queries.saturating_mul(1 + dimension + dimension * dimension);
     let (flops, n_numbers) = match asked {
         Asked::Function => (40.0 * n * (n + m), at_points.saturating_add(jets)),
@@ -146,7 +146,7 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
             let flops = 40.0 * n * (n + m)
                 + if whitened > 0 { n * n * m } else { 0.0 }
                 + if covariance { n * m * m } else { 0.0 };
-            let n_numbers = whitened.saturating_add(NUMBERS_AT_POINT).saturating_mul(n_points);
+            let n_numbers = whitened.saturating_add(numbers_at_point(dimension)).saturating_mul(n_points);
             (flops, n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)))
         }
         Asked::Geometry { offsets } => {
@@ -156,7 +156,13 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
         Asked::Operator { n_surface_points } => {
             let n_all = n_points + n_surface_points;
             let flops = 60.0 * n_all as f64 * (n_all as f64 + m) + Offsets::Confirmations.flops(n_queries);
-            (flops, (NUMBERS_AT_POINT * n_all).saturating_add(at_queries).saturating_add(jets))
+            (
+                flops,
+                n_all
+                    .saturating_mul(numbers_at_point(dimension))
+                    .saturating_add(at_queries)
+                    .saturating_add(jets),
+            )
         }
         Asked::OperatorMatrix { n_surface_points, n_rows } => {
             let sums = 60.0 * n_surface_points as f64 * m + Offsets::Confirmations.flops(n_queries);
@@ -166,12 +172,16 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
     Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
 }
 
-/// Numbers that a solve for new values takes at a point: values, weights, sums and residuals.
-const NUMBERS_AT_POINT: usize = 10;
+/// Numbers that a solve for new values takes at a point: the point, its value, two sets of weights with their sums and residuals
+/// while one is refined, and a correction.
+fn numbers_at_point(dimension: usize) -> usize {
+    10 + dimension
+}
 
-/// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, and what is said about it.
+/// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, what is said about it, and its
+/// neighbours.
 fn numbers_at_query(dimension: usize) -> usize {
-    20 + 6 * dimension * dimension
+    20 + 6 * dimension * dimension + 2 * n_quadric_neighbours(dimension)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! as much as a hundred quadrics. Where the quadric agrees, nothing more is asked; where it does not, the patch decides.
 //! Small clouds, of which a patch may see both sides, have a third (T3): whether the signature function would have predicted
 //! the points nearby, had each of them been left out. It is there for all points at the price of a few patches, so where
-//! the quadric agrees by half it is asked before the patch is.
+//! the quadric nearly agrees it is asked before the patch is.
 
 use super::Surface;
 use super::curvature::principal_curvatures;
@@ -130,6 +130,7 @@ impl Unconfirmed<'_> {
     /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ share · |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
     /// that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &Surface, share: f64) -> bool {
+        let Some(misses) = surface.left_out_misses() else { return false };
         let nearest =
             surface.sampling().neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
         // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
@@ -138,7 +139,6 @@ impl Unconfirmed<'_> {
         if !is_at_point || self.quadric.is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable()) {
             return false;
         }
-        let Some(misses) = surface.left_out_misses() else { return false };
         let allowed = share * self.gradient_norm * self.spacing.powi(2) * self.largest();
         nearest.iter().all(|found| misses[found.point] <= allowed)
     }

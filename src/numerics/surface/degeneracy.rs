@@ -62,7 +62,7 @@ const FAR_SPACINGS: f64 = 3.0;
 
 /// T1 at each query: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
 ///
-/// The sums of magnitudes take a third of a pass over all pairs. They are at most `Σ|λ_j|` times the greatest values of k and
+/// The sums of magnitudes take half of a pass over all pairs more. They are at most `Σ|λ_j|` times the greatest values of k and
 /// ℓ|∇k|, which nearly every gradient exceeds; only the others are asked for theirs.
 ///
 /// # Errors

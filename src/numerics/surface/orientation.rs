@@ -17,6 +17,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
 use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::points::quadric::n_quadric_neighbours;
 
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
@@ -186,6 +187,10 @@ fn sheet_edges(cloud: &Cloud, around: &Neighbourhoods, normals: &[f64]) -> Vec<E
         let weight = cosine * cosine * (1.0 - 2.0 * across / found.squared_distance.sqrt());
         (weight > 0.01).then_some(Edge { a, b, cosine, weight })
     };
+    debug_assert!(
+        n_neighbours(cloud) < n_quadric_neighbours(d),
+        "itself and those that it shares edges with"
+    );
     let edges_of = |a: usize| {
         let elsewhere = around.around(a).iter().filter(|found| found.squared_distance > 0.0);
         elsewhere.take(n_neighbours(cloud)).filter_map(move |found| edge(a, found))

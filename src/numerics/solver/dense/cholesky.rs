@@ -8,7 +8,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use super::packed::Packed;
 use super::parallelism;
@@ -100,6 +100,11 @@ impl Cholesky {
             return solve_forward(&self.packed, x);
         }
         let par = self.parallelism(rhs.ncols());
+        self.whiten_with(rhs, par);
+    }
+
+    /// The same with this parallelism.
+    pub(super) fn whiten_with(&self, rhs: MatMut<'_, f64>, par: Par) {
         let (l11, l21, l22) = self.parts();
         let (mut first, mut second) = rhs.split_at_row_mut(l11.nrows());
         solve_lower_triangular_in_place(l11, first.rb_mut(), par);
@@ -119,7 +124,7 @@ impl Cholesky {
         (l11, l21, self.packed.second_transposed().transpose())
     }
 
-    fn parallelism(&self, n_columns: usize) -> faer::Par {
+    fn parallelism(&self, n_columns: usize) -> Par {
         parallelism((self.packed.n_points() * self.packed.n_points() * n_columns) as f64)
     }
 }

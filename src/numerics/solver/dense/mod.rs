@@ -188,7 +188,8 @@ impl Dense {
     pub(super) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
         let n = self.system.n_points();
         let mut inverse = Mat::<f64>::identity(n, n);
-        self.cholesky()?.whiten_in_place(inverse.as_mut());
+        // On one thread: who asks for it is one of many tasks, and a thread that waits would take up another that asks as well.
+        self.cholesky()?.whiten_with(inverse.as_mut(), Par::Seq);
         Ok((0..n).map(|i| inverse.col(i).squared_norm_l2()).collect())
     }
 

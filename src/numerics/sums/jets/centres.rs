@@ -7,13 +7,16 @@ use super::Layout;
 use super::pass::{Expansion, Sums};
 use super::tiles::mirror;
 use crate::numerics::error::NumericsError;
-use crate::numerics::machine::registers::BLOCK;
+use crate::numerics::machine::registers::{BLOCK, Block};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::sums::symmetric::{Share, block_points, sum_pairs};
 
 /// Beyond it the sums of a point take more memory and time than the kernel.
 pub(super) const MAX_DIMENSION: usize = 3;
+
+/// Below it there are too few pairs of blocks for all threads.
+pub(super) const MIN_POINTS: usize = 8 * BLOCK;
 
 /// Jets of order 2 at all points, `[n, layout.width()]`.
 ///
@@ -57,9 +60,11 @@ impl WithSimd for BlockPair<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { expansion, cloud, a: (row, own), b: mut other } = self;
+        let Self { expansion, cloud, a: (row, own), b: other } = self;
         let d = cloud.dimension();
         let (mut sums, mut numbers) = ([Sums::new(simd, d), Sums::new(simd, d)], vec![0.0; own.len()]);
+        // By itself first: sums of n terms one after the other would lose a digit.
+        let mut mirrored = vec![Block::ZERO; own.len()];
         let (block, points) = (other.as_ref().map_or(row, |(block, _)| *block), block_points(cloud, row));
         for first in points.clone().step_by(2) {
             // Without a second point its part of what is mirrored has no weight.
@@ -68,18 +73,23 @@ impl WithSimd for BlockPair<'_> {
                 weights[k] = expansion.weights[row].0[point % BLOCK];
                 sums[k].clear(simd);
                 sums[k].add::<2>(simd, expansion, block, cloud.point(point));
-                sums[k].write(&mut numbers);
+                sums[k].write::<2>(&mut numbers);
                 for (own, number) in own.iter_mut().zip(&numbers) {
                     own.0[point % BLOCK] += number;
                 }
             }
-            let Some((_, mirrored)) = &mut other else { continue };
+            if other.is_none() {
+                continue;
+            }
             let given = [(&sums[0].block, weights[0]), (&sums[1].block, weights[1])];
             match d {
-                1 => mirror::<S, 1>(simd, given, mirrored),
-                2 => mirror::<S, 2>(simd, given, mirrored),
-                _ => mirror::<S, MAX_DIMENSION>(simd, given, mirrored),
+                1 => mirror::<S, 1>(simd, given, &mut mirrored),
+                2 => mirror::<S, 2>(simd, given, &mut mirrored),
+                _ => mirror::<S, MAX_DIMENSION>(simd, given, &mut mirrored),
             }
+        }
+        for (sums, mirrored) in other.into_iter().flat_map(|(_, sums)| sums.iter_mut().zip(&mirrored)) {
+            sums.0.iter_mut().zip(mirrored.0).for_each(|(sum, mirrored)| *sum += mirrored);
         }
     }
 }

@@ -146,7 +146,8 @@ impl Jets {
         Ok(Self { packed, layout })
     }
 
-    /// [`Jets::evaluate`] at the points of the cloud themselves to the second order, by half of the pairs where that pays.
+    /// [`Jets::evaluate`] at the points of the cloud themselves to the second order, by half of the pairs where that pays: the
+    /// order of the sums is another then, and depends on the number of points alone.
     ///
     /// # Errors
     /// Those of [`Jets::evaluate`].
@@ -156,13 +157,21 @@ impl Jets {
         weights: &[f64],
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let order = JetOrder::Hessian;
-        if cloud.dimension() > centres::MAX_DIMENSION {
-            return Self::evaluate(cloud, kernel, weights, cloud, order, observer);
+        if cloud.dimension() > centres::MAX_DIMENSION || cloud.n_points() < centres::MIN_POINTS {
+            return Self::evaluate(cloud, kernel, weights, cloud, JetOrder::Hessian, observer);
         }
-        let nodes = Nodes::of(cloud);
-        let layout = Layout { order, dimension: cloud.dimension() };
-        let expansion = Expansion { nodes: &nodes, kernel, weights: &blocked(weights) };
+        Self::by_half_of_the_pairs(&Nodes::of(cloud), cloud, kernel, weights, observer)
+    }
+
+    fn by_half_of_the_pairs(
+        nodes: &Nodes,
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let layout = Layout { order: JetOrder::Hessian, dimension: cloud.dimension() };
+        let expansion = Expansion { nodes, kernel, weights: &blocked(weights) };
         let packed = centres::jets(expansion, cloud, layout, observer)?;
         Ok(Self { packed, layout })
     }

@@ -52,16 +52,17 @@ impl Pass<'_> {
             for block in 0..expansion.weights.len() {
                 sums.add::<ORDER>(simd, expansion, block, x);
                 if has_magnitudes {
-                    sums.block.add_magnitudes(simd, &expansion.weights[block], &mut sums.magnitudes);
+                    let weights = &expansion.weights[block];
+                    sums.block.add_magnitudes(simd, weights, kernel, &mut sums.magnitudes);
                 }
             }
-            sums.write(&mut numbers);
+            sums.write::<ORDER>(&mut numbers);
             let (jet, magnitudes) = jet.split_at_mut(jet.len() - if has_magnitudes { 2 } else { 0 });
             layout.finish(kernel, &numbers, jet);
             if let [value, slope] = magnitudes {
                 let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
                 *value = variance * sums.magnitudes[0].sum_lanes();
-                *slope = 2.0 * variance * sums.magnitudes[1].sum_lanes() * inverse * inverse;
+                *slope = 2.0 * variance * sums.magnitudes[1].sum_lanes() * inverse;
             }
         }
     }
@@ -73,7 +74,7 @@ pub(super) struct Sums<S: Simd> {
     value: Sum<S>,
     /// `Σλφ′`, which enters the whole diagonal of the Hessian.
     trace: Sum<S>,
-    /// `Σ|λ|φ` and `Σ|λφ′||D|`.
+    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
     magnitudes: [Sum<S>; 2],
     /// `Σλφ′D_a`.
     gradient: Vec<Sum<S>>,
@@ -120,13 +121,19 @@ impl<S: Simd> Sums<S> {
         }
     }
 
-    /// Writes the sums in the order of [`Layout::finish`].
+    /// Writes the sums up to an order, in that of [`Layout::finish`].
     #[inline(always)]
-    pub(super) fn write(&self, numbers: &mut [f64]) {
+    pub(super) fn write<const ORDER: usize>(&self, numbers: &mut [f64]) {
         let d = self.gradient.len();
         numbers[0] = self.value.sum_lanes();
+        if ORDER == 0 {
+            return;
+        }
         for (number, sum) in numbers[1..].iter_mut().zip(&self.gradient) {
             *number = sum.sum_lanes();
+        }
+        if ORDER == 1 {
+            return;
         }
         for (number, sum) in numbers[1 + d..].iter_mut().zip(&self.hessian) {
             *number = sum.sum_lanes();

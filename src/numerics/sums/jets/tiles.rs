@@ -5,6 +5,7 @@
 
 use pulp::Simd;
 
+use crate::numerics::kernel::{HUGE, Kernel, distance_and_inverse};
 use crate::numerics::machine::registers::{Block, Pack};
 
 /// Coordinates per tile.
@@ -177,9 +178,15 @@ fn add_products<S: Simd>(simd: S, at: usize, a: [Sum<S>; 2], b: [Sum<S>; 2], blo
 }
 
 impl ProfileBlock {
-    /// `Σ|λ|φ` and `Σ|λφ′|·√q` with `√q = |D|/ℓ`, up to the factor 1/ℓ.
+    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
     #[inline(always)]
-    pub(super) fn add_magnitudes<S: Simd>(&self, simd: S, weights: &Block, magnitudes: &mut [Sum<S>; 2]) {
+    pub(super) fn add_magnitudes<S: Simd>(
+        &self,
+        simd: S,
+        weights: &Block,
+        kernel: &Kernel,
+        magnitudes: &mut [Sum<S>; 2],
+    ) {
         for at in 0..Sum::<S>::PER_BLOCK {
             let weight = Sum::load(simd, weights, at).abs();
             let phi = Sum::load(simd, &self.profiles[0], at);
@@ -190,7 +197,7 @@ impl ProfileBlock {
                 square = difference.mul_add(difference, square);
             }
             magnitudes[0] = weight.mul_add(phi, magnitudes[0]);
-            let (distance, _) = square.at_least(1e-200).at_most(1e300).sqrt_and_inverse();
+            let (distance, _) = distance_and_inverse(square * kernel.inverse_square_length(), HUGE);
             magnitudes[1] = (-(weight * slope)).mul_add(distance, magnitudes[1]);
         }
     }
