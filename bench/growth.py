@@ -60,7 +60,7 @@ def main():
         print(", ".join(f"{key} {value:.4g}" for key, value in rows[-1].items()), flush=True)
     slopes = {key: slope(rows, key) for key, *_ in TIMES + MEMORY}
     arguments.table.write_text(table(rows, slopes))
-    arguments.svg.write_text(picture(rows, slopes))
+    arguments.svg.write_text(picture(rows, slopes, TIMES, MEMORY))
     print(arguments.table.read_text())
 
 
@@ -205,15 +205,16 @@ class Panel:
         yield f'<text x="{self.left + 24}" y="{y}">{name}: slope {slope:.2f}, expected {expected}</text>'
 
 
-def picture(rows, slopes):
+def picture(rows, slopes, times, memory):
     """Time on the left, memory on the right."""
     x_range = (rows[0]["n"] / 1.1, rows[-1]["n"] * 1.1)
-    x_ticks = [tick for tick in (500, 1000, 2000, 4000, 8000, 16000) if x_range[0] <= tick <= x_range[1]]
+    ticks = (500, 1000, 2000, 4000, 8000, 16000) if x_range[1] < 50_000 else (1000, 10_000, 100_000, 1_000_000)
+    x_ticks = [tick for tick in ticks if x_range[0] <= tick <= x_range[1]]
     panels = [
-        (Panel(70, "time", x_range, bounds(rows, TIMES)), TIMES, duration_label),
-        (Panel(560, "memory", x_range, bounds(rows, MEMORY)), MEMORY, size_label),
+        (Panel(70, "time", x_range, bounds(rows, times)), times, duration_label),
+        (Panel(560, "memory", x_range, bounds(rows, memory)), memory, size_label),
     ]
-    width, height = 990, Panel.TOP + Panel.HEIGHT + 70 + 18 * len(TIMES)
+    width, height = 990, Panel.TOP + Panel.HEIGHT + 70 + 18 * len(times)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">',
         f'<rect width="{width}" height="{height}" fill="white"/>',

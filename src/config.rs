@@ -34,15 +34,19 @@ pub struct Config {
     pub cache_bytes: usize,
 
     /// Of these, bytes of registered clouds that are kept, an eighth of all at most.
-    #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 256 << 20)]
+    #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 512 << 20)]
     pub cloud_bytes: usize,
 
-    /// Points a cloud may have; a dense factorization takes 4 n² bytes and n³/3 flops.
-    #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 20_000, value_parser = whole::<1, MAX_COUNT>)]
+    /// Points a cloud may have, whatever solves for it.
+    #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 2_000_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_points: usize,
 
+    /// Points that are factorized densely, which takes 4 n² bytes and n³/3 flops.
+    #[arg(long, env = "GRAMIAN_MAX_DENSE_POINTS", default_value_t = 20_000, value_parser = whole::<1, MAX_COUNT>)]
+    pub max_dense_points: usize,
+
     /// Queries a request may have.
-    #[arg(long, env = "GRAMIAN_MAX_QUERIES", default_value_t = 100_000, value_parser = whole::<1, MAX_COUNT>)]
+    #[arg(long, env = "GRAMIAN_MAX_QUERIES", default_value_t = 2_000_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_queries: usize,
 
     /// Coordinates a point may have.
@@ -50,11 +54,11 @@ pub struct Config {
     pub max_dimension: usize,
 
     /// Bytes a request body may have.
-    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 64 << 20, value_parser = whole::<1, MAX_BYTES>)]
+    #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 256 << 20, value_parser = whole::<1, MAX_BYTES>)]
     pub max_body_bytes: usize,
 
     /// Bytes an answer may have, estimated at 25 bytes a number before anything is computed.
-    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 512 << 20, value_parser = whole::<1, MAX_BYTES>)]
+    #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 1 << 30, value_parser = whole::<1, MAX_BYTES>)]
     pub max_response_bytes: usize,
 
     /// Compute requests that may wait for a thread; the next one is answered 503.

@@ -15,6 +15,9 @@ const BYTES_PER_THREAD: usize = 16 << 20;
 /// Of the budget without what the process itself takes: the part for requests that are read, unpacked, parsed or wait.
 const INTAKE_SHARE: usize = 4;
 
+/// Bytes of numbers for each byte that a body may have: JSON has a number in two bytes, its comma included.
+pub const NUMBERS_PER_BODY: usize = 4;
+
 /// A body takes six times its limit at most: itself, what it is unpacked to, and four times that as numbers. That fits in seven
 /// parts of eight of as many times its limit, which is the most that one may have.
 const BODIES_PER_REQUEST: usize = 8;
@@ -97,6 +100,31 @@ mod tests {
         }
         // With memory enough the settings are what they say.
         let memory = Memory::of(&config(&["--memory-bytes", "68719476736", "--threads", "2"]));
-        assert_eq!((memory.clouds, memory.body, memory.cache + memory.spare), (256 << 20, 64 << 20, 4 << 30));
+        assert_eq!(
+            (memory.clouds, memory.body, memory.cache + memory.spare),
+            (512 << 20, 256 << 20, 4 << 30)
+        );
+    }
+
+    #[test]
+    fn a_million_points_are_served_by_default_where_there_are_eight_gigabytes() {
+        const N: usize = 1_000_000;
+        // Coordinates as JSON writes them at their longest, and space that some writers leave between them.
+        const JSON_BYTES: usize = N * 3 * 25;
+        let bytes = (8_usize << 30) / 4 * 3;
+        for (keys, n_owners) in [(&[][..], 1), (&["--api-keys", "a,b"][..], 2)] {
+            let flags = ["--memory-bytes", &bytes.to_string(), "--threads", "8"];
+            let config = config(&[&flags[..], keys].concat());
+            let memory = Memory::of(&config);
+            assert!(
+                config.max_points >= N && config.max_queries >= N && memory.body >= JSON_BYTES,
+                "{memory:?}"
+            );
+            // Points, normals and what is known of their neighbours.
+            assert!(memory.clouds >= N * (24 + 24 + 60), "{memory:?}");
+            // Curvatures with deviations: 20 numbers a point as text, and twice as numbers while they are put together.
+            assert!(config.max_response_bytes >= 2 * N * 20 * 25);
+            assert!(Budget::new(memory.work, n_owners).largest() >= 2 * N * 20 * 8);
+        }
     }
 }

@@ -13,6 +13,7 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::solver::choose::choose;
+use gramian::numerics::solver::kind::SolverKind;
 use gramian::numerics::solver::{Solution, Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
@@ -132,7 +133,7 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
         store.reserve(OWNER, choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
     let (stored, _) = store.get_or_prepare(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
-        let factor = stored.solver().clone();
+        let factor = stored.solver().unwrap().clone();
         let make = |memory| async move { Ok((fits::surface(&factor), memory)) };
         let memory =
             store.reserve(OWNER, choose(n, 3, usize::MAX).surface.n_bytes, || true).await.unwrap().unwrap();
@@ -147,7 +148,7 @@ fn kernel(k: usize) -> Kernel {
 }
 
 fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FitKey {
-    FitKey::of_dense(OWNER, CloudId::of(cloud, None), kernel, alpha, false)
+    FitKey::of(SolverKind::Dense, OWNER, CloudId::of(cloud, None), kernel, alpha, false)
 }
 
 fn resident_bytes() -> f64 {

@@ -11,6 +11,7 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use gramian::http::problem::Problem;
 use gramian::http::wire::negotiation::{Coding, Format};
 use gramian::http::wire::read::body::RequestBody;
 use gramian::http::wire::read::limits::ParseContext;
@@ -88,12 +89,19 @@ enum Family {
     Matern,
 }
 
-/// An array as npy has it.
+/// A cloud as npy and PLY have it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
 struct CloudRequest {
     points: Points,
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    normals: Option<Points>,
+}
+
+/// For what a test allows, whatever it is unpacked to.
+fn is_room(_n_bytes: usize) -> Result<(), Problem> {
+    Ok(())
 }
 
 struct Outcome {
@@ -110,8 +118,8 @@ fn parse(format: Format, coding: Coding, body: &[u8]) -> Outcome {
     let began = Instant::now();
     let request = RequestBody::new(format, coding, body.to_vec(), LIMIT_BYTES);
     let problem = match format {
-        Format::Npy => request.parse::<CloudRequest>(&CONTEXT).err(),
-        Format::Json | Format::Safetensors => request.parse::<Request>(&CONTEXT).err(),
+        Format::Npy | Format::Ply => request.parse::<CloudRequest>(&CONTEXT, is_room).err(),
+        Format::Json | Format::Safetensors => request.parse::<Request>(&CONTEXT, is_room).err(),
     };
     let took = began.elapsed();
     let peak = ALLOCATOR.peak_usage() - before;
@@ -329,6 +337,59 @@ fn npy() -> Vec<u8> {
     body
 }
 
+fn ply_head(format: &str, n_vertices: usize) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment made here\nelement camera 1\nproperty list uchar int views\nelement vertex {n_vertices}\n\
+         property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty list uchar short edges\n\
+         property float nx\nproperty float ny\nproperty float nz\nelement face 1\nproperty list uchar int vertex_indices\n\
+         end_header\n"
+    )
+}
+
+fn ply_in_text() -> Vec<u8> {
+    format!("{}2 7 8\n0.5 1 -2e3 255 0 1 0 0\n3 4.25 5 0 2 1 0 0 1 0\n3 0 1 0\n", ply_head("ascii", 2))
+        .into_bytes()
+}
+
+fn ply_in_binary() -> Vec<u8> {
+    let mut body = ply_head("binary_big_endian", 2).into_bytes();
+    body.extend([1, 0, 0, 0, 7]);
+    for edges in [&[][..], &[0, 1, 0, 2]] {
+        (0..3).for_each(|i: u8| body.extend(f32::from(i).to_be_bytes()));
+        body.extend([255, edges.len() as u8 / 2]);
+        body.extend(edges);
+        (1..4).for_each(|i: u8| body.extend(f32::from(i).to_be_bytes()));
+    }
+    body.extend([1, 0, 0, 0, 1]);
+    body
+}
+
+#[test]
+fn files_that_announce_more_than_they_have_take_nothing_for_it() {
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        for count in ["3", "1000000000000", "18446744073709551615"] {
+            for what in ["element vertex 2", "element camera 1"] {
+                let (name, _) = what.rsplit_once(' ').unwrap();
+                let head = ply_head(format, 2).replace(what, &format!("{name} {count}"));
+                expect(what, Format::Ply, head.as_bytes(), "/problems/malformed-body");
+            }
+        }
+    }
+    let head = ply_head("binary_little_endian", 2);
+    let endless = head.replace("end_header", &"comment 0123456789\n".repeat(N_BYTES / 20));
+    expect("a long header", Format::Ply, endless.as_bytes(), "/problems/malformed-body");
+    let names = head.replace("property uchar red\n", &format!("property uchar {}\n", "r".repeat(60_000)));
+    expect("a long name", Format::Ply, names.as_bytes(), "/problems/malformed-body");
+    let words = format!("{}1 7\n{}", ply_head("ascii", 2), "x".repeat(N_BYTES));
+    let outcome = expect("a long word", Format::Ply, words.as_bytes(), "/problems/malformed-body");
+    assert!(outcome.problem.unwrap().to_string().len() < 1000);
+    // Beyond the limit of points nothing is read.
+    let many = format!("{}1 7\n{}", ply_head("ascii", 3000), "0 0 0 0 0 1 0 0\n".repeat(3000));
+    let outcome = expect("many", Format::Ply, many.as_bytes(), "/problems/problem-too-large");
+    assert!(pointer(&outcome) == "/points" && outcome.problem.unwrap()["required"] == 3000);
+}
+
 /// What is done to a body at one place.
 #[derive(Debug, Clone)]
 enum Mutation {
@@ -361,6 +422,9 @@ fn mutation() -> impl Strategy<Value = Mutation> {
         b" ",
         b"__metadata__",
         b"18446744073709551615",
+        b"\n",
+        b"property list uchar int q\n",
+        b"element vertex 2000\n",
     ];
     prop_oneof![
         any::<u8>().prop_map(Mutation::Set),
@@ -392,7 +456,13 @@ fn mutate(body: &mut Vec<u8>, at: proptest::sample::Index, mutation: &Mutation) 
 #[test]
 fn mutated_bodies_are_read_or_refused() {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let originals = [(Format::Json, json()), (Format::Safetensors, safetensors()), (Format::Npy, npy())];
+    let originals = [
+        (Format::Json, json()),
+        (Format::Safetensors, safetensors()),
+        (Format::Npy, npy()),
+        (Format::Ply, ply_in_text()),
+        (Format::Ply, ply_in_binary()),
+    ];
     for (format, body) in &originals {
         let outcome = parse(*format, Coding::Identity, body);
         assert_eq!(kind(&outcome), "accepted", "{format:?}: {:?}", outcome.problem);
@@ -404,7 +474,7 @@ fn mutated_bodies_are_read_or_refused() {
         proptest::collection::vec(change(), 1..4),
         proptest::option::weighted(0.3, change()),
     );
-    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(6000) };
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(9000) };
     let rng = proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
     let mut runner = proptest::test_runner::TestRunner::new_with_rng(config, rng);
     let outcome = runner.run(&strategy, |((format, mut plain), coding, changes, change)| {

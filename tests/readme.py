@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Runs the examples of a README against a server and compares the answers.
+"""Runs the examples of pages against a server and compares the answers.
 
-    tests/readme.py [BASE_URL] [README]              asks the server at BASE_URL, http://localhost:8080 if absent
-    tests/readme.py --binary GRAMIAN [README]        starts that binary for the purpose, on a free port, and ends it
+    tests/readme.py [BASE_URL] [PAGE]…               asks the server at BASE_URL, http://localhost:8080 if absent
+    tests/readme.py --binary GRAMIAN [PAGE]…         starts that binary for each page, on a free port, and ends it
 
-Every ```sh block that contains curl is run by bash, in order, in the folder of the README, with the server's address in
+Without pages it runs README.md, docs/walkthrough.md and docs/operations.md, none of which needs what another did.
+
+Every ```sh block that contains curl is run by bash, in order, in the root of the repository, with the server's address in
 place of localhost:8080. What it prints is compared with the fenced block that follows, ```json or ```text:
 
 - `…` matches anything: a JSON value, any run of entries of a list, any further members of an object, any part of a
@@ -24,6 +26,9 @@ from pathlib import Path
 
 from with_server import server
 
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ["README.md", "docs/walkthrough.md", "docs/operations.md"]
+
 RELATIVE = 1e-6
 ROUNDING = 1e-9
 SECONDS_PER_EXAMPLE = 120
@@ -34,43 +39,44 @@ NUMBER = re.compile(r"(?<![\w.-])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 
 def main():
-    arguments = argparse.ArgumentParser(description="Runs the examples of a README against a server.")
+    arguments = argparse.ArgumentParser(description="Runs the examples of pages against a server.")
     arguments.add_argument("--binary", metavar="GRAMIAN", help="start this binary instead of asking a running server")
-    arguments.add_argument("places", nargs="*", metavar="BASE_URL or README")
+    arguments.add_argument("places", nargs="*", metavar="BASE_URL or PAGE")
     arguments = arguments.parse_args()
     bases = [place for place in arguments.places if "://" in place]
-    readmes = [place for place in arguments.places if "://" not in place]
-    readme = Path(readmes[0] if readmes else Path(__file__).resolve().parent.parent / "README.md").resolve()
-    if arguments.binary:
-        with server(arguments.binary) as (base, _):
-            run(base, readme)
-    else:
-        run(bases[0].rstrip("/") if bases else "http://localhost:8080", readme)
+    pages = [Path(place).resolve() for place in arguments.places if "://" not in place]
+    n_failed = 0
+    for page in pages or [ROOT / page for page in PAGES]:
+        if arguments.binary:
+            with server(arguments.binary) as (base, _):
+                n_failed += run(base, page)
+        else:
+            n_failed += run(bases[0].rstrip("/") if bases else "http://localhost:8080", page)
+    sys.exit(1 if n_failed else 0)
 
 
-def run(base, readme):
-    """Checks every example; ends the program with status 1 if one fails."""
-    examples = examples_of(readme.read_text(encoding="utf-8"))
+def run(base, page):
+    """Checks every example of a page; returns how many fail."""
+    examples = examples_of(page)
     if not examples:
-        sys.exit(f"{readme} has no ```sh block with curl")
-    failed = 0
+        sys.exit(f"{page} has no ```sh block with curl")
+    n_failed = 0
     for line, script, language, expected in examples:
-        found, problems = check(script, language, expected, base, readme.parent)
+        found, problems = check(script, language, expected, base)
         if problems:
-            failed += 1
-            print(f"{readme.name}:{line}:\n{indented(script)}")
+            n_failed += 1
+            print(f"{page.name}:{line}:\n{indented(script)}")
             print("\n".join(f"  {problem}" for problem in problems))
             print(f"  the whole answer:\n{indented(found[:SHOWN_CHARACTERS])}\n")
-    sys.stdout.flush()
-    if failed:
-        sys.exit(f"{failed} of {len(examples)} examples of {readme.name} do not agree with the server at {base}")
-    print(f"{len(examples)} examples of {readme.name} agree with the server at {base}")
+    n_good = len(examples) - n_failed
+    print(f"{page.name}: {n_good} of {len(examples)} examples agree with the server at {base}", flush=True)
+    return n_failed
 
 
-def examples_of(text):
+def examples_of(page):
     """Pairs of blocks: (line, script, language of the answer, answer)."""
     blocks, language, start, body = [], None, 0, []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         if not line.startswith("```"):
             body.append(line)
         elif language is None:
@@ -83,17 +89,17 @@ def examples_of(text):
         if language == "sh" and re.search(r"\bcurl\b", script):
             _, kind, expected = blocks[index + 1] if index + 1 < len(blocks) else (0, None, "")
             if kind not in ("json", "text"):
-                sys.exit(f"line {line}: an example needs its answer in a ```json or ```text block behind it")
+                sys.exit(f"{page.name}:{line}: an example needs its answer in a ```json or ```text block behind it")
             examples.append((line, script, kind, expected))
     return examples
 
 
-def check(script, language, expected, base, folder):
+def check(script, language, expected, base):
     """Runs one example; returns what it printed and what is wrong with that."""
     here = re.sub(r"(http://)?localhost:8080", lambda _: base, script)
     command = ["bash", "-euo", "pipefail", "-c", here]
     try:
-        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=SECONDS_PER_EXAMPLE)
+        run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS_PER_EXAMPLE)
     except subprocess.TimeoutExpired:
         return "", [f"no answer within {SECONDS_PER_EXAMPLE} s"]
     if run.returncode != 0:
@@ -104,7 +110,7 @@ def check(script, language, expected, base, folder):
     try:
         pattern = Pattern(expected).parse()
     except ValueError as error:
-        return run.stdout, [f"the block in the README is not JSON with …: {error}"]
+        return run.stdout, [f"the block on the page is not JSON with …: {error}"]
     try:
         return run.stdout, differences(pattern, json.loads(run.stdout))
     except ValueError as error:
@@ -125,7 +131,7 @@ def differences(pattern, answer, path="", scale=None):
         close = strings_match(pattern, answer)
     else:
         close = type(pattern) is type(answer) and pattern == answer
-    return [] if close else [f"{path or 'the answer'}: the README has {shown(pattern)}, the server {shown(answer)}"]
+    return [] if close else [f"{path or 'the answer'}: the page has {shown(pattern)}, the server {shown(answer)}"]
 
 
 def of_objects(pattern, answer, path):
@@ -136,9 +142,9 @@ def of_objects(pattern, answer, path):
         if name in answer:
             problems += differences(value, answer[name], f"{path}/{name}")
         else:
-            problems.append(f"{path}/{name}: in the README, not in the answer")
+            problems.append(f"{path}/{name}: on the page, not in the answer")
     if ANY not in pattern:
-        problems += [f"{path}/{name}: in the answer, not in the README" for name in answer if name not in pattern]
+        problems += [f"{path}/{name}: in the answer, not on the page" for name in answer if name not in pattern]
     return problems
 
 
@@ -146,14 +152,14 @@ def of_lists(pattern, answer, path, scale):
     if ANY not in pattern:
         if len(pattern) != len(answer):
             at = next((i for i, (p, a) in enumerate(zip(pattern, answer)) if differences(p, a, "", scale)), None)
-            counts = f"the README has {len(pattern)} entries or lines, the server {len(answer)}"
+            counts = f"the page has {len(pattern)} entries or lines, the server {len(answer)}"
             first = [] if at is None else differences(pattern[at], answer[at], f"{path}/{at}", scale)[:1]
             return [f"{path or 'the answer'}: {counts}", *first]
         return [d for i, (p, a) in enumerate(zip(pattern, answer)) for d in differences(p, a, f"{path}/{i}", scale)]
     runs = split_at_any(pattern)
     first, last = runs[0], runs[-1]
     if len(first) + len(last) > len(answer):
-        return [f"{path or 'the answer'}: the README shows more entries or lines than the answer has"]
+        return [f"{path or 'the answer'}: the page shows more entries or lines than the answer has"]
     problems = [d for i, p in enumerate(first) for d in differences(p, answer[i], f"{path}/{i}", scale)]
     end = len(answer) - len(last)
     problems += [d for i, p in enumerate(last) for d in differences(p, answer[end + i], f"{path}/{end + i}", scale)]

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -27,9 +28,13 @@ INSTRUCTION_SETS = ("avx2", "fma", "avx512f", "avx512vl", "avx512dq")
 
 def describe(setting: Setting) -> list[tuple[str, str]]:
     """Names and values, in the order of the report."""
-    cpu = _cpu()
     with setting.gramian() as server:
-        version = server.version()
+        return facts(setting, server.version())
+
+
+def facts(setting: Setting, version: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The same, where a server has said its version."""
+    cpu = _cpu()
     flags = " ".join(name for name in INSTRUCTION_SETS if name in cpu.get("flags", "").split())
     return [
         ("date", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),

@@ -85,8 +85,10 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))
         .routes(routes!(surface_gradient::assemble_surface_gradient_matrix))
+        .routes(routes!(surface_gradient::assemble_surface_gradient_sparse_matrix))
         .routes(routes!(laplace_beltrami::compute_laplace_beltrami))
-        .routes(routes!(laplace_beltrami::assemble_laplace_beltrami_matrix));
+        .routes(routes!(laplace_beltrami::assemble_laplace_beltrami_matrix))
+        .routes(routes!(laplace_beltrami::assemble_laplace_beltrami_sparse_matrix));
     let probes = OpenApiRouter::new()
         .routes(routes!(process::check_live))
         .routes(routes!(process::check_ready))

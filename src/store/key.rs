@@ -5,6 +5,7 @@ use std::fmt;
 use super::Owner;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::kind::SolverKind;
 use crate::numerics::sums::regularization::Regularization;
 
 /// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
@@ -57,8 +58,14 @@ pub struct FitKey {
 }
 
 impl FitKey {
-    /// Names the dense factorization of a cloud (with duplicates merged or not).
-    pub fn of_dense(
+    /// Names local regressions of a cloud, which choose all else by themselves.
+    pub fn of_local(owner: Owner, cloud_id: CloudId) -> Self {
+        Self { owner, cloud_id, fit: blake3::hash(b"local").into() }
+    }
+
+    /// Names a fit of values to a cloud (with duplicates merged or not).
+    pub fn of(
+        solver: SolverKind,
         owner: Owner,
         cloud_id: CloudId,
         kernel: &Kernel,
@@ -67,6 +74,9 @@ impl FitKey {
     ) -> Self {
         let (family, parameter) = kernel.family().canonical();
         let mut hasher = blake3::Hasher::new();
+        if solver == SolverKind::Local {
+            hasher.update(b"local");
+        }
         hasher.update(&[family, u8::from(merged)]);
         update_with_floats(&mut hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
         match regularization {
@@ -134,7 +144,7 @@ mod tests {
         let kernel = |family, length_scale, variance| Kernel::new(family, length_scale, variance).unwrap();
         let alpha = Regularization::Uniform;
         let of = |owner, kernel: &Kernel, regularization: &Regularization, merged| {
-            FitKey::of_dense(Owner(owner), id, kernel, regularization, merged)
+            FitKey::of(SolverKind::Dense, Owner(owner), id, kernel, regularization, merged)
         };
         let gauss = kernel(Family::Gauss, 1.0, 1.0);
         let keys = [
@@ -148,6 +158,8 @@ mod tests {
             of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
+            FitKey::of(SolverKind::Local, Owner(0), id, &gauss, &alpha(0.0), false),
+            FitKey::of_local(Owner(0), id),
         ];
         let distinct: std::collections::HashSet<_> = keys.iter().collect();
         assert_eq!(distinct.len(), keys.len());

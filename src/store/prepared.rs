@@ -9,6 +9,7 @@ use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
 use super::fair_cache::FairCache;
 use super::key::{CloudId, FitKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
+use crate::numerics::function::moving::Moving;
 use crate::numerics::machine::heap::{arc_payload, block_bytes};
 use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::solver::{Solution, Solver};
@@ -21,6 +22,10 @@ const WEIGHTS_SHARE: usize = 16;
 pub enum Prepared {
     /// A system made ready.
     Solver(Arc<Solver>),
+    /// A system that is solved around each query.
+    Moving(Arc<Moving>),
+    /// Nothing: local regressions need no solver.
+    Local,
 }
 
 /// What a fit is served from, with the surface of its cloud, once that was asked for, and the time it took. It holds the memory
@@ -43,6 +48,22 @@ struct PreparedSurface {
 }
 
 impl PreparedFit {
+    /// What local regressions are kept under: their surface comes later.
+    pub fn local(mut memory: Reservation) -> Self {
+        memory.shrink_to(0);
+        let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
+        let memory = Arc::new(memory);
+        Self { prepared: Prepared::Local, gram_time, factor_time, surface: OnceLock::new(), memory }
+    }
+
+    /// Gives back what of the memory it does not take.
+    pub fn moving(moving: Moving, mut memory: Reservation) -> Self {
+        memory.shrink_to(moving.n_bytes());
+        let (prepared, memory) = (Prepared::Moving(Arc::new(moving)), Arc::new(memory));
+        let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
+        Self { prepared, gram_time, factor_time, surface: OnceLock::new(), memory }
+    }
+
     /// Gives back what of the memory the finished solver does not take.
     pub fn new(solver: Solver, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
         memory.shrink_to(solver.n_bytes());
@@ -51,9 +72,19 @@ impl PreparedFit {
     }
 
     /// The system made ready.
-    pub fn solver(&self) -> &Arc<Solver> {
-        let Prepared::Solver(solver) = &self.prepared;
-        solver
+    pub fn solver(&self) -> Option<&Arc<Solver>> {
+        match &self.prepared {
+            Prepared::Solver(solver) => Some(solver),
+            Prepared::Moving(_) | Prepared::Local => None,
+        }
+    }
+
+    /// The system that is solved around each query.
+    pub fn of_queries(&self) -> Option<&Arc<Moving>> {
+        match &self.prepared {
+            Prepared::Moving(moving) => Some(moving),
+            Prepared::Solver(_) | Prepared::Local => None,
+        }
     }
 
     /// The surface of the signature function, once it was asked for.
@@ -64,7 +95,12 @@ impl PreparedFit {
     /// Bytes held on the heap, those of the surface once there is one.
     fn n_bytes(&self) -> usize {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Solver>());
-        own + self.solver().n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
+        let of_solver = match &self.prepared {
+            Prepared::Solver(solver) => solver.n_bytes(),
+            Prepared::Moving(moving) => moving.n_bytes(),
+            Prepared::Local => 0,
+        };
+        own + of_solver + self.surface().map_or(0, |surface| surface.n_bytes())
     }
 
     /// Bytes that are given back when it is dropped.

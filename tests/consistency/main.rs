@@ -2,10 +2,13 @@
 //! with direct"), and the refusal of every verb that it does not.
 //!
 //! A solver is one line of [`solvers`]. The dense one is held against itself on the same points in another order, so that
-//! no two numbers come from the same operations.
+//! no two numbers come from the same operations. The local solver has no function that it could be asked for here: a cloud of its
+//! neighbours alone has the dense answers for every kernel (src/numerics/function/moving/tests.rs), and what larger clouds lose is in
+//! moving.rs.
 
 #[path = "../common/mod.rs"]
 mod common;
+mod moving;
 mod verbs;
 
 use std::sync::Arc;

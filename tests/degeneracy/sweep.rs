@@ -6,6 +6,7 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::degeneracy::DegeneracyReason;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
+use gramian::numerics::surface::served::ServedBy;
 
 use super::common::clouds::cloud;
 use super::common::fits::{factorize, kernel};
@@ -114,7 +115,7 @@ impl Case {
             let exact = if is_open && along < 0.0 { [-exact[1], -exact[0]] } else { exact };
             let largest = exact[0].abs().max(exact[1].abs()).max(0.5 / radius);
             let error = (found[0] - exact[0]).abs().max((found[1] - exact[1]).abs()) / largest;
-            tally.offset += usize::from(geometry.is_offset(query));
+            tally.offset += usize::from(geometry.served_by(query) == ServedBy::Offset);
             match flags[query] {
                 Some(reason) if DegeneracyReason::is_null(reason) => tally.null += 1,
                 Some(_) => {

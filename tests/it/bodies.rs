@@ -1,4 +1,4 @@
-//! Bodies in and out: JSON, safetensors and npy, compressed or not, at once or streamed.
+//! Bodies in and out: JSON, safetensors, npy and PLY, compressed or not, at once or streamed.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -16,6 +16,7 @@ use crate::support::{Server, fibonacci_sphere, numbers, receive};
 const JSON: &str = "application/json";
 const SAFETENSORS: &str = "application/x-safetensors";
 const NPY: &str = "application/x-npy";
+const PLY: &str = "model/ply";
 
 async fn post(
     server: &Server,
@@ -201,6 +202,88 @@ async fn clouds_come_as_npy_too() {
     assert_eq!((refused.status, &problem["errors"][0]["pointer"]), (422, &json!("/points/4/2")));
 }
 
+/// A scan as a scanner writes it: text, or numbers of 64 bits in either byte order.
+fn scan(format: &str, points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<u8> {
+    let names = ["x", "y", "z", "nx", "ny", "nz"];
+    let properties: String = names.iter().map(|name| format!("property double {name}\r\n")).collect();
+    let head = format!(
+        "ply\r\nformat {format} 1.0\r\ncomment a scan\r\nelement vertex {}\r\n{properties}element face 1\r\n\
+         property list uchar int vertex_indices\r\nend_header\r\n",
+        points.len()
+    );
+    let mut body = head.into_bytes();
+    for (x, normal) in points.iter().zip(normals) {
+        let numbers = x.iter().chain(normal);
+        match format {
+            "ascii" => {
+                let words: Vec<String> = numbers.map(|x| x.to_string()).collect();
+                writeln!(body, "{}", words.join(" ")).unwrap();
+            }
+            "binary_big_endian" => body.extend(numbers.flat_map(|x| x.to_be_bytes())),
+            _ => body.extend(numbers.flat_map(|x| x.to_le_bytes())),
+        }
+    }
+    body.extend(if format == "ascii" { &b"3 0 1 2\n"[..] } else { &[0] });
+    body
+}
+
+#[tokio::test]
+async fn clouds_come_as_scanners_write_them() {
+    let server = Server::start().await;
+    let (points, normals) = (fibonacci_sphere(5), fibonacci_sphere(5));
+    let known = server.post("/v1/clouds", &json!({"points": points, "normals": normals})).await;
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let body = scan(format, &points, &normals);
+        let answer = post(&server, "/v1/clouds", &[("content-type", PLY)], body.clone()).await;
+        assert_eq!((answer.status, answer.text()), (200, known.text.as_str()), "{format}");
+        for coding in ["gzip", "zstd"] {
+            let headers = [("content-type", PLY), ("content-encoding", coding)];
+            let answer = post(&server, "/v1/clouds", &headers, compressed(coding, &body)).await;
+            assert_eq!((answer.status, answer.text()), (200, known.text.as_str()), "{format} {coding}");
+        }
+    }
+    // Nothing but the registration of clouds takes a file.
+    let route = route_of("/v1/normals");
+    assert_eq!(post(&server, route.path, &[("content-type", PLY)], "").await.status, 415);
+}
+
+#[tokio::test]
+async fn scans_that_cannot_be_read_are_refused_with_their_place() {
+    let server = Server::with_flags(&["--max-points", "5"]).await;
+    let (points, normals) = (fibonacci_sphere(5), fibonacci_sphere(5));
+    let refused = async |body: Vec<u8>, status: u16, slug: &str| {
+        let answer = post(&server, "/v1/clouds", &[("content-type", PLY)], body).await;
+        let problem: Value = serde_json::from_str(answer.text()).unwrap();
+        assert_eq!(
+            (answer.status, &problem["type"]),
+            (status, &json!(format!("/problems/{slug}"))),
+            "{problem}"
+        );
+        problem
+    };
+    for format in ["ascii", "binary_little_endian"] {
+        let mut unknown = normals.clone();
+        unknown[3] = [0.0; 3];
+        let problem = refused(scan(format, &points, &unknown), 422, "invalid-cloud").await;
+        assert_eq!(problem["errors"][0]["pointer"], "/normals/3");
+        assert!(problem["detail"].as_str().unwrap().contains("leave out this point"), "{problem}");
+        let mut missing = points.clone();
+        missing[2][1] = f64::NAN;
+        let problem = refused(scan(format, &missing, &normals), 422, "invalid-request").await;
+        assert_eq!(problem["errors"][0]["pointer"], "/points/2/1");
+        let six = (fibonacci_sphere(6), fibonacci_sphere(6));
+        let problem = refused(scan(format, &six.0, &six.1), 413, "problem-too-large").await;
+        assert_eq!((&problem["limit"], &problem["required"]), (&json!(5), &json!(6)));
+        let body = scan(format, &points, &normals);
+        let problem = refused(body[..body.len() / 4 * 3].to_vec(), 400, "malformed-body").await;
+        assert!(problem["detail"].as_str().unwrap().contains("element vertex"), "{problem}");
+        refused(body[1..].to_vec(), 400, "malformed-body").await;
+    }
+    refused(Vec::new(), 400, "malformed-body").await;
+    refused(scan("ascii", &[], &[]), 422, "invalid-cloud").await;
+    assert_eq!(server.get("/v1/clouds").await.expect_ok()["clouds"], json!([]));
+}
+
 fn compressed(coding: &str, bytes: &[u8]) -> Vec<u8> {
     if coding == "zstd" {
         return zstd::encode_all(bytes, 3).unwrap();
@@ -342,7 +425,7 @@ async fn every_documented_media_type_is_served_and_no_other() {
     for route in &ROUTES {
         let operation = &document["paths"][route.path]["post"];
         let documented = |content: &Value, media_type: &str| content.get(media_type).is_some();
-        for media_type in [JSON, SAFETENSORS, NPY] {
+        for media_type in [JSON, SAFETENSORS, NPY, PLY] {
             let headers = [("content-type", JSON), ("accept", media_type)];
             let answer = post(&server, route.path, &headers, route.request().to_string()).await;
             let is_served = answer.status == 200 && answer.header("content-type") == media_type;
@@ -354,5 +437,5 @@ async fn every_documented_media_type_is_served_and_no_other() {
         }
     }
     let content = &document["paths"]["/v1/clouds"]["post"]["requestBody"]["content"];
-    assert!([JSON, SAFETENSORS, NPY].iter().all(|media_type| content.get(media_type).is_some()));
+    assert!([JSON, SAFETENSORS, NPY, PLY].iter().all(|media_type| content.get(media_type).is_some()));
 }

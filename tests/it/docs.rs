@@ -1,10 +1,13 @@
-//! docs/api.md says what the document says: its examples are the document's, its tables are complete.
+//! Pages say what the service does: the examples of docs/api.md are the document's and its tables are complete, the settings of
+//! docs/operations.md are those of the process, links lead somewhere, and the README is short.
 //!
 //! A block of JSON is preceded by a comment that names a file, a pointer into it, and members that are left out:
 //! `<!-- openapi/examples/compute_normals.json /response without diagnostics -->`.
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
+use gramian::config::Config;
 use gramian::http::problem::slug::Slug;
 use serde_json::Value;
 
@@ -165,11 +168,83 @@ fn every_operation_is_in_the_overview() {
 }
 
 #[test]
+fn every_setting_is_in_the_table() {
+    let page = std::fs::read_to_string(at_root("docs/operations.md")).unwrap();
+    let rows = page.lines().filter(|line| line.starts_with("| `GRAMIAN_"));
+    let listed: Vec<_> = rows
+        .map(|row| {
+            let cells: Vec<_> =
+                row.trim_matches('|').split('|').map(|cell| cell.trim().replace('`', "")).collect();
+            assert!(cells.len() == 5 && !cells[4].is_empty(), "{cells:?}");
+            // "4294967296 (4 GiB)" is 4294967296.
+            let number = cells[3].split(" (").next().unwrap();
+            (cells[0].clone(), cells[1].clone(), number.to_owned())
+        })
+        .collect();
+    let command = Config::augment_args(clap::Command::new("gramian"));
+    let settings = command.get_arguments().filter_map(|setting| {
+        let default = setting.get_default_values().first().map(|value| value.to_str().unwrap().to_owned());
+        Some((setting.get_env()?.to_str()?.to_owned(), format!("--{}", setting.get_long()?), default))
+    });
+    let expected: Vec<_> = settings
+        .zip(&listed)
+        // What has no default says in words what holds without it.
+        .map(|((variable, flag, default), (.., words))| {
+            (variable, flag, default.unwrap_or_else(|| words.clone()))
+        })
+        .collect();
+    assert_eq!(listed, expected);
+    assert_eq!(listed.len(), command.get_arguments().filter(|setting| setting.get_env().is_some()).count());
+}
+
+#[test]
+fn the_readme_is_short() {
+    let page = std::fs::read_to_string(at_root("README.md")).unwrap();
+    assert!(page.lines().count() <= 300, "what is more belongs into docs/");
+}
+
+#[test]
 fn links_lead_somewhere() {
-    let page = page();
-    let targets = page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap());
-    for target in targets.filter(|target| !target.starts_with("http")) {
-        let file = target.split('#').next().unwrap();
-        assert!(at_root("docs").join(file).exists(), "{target}");
+    let mut pages: Vec<_> =
+        ["", "docs", "sdk", "sdk/python", "bench", "tests/data"].map(markdown_in).concat();
+    pages.sort();
+    assert!(pages.len() >= 15, "{pages:?}");
+    for page in &pages {
+        let text = prose(page);
+        let targets = text.split("](").skip(1).map(|rest| rest.split(')').next().unwrap());
+        for target in targets.filter(|target| !target.starts_with("http")) {
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let file = if file.is_empty() { page.clone() } else { page.parent().unwrap().join(file) };
+            assert!(file.exists(), "{}: {target}", page.display());
+            let leads_on = anchor.is_empty() || anchors(&prose(&file)).any(|known| known == anchor);
+            assert!(leads_on, "{}: no heading for {target}", page.display());
+        }
     }
+}
+
+fn markdown_in(folder: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(at_root(folder)).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()
+}
+
+/// A page without its blocks of code and its comments.
+fn prose(page: &Path) -> String {
+    let text = std::fs::read_to_string(page).unwrap();
+    let mut is_code = false;
+    let lines = text.lines().filter(|line| {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence && !line.starts_with("<!--")
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// What a link may name behind `#`: headings in lower case, without punctuation, with hyphens for spaces.
+fn anchors(prose: &str) -> impl Iterator<Item = String> {
+    let headings =
+        prose.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    headings.map(|heading| {
+        let kept = heading.to_lowercase().replace(' ', "-");
+        kept.chars().filter(|letter| letter.is_alphanumeric() || "-_".contains(*letter)).collect()
+    })
 }

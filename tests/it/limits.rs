@@ -114,6 +114,43 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
 }
 
 #[tokio::test]
+async fn clouds_beyond_the_limit_of_the_dense_solver_are_registered_and_not_factorized() {
+    let server = Server::with_flags(&["--max-points", "25", "--max-dense-points", "20"]).await;
+    let expect_refused = async |path: &str, body: Value, pointer: &str| {
+        let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
+        assert_eq!((&problem["limit"], &problem["required"]), (&json!(20), &json!(25)), "{path}");
+        assert_eq!(problem["errors"][0]["pointer"], pointer);
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(
+            detail.contains(r#""solver" to "local""#) && detail.contains("GRAMIAN_MAX_DENSE_POINTS"),
+            "{detail}"
+        );
+    };
+    let points = json!({"points": fibonacci_sphere(25)});
+    let registered = server.post("/v1/clouds", &points).await;
+    assert_eq!(registered.status, 201);
+    let id = registered.json()["cloud_id"].clone();
+    for route in &ROUTES {
+        let mut body = route.with("/cloud", &points);
+        if !route.is_geometry() {
+            // What the local solver has is not refused unless the dense one is asked for.
+            body["solver"] = json!("dense");
+        }
+        expect_refused(route.path, body.clone(), "/cloud/points").await;
+        body["cloud"] = json!({"id": id});
+        expect_refused(route.path, body, "/cloud/id").await;
+        if route.has_geometry {
+            let surface = json!({"cloud": {"id": id}});
+            expect_refused(route.path, route.with("/geometry", &surface), "/geometry/cloud/id").await;
+        }
+        server.post(route.path, &route.request()).await.expect_ok();
+    }
+    let beyond = json!({"points": fibonacci_sphere(26)});
+    let problem = server.post("/v1/clouds", &beyond).await.expect_problem(413, "problem-too-large");
+    assert!(problem["detail"].as_str().unwrap().contains("GRAMIAN_MAX_POINTS"), "{problem}");
+}
+
+#[tokio::test]
 async fn answers_beyond_the_limit_are_refused_before_they_are_computed() {
     let server = Server::with_flags(&["--max-response-bytes", "5000"]).await;
     // 20 points and 20 queries: 25 bytes for each number.

@@ -19,7 +19,7 @@ async fn every_type_of_problem_has_a_page() {
     // The names of the contract that this version has; none may go or change.
     for slug in [
         "malformed-json invalid-request invalid-cloud duplicate-points dimension-mismatch length-mismatch",
-        "kernel-not-smooth kernel-not-positive-definite not-positive-definite unknown-cloud not-found",
+        "kernel-not-smooth kernel-not-positive-definite not-positive-definite unsupported-by-solver unknown-cloud not-found",
         "method-not-allowed not-acceptable unsupported-media-type body-too-large problem-too-large unauthorized",
         "overloaded deadline-exceeded internal",
     ]

@@ -19,6 +19,7 @@ async fn every_setting_has_a_variable_and_a_flag_which_wins() {
         "CACHE_BYTES",
         "CLOUD_BYTES",
         "MAX_POINTS",
+        "MAX_DENSE_POINTS",
         "MAX_QUERIES",
         "MAX_DIMENSION",
         "MAX_BODY_BYTES",
@@ -70,6 +71,7 @@ fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
     ];
     let counts = [
         "MAX_POINTS",
+        "MAX_DENSE_POINTS",
         "MAX_QUERIES",
         "MAX_DIMENSION",
         "MAX_BODY_BYTES",

@@ -80,11 +80,11 @@ impl Surface {
 
     /// Values sampled at the points of the cloud.
     pub fn function(&self, values: &[f64]) -> Function<'_> {
-        Function { surface: self, interpolant: fit(&self.surface.signature().solver, values) }
+        Function { surface: self, interpolant: fit(&self.surface.signature().unwrap().solver, values) }
     }
 
     fn jets(&self, queries: &Cloud, order: JetOrder) -> Jets {
-        self.surface.signature().at(queries, order, &Unobserved).unwrap()
+        self.surface.signature().unwrap().at(queries, order, &Unobserved).unwrap()
     }
 
     fn geometry(&self, queries: &Cloud, orientation: Orientation) -> Geometry {
@@ -93,6 +93,7 @@ impl Surface {
             model: self.model,
             checks_curvatures: self.model == SurfaceModel::Auto,
             max_offsets: usize::MAX,
+            has_deviations: false,
         };
         Geometry::of(&self.surface, queries, &request, &Unobserved).unwrap()
     }

@@ -33,8 +33,10 @@ METHODS: dict[str, dict[str, Any]] = {
     "curvatures": {},
     "surface_gradient": {"values": VALUES},
     "surface_gradient_matrix": {},
+    "surface_gradient_sparse_matrix": {},
     "laplace_beltrami": {"values": VALUES},
     "laplace_beltrami_matrix": {},
+    "laplace_beltrami_sparse_matrix": {},
 }
 OPERATORS = [method for method in METHODS if "surface_gradient" in method or "laplace" in method]
 

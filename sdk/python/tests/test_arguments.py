@@ -415,6 +415,30 @@ def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
             assert sent(method, orientation=orientation)["orientation"] == "gradient"
 
 
+@pytest.mark.parametrize("method", ["normals", "curvatures"])
+def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
+    wanted = {"include": ["deviations"]}
+    said: list[dict[str, Any]] = [
+        {"deviations": True},
+        {"deviations": np.True_},
+        {"deviations": True, "include": []},
+        {"deviations": True, "include": "deviations"},
+        {"include": "deviations"},
+        {"include": [gramian.GeometryInclude.DEVIATIONS], "deviations": False},
+    ]
+    for arguments in said:
+        assert sent(method, **arguments) == wanted
+    for absent in [None, UNSET, False]:
+        assert sent(method, deviations=absent, include=UNSET) == {}
+    for number in [1, 0.0, "yes", [True]]:
+        with pytest.raises(TypeError, match=r"^deviations is to be True or False, not "):
+            sent(method, deviations=number)
+    with pytest.raises(ValueError, match=r"^include is 'deviation', .*; did you mean 'deviations'\?$"):
+        sent(method, include="deviation")
+    with pytest.raises(TypeError, match=rf"^{method}\(\) has no parameter 'deviation'; did you mean 'deviations'\?$"):
+        sent(method, deviation=True)
+
+
 @pytest.mark.parametrize("include", QUANTITIES, ids=repr)
 def test_one_word_may_stand_for_a_list(include: object) -> None:
     assert sent("posterior", include=include)["include"] == ["variance"]

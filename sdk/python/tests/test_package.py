@@ -12,10 +12,12 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
+import scipy.sparse
 
 import gramian
 from gramian import Cloud, Geometry, Kernel, KernelFamily
@@ -49,6 +51,10 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     "surface_gradient_matrix": lambda cloud: cloud.surface_gradient_matrix(QUERIES, kernel=GAUSS),
     "laplace_beltrami": lambda cloud: cloud.laplace_beltrami(squares(cloud), QUERIES, kernel=GAUSS),
     "laplace_beltrami_matrix": lambda cloud: cloud.laplace_beltrami_matrix(QUERIES, kernel=GAUSS),
+    "deviations": lambda cloud: cloud.curvatures(QUERIES, kernel=GAUSS, alpha=0, deviations=True),
+    "deviations of normals": lambda cloud: cloud.normals(QUERIES, include="deviations"),
+    "surface_gradient_sparse_matrix": lambda cloud: cloud.surface_gradient_sparse_matrix(QUERIES, kernel=GAUSS),
+    "laplace_beltrami_sparse_matrix": lambda cloud: cloud.laplace_beltrami_sparse_matrix(QUERIES, kernel=GAUSS),
     "another surface": lambda cloud: cloud.laplace_beltrami(
         squares(cloud), kernel=GAUSS, geometry=Geometry(cloud=cloud, alpha=1e-8, noise_variances=None)
     ),
@@ -78,6 +84,11 @@ def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], ob
             np.testing.assert_array_equal(value, other, err_msg=name)
             assert not value.flags.writeable
             assert not other.flags.writeable
+        elif name in ["matrix", "matrices"]:
+            for matrix, other_matrix in zip(*(v if isinstance(v, list) else [v] for v in (value, other)), strict=True):
+                assert isinstance(matrix, scipy.sparse.csr_matrix)
+                assert (matrix.shape, matrix.dtype) == (other_matrix.shape, other_matrix.dtype)
+                assert (matrix != other_matrix).nnz == 0
         elif name == "fit":
             assert repr(value) == repr(other)
         else:
@@ -115,6 +126,74 @@ def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) 
     assert answer.degenerate[0].reason is gramian.DegenerateReason.VANISHING_GRADIENT
 
 
+def test_deviations_are_there_where_they_are_asked_for(client: gramian.Client) -> None:
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(400, 3))
+    points *= (1 + 0.01 * rng.normal(size=(400, 1))) / np.linalg.norm(points, axis=1, keepdims=True)
+    cloud = client.cloud(points)
+    queries = np.vstack([points[:7], [[50.0, 0.0, 0.0]]])
+    answer = cloud.curvatures(queries, deviations=True)
+    deviations = [answer.normal_deviations, answer.mean_curvature_deviations, answer.gaussian_curvature_deviations]
+    for numbers, of_what in zip(deviations, [answer.mean_curvatures] * 3, strict=True):
+        assert numbers is not None
+        assert numbers.shape == (8,)
+        assert (np.isnan(of_what) <= np.isnan(numbers)).all()
+        assert (numbers[:7] > 0).all()
+    assert answer.principal_curvature_deviations is not None
+    assert answer.principal_curvature_deviations.shape == (8, 2)
+    assert answer.mean_curvature_deviations is not None
+    errors = np.abs(answer.mean_curvatures[:7] - 1) / answer.mean_curvature_deviations[:7]
+    assert np.median(errors) < 2
+    assert answer.diagnostics.solver is gramian.SolverUsed.LOCAL
+    assert answer.diagnostics.noise_deviation == pytest.approx(0.01, rel=0.3)
+    normals = cloud.normals(queries, include="deviations")
+    assert normals.normal_deviations is not None
+    assert normals.normal_deviations.shape == (8,)
+    plain = cloud.curvatures(queries)
+    assert plain.normal_deviations is plain.principal_curvature_deviations is plain.mean_curvature_deviations is None
+    assert cloud.normals(queries).normal_deviations is None
+
+
+@pytest.mark.parametrize("format_", ["safetensors", "json"])
+def test_sparse_matrices_are_those_of_scipy(format_: Format) -> None:
+    angles = np.arange(200) * np.pi / 100
+    cloud = gramian.Client(format=format_).cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
+    laplace = cloud.laplace_beltrami_sparse_matrix(solver="local")
+    assert laplace.matrix.shape == (200, 200)
+    assert laplace.matrix.nnz < 200 * 30
+    np.testing.assert_allclose(laplace.matrix @ np.cos(3 * angles), -9 * np.cos(3 * angles), atol=1e-2)
+    gradient = cloud.surface_gradient_sparse_matrix(cloud.points[:5] if cloud.points is not None else None)
+    assert [matrix.shape for matrix in gradient.matrices] == [(5, 200), (5, 200)]
+    tangents = np.array([-np.sin(angles[:5]), np.cos(angles[:5])])
+    found = np.array([matrix @ np.sin(angles) for matrix in gradient.matrices])
+    np.testing.assert_allclose(found, np.cos(angles[:5]) * tangents, atol=1e-4)
+    assert repr(laplace).startswith("LaplaceBeltramiSparseMatrix(matrix=csr_matrix[200, 200], degenerate=()")
+
+
+def test_without_scipy_an_error_says_what_is_missing(circle: Array) -> None:
+    program = f"""
+import sys
+sys.modules["scipy"] = None  # as if it were not installed
+import gramian
+cloud = gramian.Client().cloud({circle.tolist()})
+for method in [cloud.laplace_beltrami_sparse_matrix, cloud.surface_gradient_sparse_matrix]:
+    try:
+        method()
+    except ModuleNotFoundError as error:
+        print(error.name, error)
+"""
+    printed = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
+    message = "sparse matrices are those of SciPy, which is not installed: pip install 'gramian[scipy]'"
+    assert printed == f"scipy {message}\n" * 2
+
+
+def test_scipy_is_imported_where_it_is_needed() -> None:
+    program = "import sys, gramian; print('scipy' in sys.modules)"
+    assert (
+        subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout == "False\n"
+    )
+
+
 def test_without_safetensors_json_is_used(circle: Array) -> None:
     program = f"""
 import sys
@@ -140,6 +219,29 @@ def test_a_forgotten_cloud_is_posted_again(format_: Format, circle: Array) -> No
     forget(cloud)
     np.testing.assert_array_equal(cloud.normals().normals, expected)
     assert cloud.id in {known.id for known in client.clouds()}
+
+
+def test_a_file_is_a_cloud(client: gramian.Client, tmp_path: Path) -> None:
+    points = np.array([[0.0, 0.0, 1.0], [0.0, 3.0, 1.0], [2.0, 0.5, 0.25]])
+    names = ["x", "y", "z", "nx", "ny", "nz"]
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    head = "\n".join([*lines, *(f"property double {name}" for name in names), "end_header", ""])
+    file = head.encode() + np.hstack([points, points]).astype("<f8").tobytes()
+    path = tmp_path / "scan.PLY"
+    path.write_bytes(file)
+    expected = client.cloud(points, normals=points)
+    paths: list[Path | str] = [path, str(path)]
+    for cloud in [client.cloud(file), *map(client.cloud, paths)]:
+        assert (cloud.id, cloud.n_points, cloud.points) == (expected.id, 3, None)
+    cloud = client.cloud(file)
+    forget(cloud)
+    np.testing.assert_array_equal(cloud.normals().normals, expected.normals().normals)
+    with pytest.raises(TypeError, match="a PLY file has its own"):
+        client.cloud(path, normals=points)
+    with pytest.raises(gramian.Problem, match="at most 0 fit"):
+        client.cloud(head.encode())
+    with pytest.raises(FileNotFoundError):
+        client.cloud("nowhere.ply")
 
 
 def test_the_cloud_of_a_geometry_is_posted_again(client: gramian.Client, circle: Array) -> None:

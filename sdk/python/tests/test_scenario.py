@@ -89,8 +89,8 @@ def test_laplace_beltrami_matrix(client: Client, cloud: CloudRef) -> None:
     for row, cosine in zip(answer.matrix, COSINES, strict=True):
         assert row is not None
         assert len(row) == 8
-        # Δ cos θ = −cos θ. Eight points and this kernel give it to 2.4e-6 (the README shows −1.000002 at (1, 0)); its
-        # condition, 3e3, and entries of 5 leave rounding below 1e-11.
+        # Δ cos θ = −cos θ. Eight points and this kernel give it to 2.4e-6, as docs/walkthrough.md shows at (1, 0);
+        # its condition, 3e3, and entries of 5 leave rounding below 1e-11.
         assert sum(x * y for x, y in zip(row, COSINES, strict=True)) == pytest.approx(-cosine, abs=1e-5)
 
 

@@ -93,6 +93,7 @@ def test_enumerations_are_enumerations() -> None:
     assert hints["factorization"] is models.FactorizationUsed
     assert fields(models.Warning_)["code"] is models.WarningCode
     assert fields(models.PosteriorRequest)["include"] == list[models.PosteriorQuantity] | Unset
+    assert fields(models.NormalsRequest)["include"] == list[models.GeometryInclude] | Unset
 
 
 def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
@@ -103,13 +104,17 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
     assert curvatures["principal_directions"] == list[list[row] | None]
     assert curvatures["mean_curvatures"] == list[float | None]
     assert curvatures["gaussian_curvatures"] == list[float | None]
+    assert curvatures["principal_curvature_deviations"] == list[row | None] | Unset
+    for of_what in ["normal", "mean_curvature", "gaussian_curvature"]:
+        assert curvatures[f"{of_what}_deviations"] == list[float | None] | Unset
     assert fields(models.SurfaceGradientResponse)["gradients"] == list[row | None]
     assert fields(models.SurfaceGradientMatrixResponse)["matrices"] == list[list[row | None]]
     assert fields(models.LaplaceBeltramiResponse)["values"] == list[float | None]
     assert fields(models.LaplaceBeltramiMatrixResponse)["matrix"] == list[row | None]
+    assert fields(models.LaplaceBeltramiSparseMatrixResponse)["indices"] == list[int]
     nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
     assert all(name.endswith("Response") for name in nullable)
-    assert not nullable & {"InterpolationResponse", "PosteriorResponse"}
+    assert not nullable & {"InterpolationResponse", "PosteriorResponse", "LaplaceBeltramiSparseMatrixResponse"}
 
 
 def test_a_required_body_is_required_and_the_key_is_not() -> None:
@@ -123,7 +128,9 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
 
 
 @pytest.mark.parametrize(
-    "alias", [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Quantity], ids=str
+    "alias",
+    [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Quantity, fit.Deviations],
+    ids=str,
 )
 def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:
     enumeration, *used, strings = get_args(alias)

@@ -222,6 +222,9 @@ the noise of the points, 1e-3 at least.*/
         ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///What is wanted beside what every answer has.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<GeometryInclude>,
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
@@ -253,16 +256,31 @@ the noise of the points, 1e-3 at least.*/
         pub degenerate: ::std::vec::Vec<Degenerate>,
         ///How the answer came about.
         pub diagnostics: Diagnostics,
+        ///Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gaussian_curvature_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
         ///Their product at each query, 1/length to the d − 1; null where there are none.
         pub gaussian_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
         ///|∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
         pub gradient_norms: ::std::vec::Vec<f64>,
         ///The signature function at each query: 1 on the surface, usually more inside a closed one.
         pub levels: ::std::vec::Vec<f64>,
+        ///Standard deviations of the mean curvatures, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_curvature_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
         ///Their average at each query, 1/length; null where there are none.
         pub mean_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
+        /**Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
+there is no answer or none is known.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub normal_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
         ///The normal at each query, of length 1; null where there is none.
         pub normals: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+        ///Standard deviations of the principal curvatures at each query, in their order, 1/length.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub principal_curvature_deviations: ::std::vec::Vec<
+            ::std::option::Option<::std::vec::Vec<f64>>,
+        >,
         ///The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
         pub principal_curvatures: ::std::vec::Vec<
             ::std::option::Option<::std::vec::Vec<f64>>,
@@ -388,15 +406,25 @@ where that has no answer.*/
         ///Queries answered, m.
         pub n_queries: u64,
         ///‖u‖² = ΛᵀKΛ in the native space of the kernel.
-        pub native_norm_squared: f64,
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub native_norm_squared: ::std::option::Option<f64>,
+        ///Standard deviation of the noise of the points across the surface, as estimated, length.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub noise_deviation: ::std::option::Option<f64>,
         ///Numerical rank of the matrix.
-        pub rank: u64,
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub rank: ::std::option::Option<u64>,
         ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
-        pub reciprocal_condition: f64,
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub reciprocal_condition: ::std::option::Option<f64>,
         ///‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
-        pub relative_residual: f64,
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub relative_residual: ::std::option::Option<f64>,
         ///The solver used.
         pub solver: SolverUsed,
+        ///Why it was chosen, where `auto` chose another one than the dense one.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver_reason: ::std::option::Option<::std::string::String>,
         ///What was changed or limits the accuracy.
         pub warnings: ::std::vec::Vec<Warning>,
     }
@@ -572,6 +600,57 @@ the request.*/
     impl Geometry {
         pub fn builder() -> builder::Geometry {
             Default::default()
+        }
+    }
+    ///What a geometric answer has beside what it always has.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum GeometryInclude {
+        #[serde(rename = "deviations")]
+        Deviations,
+    }
+    impl ::std::fmt::Display for GeometryInclude {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Deviations => f.write_str("deviations"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for GeometryInclude {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "deviations" => Ok(Self::Deviations),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for GeometryInclude {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for GeometryInclude {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
         }
     }
     ///The state of the process.
@@ -913,6 +992,62 @@ the noise of the points, 1e-3 at least.*/
             Default::default()
         }
     }
+    ///Nodes and queries of the operator as a sparse matrix.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct LaplaceBeltramiSparseMatrixRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
+the noise of the points, 1e-3 at least.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The surface, where it is not that of the request.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///Where rows are wanted; the points of the surface if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+    }
+    impl LaplaceBeltramiSparseMatrixRequest {
+        pub fn builder() -> builder::LaplaceBeltramiSparseMatrixRequest {
+            Default::default()
+        }
+    }
+    ///The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct LaplaceBeltramiSparseMatrixResponse {
+        ///The entries row by row, 1/length²: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
+        pub data: ::std::vec::Vec<f64>,
+        ///The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
+        pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the surface came about.
+        pub diagnostics: Diagnostics,
+        ///The column of each entry, from 0, ascending within a row.
+        pub indices: ::std::vec::Vec<i64>,
+        ///Where each row begins among the entries, and how many there are, from 0.
+        pub indptr: ::std::vec::Vec<i64>,
+        ///Queries, nodes.
+        pub shape: ::std::vec::Vec<i64>,
+    }
+    impl LaplaceBeltramiSparseMatrixResponse {
+        pub fn builder() -> builder::LaplaceBeltramiSparseMatrixResponse {
+            Default::default()
+        }
+    }
     ///How a matrix is written.
     #[derive(
         ::serde::Deserialize,
@@ -978,6 +1113,9 @@ the noise of the points, 1e-3 at least.*/
         ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///What is wanted beside what every answer has.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<GeometryInclude>,
         ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
@@ -1013,6 +1151,10 @@ the noise of the points, 1e-3 at least.*/
         pub gradient_norms: ::std::vec::Vec<f64>,
         ///The signature function at each query: 1 on the surface, usually more inside a closed one.
         pub levels: ::std::vec::Vec<f64>,
+        /**Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
+there is no answer or none is known.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub normal_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
         ///The normal at each query, of length 1; null where there is none.
         pub normals: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
         ///The function whose level surface was used at each query; `signature` where there is no answer.
@@ -1299,12 +1441,15 @@ the noise of the points, 1e-3 at least.*/
         Auto,
         #[serde(rename = "dense")]
         Dense,
+        #[serde(rename = "local")]
+        Local,
     }
     impl ::std::fmt::Display for SolverChoice {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
             match *self {
                 Self::Auto => f.write_str("auto"),
                 Self::Dense => f.write_str("dense"),
+                Self::Local => f.write_str("local"),
             }
         }
     }
@@ -1316,6 +1461,7 @@ the noise of the points, 1e-3 at least.*/
             match value {
                 "auto" => Ok(Self::Auto),
                 "dense" => Ok(Self::Dense),
+                "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
             }
         }
@@ -1434,6 +1580,8 @@ the noise of the points, 1e-3 at least.*/
         Signature,
         #[serde(rename = "offset")]
         Offset,
+        #[serde(rename = "local")]
+        Local,
     }
     impl ::std::fmt::Display for SurfaceChoice {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
@@ -1441,6 +1589,7 @@ the noise of the points, 1e-3 at least.*/
                 Self::Auto => f.write_str("auto"),
                 Self::Signature => f.write_str("signature"),
                 Self::Offset => f.write_str("offset"),
+                Self::Local => f.write_str("local"),
             }
         }
     }
@@ -1453,6 +1602,7 @@ the noise of the points, 1e-3 at least.*/
                 "auto" => Ok(Self::Auto),
                 "signature" => Ok(Self::Signature),
                 "offset" => Ok(Self::Offset),
+                "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
             }
         }
@@ -1578,6 +1728,62 @@ the noise of the points, 1e-3 at least.*/
             Default::default()
         }
     }
+    ///Nodes and queries of the operator as a sparse matrix.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct SurfaceGradientSparseMatrixRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
+the noise of the points, 1e-3 at least.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///The surface, where it is not that of the request.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub geometry: ::std::option::Option<Geometry>,
+        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///Where rows are wanted; the points of the surface if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+    }
+    impl SurfaceGradientSparseMatrixRequest {
+        pub fn builder() -> builder::SurfaceGradientSparseMatrixRequest {
+            Default::default()
+        }
+    }
+    ///The components of the surface gradient as sparse matrices with rows for the queries and columns for the nodes.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct SurfaceGradientSparseMatrixResponse {
+        ///The entries row by row, 1/length, one list per component.
+        pub data: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
+        pub degenerate: ::std::vec::Vec<Degenerate>,
+        ///How the surface came about.
+        pub diagnostics: Diagnostics,
+        ///The column of each entry, from 0, ascending within a row.
+        pub indices: ::std::vec::Vec<i64>,
+        ///Where each row begins among the entries, and how many there are, from 0.
+        pub indptr: ::std::vec::Vec<i64>,
+        ///Components, queries, nodes.
+        pub shape: ::std::vec::Vec<i64>,
+    }
+    impl SurfaceGradientSparseMatrixResponse {
+        pub fn builder() -> builder::SurfaceGradientSparseMatrixResponse {
+            Default::default()
+        }
+    }
     ///The function whose level surface was used at a query.
     #[derive(
         ::serde::Deserialize,
@@ -1596,12 +1802,15 @@ the noise of the points, 1e-3 at least.*/
         Signature,
         #[serde(rename = "offset")]
         Offset,
+        #[serde(rename = "local")]
+        Local,
     }
     impl ::std::fmt::Display for SurfaceUsed {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
             match *self {
                 Self::Signature => f.write_str("signature"),
                 Self::Offset => f.write_str("offset"),
+                Self::Local => f.write_str("local"),
             }
         }
     }
@@ -1613,6 +1822,7 @@ the noise of the points, 1e-3 at least.*/
             match value {
                 "signature" => Ok(Self::Signature),
                 "offset" => Ok(Self::Offset),
+                "local" => Ok(Self::Local),
                 _ => Err("invalid value".into()),
             }
         }
@@ -2179,6 +2389,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::DuplicatePolicy>,
                 ::std::string::String,
             >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::GeometryInclude>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
@@ -2210,6 +2424,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: Ok(Default::default()),
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
+                    include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     orientation: Ok(Default::default()),
@@ -2255,6 +2470,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::GeometryInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
                     });
                 self
             }
@@ -2344,6 +2571,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: value.alpha?,
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
+                    include: value.include?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     orientation: value.orientation?,
@@ -2359,6 +2587,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: Ok(value.alpha),
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
+                    include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     orientation: Ok(value.orientation),
@@ -2378,6 +2607,10 @@ the noise of the points, 1e-3 at least.*/
                 super::Diagnostics,
                 ::std::string::String,
             >,
+            gaussian_curvature_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             gaussian_curvatures: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<f64>>,
                 ::std::string::String,
@@ -2387,11 +2620,23 @@ the noise of the points, 1e-3 at least.*/
                 ::std::string::String,
             >,
             levels: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            mean_curvature_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             mean_curvatures: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<f64>>,
                 ::std::string::String,
             >,
+            normal_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             normals: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            principal_curvature_deviations: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
                 ::std::string::String,
             >,
@@ -2415,6 +2660,7 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Err("no value supplied for degenerate".to_string()),
                     diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    gaussian_curvature_deviations: Ok(Default::default()),
                     gaussian_curvatures: Err(
                         "no value supplied for gaussian_curvatures".to_string(),
                     ),
@@ -2422,10 +2668,13 @@ the noise of the points, 1e-3 at least.*/
                         "no value supplied for gradient_norms".to_string(),
                     ),
                     levels: Err("no value supplied for levels".to_string()),
+                    mean_curvature_deviations: Ok(Default::default()),
                     mean_curvatures: Err(
                         "no value supplied for mean_curvatures".to_string(),
                     ),
+                    normal_deviations: Ok(Default::default()),
                     normals: Err("no value supplied for normals".to_string()),
+                    principal_curvature_deviations: Ok(Default::default()),
                     principal_curvatures: Err(
                         "no value supplied for principal_curvatures".to_string(),
                     ),
@@ -2458,6 +2707,20 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn gaussian_curvature_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gaussian_curvature_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gaussian_curvature_deviations: {e}"
+                        )
                     });
                 self
             }
@@ -2501,6 +2764,20 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn mean_curvature_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_curvature_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_curvature_deviations: {e}"
+                        )
+                    });
+                self
+            }
             pub fn mean_curvatures<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
@@ -2511,6 +2788,20 @@ the noise of the points, 1e-3 at least.*/
                     .map_err(|e| {
                         format!(
                             "error converting supplied value for mean_curvatures: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn normal_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.normal_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for normal_deviations: {e}"
                         )
                     });
                 self
@@ -2526,6 +2817,22 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for normals: {e}")
+                    });
+                self
+            }
+            pub fn principal_curvature_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.principal_curvature_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for principal_curvature_deviations: {e}"
+                        )
                     });
                 self
             }
@@ -2584,11 +2891,16 @@ the noise of the points, 1e-3 at least.*/
                 Ok(Self {
                     degenerate: value.degenerate?,
                     diagnostics: value.diagnostics?,
+                    gaussian_curvature_deviations: value.gaussian_curvature_deviations?,
                     gaussian_curvatures: value.gaussian_curvatures?,
                     gradient_norms: value.gradient_norms?,
                     levels: value.levels?,
+                    mean_curvature_deviations: value.mean_curvature_deviations?,
                     mean_curvatures: value.mean_curvatures?,
+                    normal_deviations: value.normal_deviations?,
                     normals: value.normals?,
+                    principal_curvature_deviations: value
+                        .principal_curvature_deviations?,
                     principal_curvatures: value.principal_curvatures?,
                     principal_directions: value.principal_directions?,
                     surfaces: value.surfaces?,
@@ -2600,11 +2912,19 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Ok(value.degenerate),
                     diagnostics: Ok(value.diagnostics),
+                    gaussian_curvature_deviations: Ok(
+                        value.gaussian_curvature_deviations,
+                    ),
                     gaussian_curvatures: Ok(value.gaussian_curvatures),
                     gradient_norms: Ok(value.gradient_norms),
                     levels: Ok(value.levels),
+                    mean_curvature_deviations: Ok(value.mean_curvature_deviations),
                     mean_curvatures: Ok(value.mean_curvatures),
+                    normal_deviations: Ok(value.normal_deviations),
                     normals: Ok(value.normals),
+                    principal_curvature_deviations: Ok(
+                        value.principal_curvature_deviations,
+                    ),
                     principal_curvatures: Ok(value.principal_curvatures),
                     principal_directions: Ok(value.principal_directions),
                     surfaces: Ok(value.surfaces),
@@ -2711,11 +3031,31 @@ the noise of the points, 1e-3 at least.*/
             n_merged_duplicates: ::std::result::Result<u64, ::std::string::String>,
             n_points: ::std::result::Result<u64, ::std::string::String>,
             n_queries: ::std::result::Result<u64, ::std::string::String>,
-            native_norm_squared: ::std::result::Result<f64, ::std::string::String>,
-            rank: ::std::result::Result<u64, ::std::string::String>,
-            reciprocal_condition: ::std::result::Result<f64, ::std::string::String>,
-            relative_residual: ::std::result::Result<f64, ::std::string::String>,
+            native_norm_squared: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            noise_deviation: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            rank: ::std::result::Result<
+                ::std::option::Option<u64>,
+                ::std::string::String,
+            >,
+            reciprocal_condition: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            relative_residual: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<super::SolverUsed, ::std::string::String>,
+            solver_reason: ::std::result::Result<
+                ::std::option::Option<::std::string::String>,
+                ::std::string::String,
+            >,
             warnings: ::std::result::Result<
                 ::std::vec::Vec<super::Warning>,
                 ::std::string::String,
@@ -2738,17 +3078,13 @@ the noise of the points, 1e-3 at least.*/
                     ),
                     n_points: Err("no value supplied for n_points".to_string()),
                     n_queries: Err("no value supplied for n_queries".to_string()),
-                    native_norm_squared: Err(
-                        "no value supplied for native_norm_squared".to_string(),
-                    ),
-                    rank: Err("no value supplied for rank".to_string()),
-                    reciprocal_condition: Err(
-                        "no value supplied for reciprocal_condition".to_string(),
-                    ),
-                    relative_residual: Err(
-                        "no value supplied for relative_residual".to_string(),
-                    ),
+                    native_norm_squared: Ok(Default::default()),
+                    noise_deviation: Ok(Default::default()),
+                    rank: Ok(Default::default()),
+                    reciprocal_condition: Ok(Default::default()),
+                    relative_residual: Ok(Default::default()),
                     solver: Err("no value supplied for solver".to_string()),
+                    solver_reason: Ok(Default::default()),
                     warnings: Err("no value supplied for warnings".to_string()),
                 }
             }
@@ -2880,7 +3216,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn native_norm_squared<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<f64>,
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.native_norm_squared = value
@@ -2892,9 +3228,23 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn noise_deviation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_deviation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_deviation: {e}"
+                        )
+                    });
+                self
+            }
             pub fn rank<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<u64>,
+                T: ::std::convert::TryInto<::std::option::Option<u64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.rank = value
@@ -2906,7 +3256,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn reciprocal_condition<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<f64>,
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.reciprocal_condition = value
@@ -2920,7 +3270,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn relative_residual<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<f64>,
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.relative_residual = value
@@ -2941,6 +3291,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn solver_reason<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<::std::string::String>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver_reason = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver_reason: {e}")
                     });
                 self
             }
@@ -2974,10 +3336,12 @@ the noise of the points, 1e-3 at least.*/
                     n_points: value.n_points?,
                     n_queries: value.n_queries?,
                     native_norm_squared: value.native_norm_squared?,
+                    noise_deviation: value.noise_deviation?,
                     rank: value.rank?,
                     reciprocal_condition: value.reciprocal_condition?,
                     relative_residual: value.relative_residual?,
                     solver: value.solver?,
+                    solver_reason: value.solver_reason?,
                     warnings: value.warnings?,
                 })
             }
@@ -2996,10 +3360,12 @@ the noise of the points, 1e-3 at least.*/
                     n_points: Ok(value.n_points),
                     n_queries: Ok(value.n_queries),
                     native_norm_squared: Ok(value.native_norm_squared),
+                    noise_deviation: Ok(value.noise_deviation),
                     rank: Ok(value.rank),
                     reciprocal_condition: Ok(value.reciprocal_condition),
                     relative_residual: Ok(value.relative_residual),
                     solver: Ok(value.solver),
+                    solver_reason: Ok(value.solver_reason),
                     warnings: Ok(value.warnings),
                 }
             }
@@ -4622,6 +4988,317 @@ the noise of the points, 1e-3 at least.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct LaplaceBeltramiSparseMatrixRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            geometry: ::std::result::Result<
+                ::std::option::Option<super::Geometry>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            queries: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for LaplaceBeltramiSparseMatrixRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    duplicates: Ok(Default::default()),
+                    geometry: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    queries: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                }
+            }
+        }
+        impl LaplaceBeltramiSparseMatrixRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn geometry<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Geometry>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.geometry = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn queries<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.queries = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for queries: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<LaplaceBeltramiSparseMatrixRequest>
+        for super::LaplaceBeltramiSparseMatrixRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: LaplaceBeltramiSparseMatrixRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    duplicates: value.duplicates?,
+                    geometry: value.geometry?,
+                    kernel: value.kernel?,
+                    noise_variances: value.noise_variances?,
+                    queries: value.queries?,
+                    solver: value.solver?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::LaplaceBeltramiSparseMatrixRequest>
+        for LaplaceBeltramiSparseMatrixRequest {
+            fn from(value: super::LaplaceBeltramiSparseMatrixRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    duplicates: Ok(value.duplicates),
+                    geometry: Ok(value.geometry),
+                    kernel: Ok(value.kernel),
+                    noise_variances: Ok(value.noise_variances),
+                    queries: Ok(value.queries),
+                    solver: Ok(value.solver),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct LaplaceBeltramiSparseMatrixResponse {
+            data: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            degenerate: ::std::result::Result<
+                ::std::vec::Vec<super::Degenerate>,
+                ::std::string::String,
+            >,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            indices: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+            indptr: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+            shape: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+        }
+        impl ::std::default::Default for LaplaceBeltramiSparseMatrixResponse {
+            fn default() -> Self {
+                Self {
+                    data: Err("no value supplied for data".to_string()),
+                    degenerate: Err("no value supplied for degenerate".to_string()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    indices: Err("no value supplied for indices".to_string()),
+                    indptr: Err("no value supplied for indptr".to_string()),
+                    shape: Err("no value supplied for shape".to_string()),
+                }
+            }
+        }
+        impl LaplaceBeltramiSparseMatrixResponse {
+            pub fn data<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.data = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for data: {e}")
+                    });
+                self
+            }
+            pub fn degenerate<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Degenerate>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.degenerate = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for degenerate: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn indices<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.indices = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for indices: {e}")
+                    });
+                self
+            }
+            pub fn indptr<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.indptr = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for indptr: {e}")
+                    });
+                self
+            }
+            pub fn shape<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.shape = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for shape: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<LaplaceBeltramiSparseMatrixResponse>
+        for super::LaplaceBeltramiSparseMatrixResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: LaplaceBeltramiSparseMatrixResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    data: value.data?,
+                    degenerate: value.degenerate?,
+                    diagnostics: value.diagnostics?,
+                    indices: value.indices?,
+                    indptr: value.indptr?,
+                    shape: value.shape?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::LaplaceBeltramiSparseMatrixResponse>
+        for LaplaceBeltramiSparseMatrixResponse {
+            fn from(value: super::LaplaceBeltramiSparseMatrixResponse) -> Self {
+                Self {
+                    data: Ok(value.data),
+                    degenerate: Ok(value.degenerate),
+                    diagnostics: Ok(value.diagnostics),
+                    indices: Ok(value.indices),
+                    indptr: Ok(value.indptr),
+                    shape: Ok(value.shape),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct NormalsRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -4630,6 +5307,10 @@ the noise of the points, 1e-3 at least.*/
             cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
             duplicates: ::std::result::Result<
                 ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::GeometryInclude>,
                 ::std::string::String,
             >,
             kernel: ::std::result::Result<
@@ -4663,6 +5344,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: Ok(Default::default()),
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
+                    include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     orientation: Ok(Default::default()),
@@ -4708,6 +5390,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::GeometryInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
                     });
                 self
             }
@@ -4797,6 +5491,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: value.alpha?,
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
+                    include: value.include?,
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     orientation: value.orientation?,
@@ -4812,6 +5507,7 @@ the noise of the points, 1e-3 at least.*/
                     alpha: Ok(value.alpha),
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
+                    include: Ok(value.include),
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     orientation: Ok(value.orientation),
@@ -4836,6 +5532,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::string::String,
             >,
             levels: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            normal_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             normals: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
                 ::std::string::String,
@@ -4854,6 +5554,7 @@ the noise of the points, 1e-3 at least.*/
                         "no value supplied for gradient_norms".to_string(),
                     ),
                     levels: Err("no value supplied for levels".to_string()),
+                    normal_deviations: Ok(Default::default()),
                     normals: Err("no value supplied for normals".to_string()),
                     surfaces: Err("no value supplied for surfaces".to_string()),
                 }
@@ -4910,6 +5611,20 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn normal_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.normal_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for normal_deviations: {e}"
+                        )
+                    });
+                self
+            }
             pub fn normals<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<
@@ -4947,6 +5662,7 @@ the noise of the points, 1e-3 at least.*/
                     diagnostics: value.diagnostics?,
                     gradient_norms: value.gradient_norms?,
                     levels: value.levels?,
+                    normal_deviations: value.normal_deviations?,
                     normals: value.normals?,
                     surfaces: value.surfaces?,
                 })
@@ -4959,6 +5675,7 @@ the noise of the points, 1e-3 at least.*/
                     diagnostics: Ok(value.diagnostics),
                     gradient_norms: Ok(value.gradient_norms),
                     levels: Ok(value.levels),
+                    normal_deviations: Ok(value.normal_deviations),
                     normals: Ok(value.normals),
                     surfaces: Ok(value.surfaces),
                 }
@@ -6154,6 +6871,320 @@ the noise of the points, 1e-3 at least.*/
             }
         }
         #[derive(Clone, Debug)]
+        pub struct SurfaceGradientSparseMatrixRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            geometry: ::std::result::Result<
+                ::std::option::Option<super::Geometry>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            queries: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for SurfaceGradientSparseMatrixRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    duplicates: Ok(Default::default()),
+                    geometry: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    queries: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                }
+            }
+        }
+        impl SurfaceGradientSparseMatrixRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn geometry<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Geometry>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.geometry = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for geometry: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn queries<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.queries = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for queries: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<SurfaceGradientSparseMatrixRequest>
+        for super::SurfaceGradientSparseMatrixRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: SurfaceGradientSparseMatrixRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    duplicates: value.duplicates?,
+                    geometry: value.geometry?,
+                    kernel: value.kernel?,
+                    noise_variances: value.noise_variances?,
+                    queries: value.queries?,
+                    solver: value.solver?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::SurfaceGradientSparseMatrixRequest>
+        for SurfaceGradientSparseMatrixRequest {
+            fn from(value: super::SurfaceGradientSparseMatrixRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    duplicates: Ok(value.duplicates),
+                    geometry: Ok(value.geometry),
+                    kernel: Ok(value.kernel),
+                    noise_variances: Ok(value.noise_variances),
+                    queries: Ok(value.queries),
+                    solver: Ok(value.solver),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct SurfaceGradientSparseMatrixResponse {
+            data: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            degenerate: ::std::result::Result<
+                ::std::vec::Vec<super::Degenerate>,
+                ::std::string::String,
+            >,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            indices: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+            indptr: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+            shape: ::std::result::Result<::std::vec::Vec<i64>, ::std::string::String>,
+        }
+        impl ::std::default::Default for SurfaceGradientSparseMatrixResponse {
+            fn default() -> Self {
+                Self {
+                    data: Err("no value supplied for data".to_string()),
+                    degenerate: Err("no value supplied for degenerate".to_string()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    indices: Err("no value supplied for indices".to_string()),
+                    indptr: Err("no value supplied for indptr".to_string()),
+                    shape: Err("no value supplied for shape".to_string()),
+                }
+            }
+        }
+        impl SurfaceGradientSparseMatrixResponse {
+            pub fn data<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.data = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for data: {e}")
+                    });
+                self
+            }
+            pub fn degenerate<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::Degenerate>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.degenerate = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for degenerate: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn indices<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.indices = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for indices: {e}")
+                    });
+                self
+            }
+            pub fn indptr<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.indptr = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for indptr: {e}")
+                    });
+                self
+            }
+            pub fn shape<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.shape = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for shape: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<SurfaceGradientSparseMatrixResponse>
+        for super::SurfaceGradientSparseMatrixResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: SurfaceGradientSparseMatrixResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    data: value.data?,
+                    degenerate: value.degenerate?,
+                    diagnostics: value.diagnostics?,
+                    indices: value.indices?,
+                    indptr: value.indptr?,
+                    shape: value.shape?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::SurfaceGradientSparseMatrixResponse>
+        for SurfaceGradientSparseMatrixResponse {
+            fn from(value: super::SurfaceGradientSparseMatrixResponse) -> Self {
+                Self {
+                    data: Ok(value.data),
+                    degenerate: Ok(value.degenerate),
+                    diagnostics: Ok(value.diagnostics),
+                    indices: Ok(value.indices),
+                    indptr: Ok(value.indptr),
+                    shape: Ok(value.shape),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct Version {
             api: ::std::result::Result<::std::string::String, ::std::string::String>,
             instruction_set: ::std::result::Result<
@@ -6613,6 +7644,24 @@ let response = client.assemble_surface_gradient_matrix()
     ) -> builder::AssembleSurfaceGradientMatrix<'_> {
         builder::AssembleSurfaceGradientMatrix::new(self)
     }
+    /**Assemble the sparse matrix of the surface gradient
+
+Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
+these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+
+Sends a `POST` request to `/v1/surface-gradient/sparse-matrix`
+
+```ignore
+let response = client.assemble_surface_gradient_sparse_matrix()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn assemble_surface_gradient_sparse_matrix(
+        &self,
+    ) -> builder::AssembleSurfaceGradientSparseMatrix<'_> {
+        builder::AssembleSurfaceGradientSparseMatrix::new(self)
+    }
     /**Compute the Laplace–Beltrami operator
 
 Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the signature function. On
@@ -6645,6 +7694,24 @@ let response = client.assemble_laplace_beltrami_matrix()
         &self,
     ) -> builder::AssembleLaplaceBeltramiMatrix<'_> {
         builder::AssembleLaplaceBeltramiMatrix::new(self)
+    }
+    /**Assemble the sparse matrix of the Laplace–Beltrami operator
+
+Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
+these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+
+Sends a `POST` request to `/v1/laplace-beltrami/sparse-matrix`
+
+```ignore
+let response = client.assemble_laplace_beltrami_sparse_matrix()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn assemble_laplace_beltrami_sparse_matrix(
+        &self,
+    ) -> builder::AssembleLaplaceBeltramiSparseMatrix<'_> {
+        builder::AssembleLaplaceBeltramiSparseMatrix::new(self)
     }
     /**Check that the process lives
 
@@ -8299,6 +9366,172 @@ pub mod builder {
             }
         }
     }
+    /**Builder for [`Client::assemble_surface_gradient_sparse_matrix`]
+
+[`Client::assemble_surface_gradient_sparse_matrix`]: super::Client::assemble_surface_gradient_sparse_matrix*/
+    #[derive(Debug, Clone)]
+    pub struct AssembleSurfaceGradientSparseMatrix<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::SurfaceGradientSparseMatrixRequest, String>,
+    }
+    impl<'a> AssembleSurfaceGradientSparseMatrix<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::SurfaceGradientSparseMatrixRequest>,
+            <V as std::convert::TryInto<
+                types::SurfaceGradientSparseMatrixRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!(
+                        "conversion to `SurfaceGradientSparseMatrixRequest` for body failed: {}",
+                        s
+                    )
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::SurfaceGradientSparseMatrixRequest,
+            ) -> types::builder::SurfaceGradientSparseMatrixRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/surface-gradient/sparse-matrix`
+        pub async fn send(
+            self,
+        ) -> Result<
+            ResponseValue<types::SurfaceGradientSparseMatrixResponse>,
+            Error<types::Problem>,
+        > {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::SurfaceGradientSparseMatrixRequest::try_from(v)
+                        .map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/surface-gradient/sparse-matrix", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "assemble_surface_gradient_sparse_matrix",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
     /**Builder for [`Client::compute_laplace_beltrami`]
 
 [`Client::compute_laplace_beltrami`]: super::Client::compute_laplace_beltrami*/
@@ -8541,6 +9774,172 @@ pub mod builder {
                 .build()?;
             let info = OperationInfo {
                 operation_id: "assemble_laplace_beltrami_matrix",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::assemble_laplace_beltrami_sparse_matrix`]
+
+[`Client::assemble_laplace_beltrami_sparse_matrix`]: super::Client::assemble_laplace_beltrami_sparse_matrix*/
+    #[derive(Debug, Clone)]
+    pub struct AssembleLaplaceBeltramiSparseMatrix<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::LaplaceBeltramiSparseMatrixRequest, String>,
+    }
+    impl<'a> AssembleLaplaceBeltramiSparseMatrix<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::LaplaceBeltramiSparseMatrixRequest>,
+            <V as std::convert::TryInto<
+                types::LaplaceBeltramiSparseMatrixRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!(
+                        "conversion to `LaplaceBeltramiSparseMatrixRequest` for body failed: {}",
+                        s
+                    )
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::LaplaceBeltramiSparseMatrixRequest,
+            ) -> types::builder::LaplaceBeltramiSparseMatrixRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/laplace-beltrami/sparse-matrix`
+        pub async fn send(
+            self,
+        ) -> Result<
+            ResponseValue<types::LaplaceBeltramiSparseMatrixResponse>,
+            Error<types::Problem>,
+        > {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::LaplaceBeltramiSparseMatrixRequest::try_from(v)
+                        .map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/laplace-beltrami/sparse-matrix", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "assemble_laplace_beltrami_sparse_matrix",
             };
             client.pre(&mut request, &info).await?;
             let result = client.exec(request, &info).await;

@@ -12,6 +12,9 @@ pub enum SolverChoice {
     Auto,
     /// Cholesky factorization of the full matrix: n³/3 flops, 4n² bytes.
     Dense,
+    /// From the points nearest to each query alone: values by kriging, surfaces by regressions. From thousands of points to
+    /// millions.
+    Local,
 }
 
 /// What to do with points that coincide when alpha is 0.
@@ -37,6 +40,8 @@ pub enum SurfaceChoice {
     /// An interpolant of signed distances on two offset layers, fitted to the points near each query. It needs no derivatives
     /// of `kernel`.
     Offset,
+    /// Local regressions of the height over a tangent plane, with noise.
+    Local,
 }
 
 /// The function whose level surface was used at a query.
@@ -47,6 +52,8 @@ pub enum SurfaceUsed {
     Signature,
     /// The interpolant of signed distances on two offset layers.
     Offset,
+    /// A local regression.
+    Local,
 }
 
 /// Which way normals point.
@@ -59,4 +66,12 @@ pub enum OrientationChoice {
     Outward,
     /// Along the gradient of the signature function, whatever its sign; with the offset model, the opposite of `outward`.
     Gradient,
+}
+
+/// What a geometric answer has beside what it always has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GeometryInclude {
+    /// Standard deviations.
+    Deviations,
 }

@@ -7,9 +7,9 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
-use crate::http::wire::write::array::finite;
+use crate::http::wire::write::array::{finite, finite_if_any};
 
-/// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`, `conjugate_gradients` and `local` are reserved: no
+/// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 /// answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -24,11 +24,11 @@ pub enum FactorizationUsed {
     PartialPivotingLu,
     /// Reserved for iterative solvers.
     ConjugateGradients,
-    /// Reserved for local patches.
+    /// None: small systems of the points nearest to each query.
     Local,
 }
 
-/// The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has them yet.
+/// The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverUsed {
@@ -38,7 +38,7 @@ pub enum SolverUsed {
     Landmark,
     /// Reserved for preconditioned conjugate gradients.
     Iterative,
-    /// Reserved for local patches.
+    /// The points nearest to each query.
     Local,
 }
 
@@ -97,22 +97,36 @@ pub struct Diagnostics {
     pub alpha: Option<f64>,
     /// The solver used.
     pub solver: SolverUsed,
+    /// Why it was chosen, where `auto` chose another one than the dense one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub solver_reason: Option<String>,
     /// How the matrix was factorized.
     pub factorization: FactorizationUsed,
     /// Numerical rank of the matrix.
-    pub rank: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub rank: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
-    #[serde(serialize_with = "finite")]
-    pub reciprocal_condition: f64,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[schema(nullable = false)]
+    pub reciprocal_condition: Option<f64>,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
-    #[serde(serialize_with = "finite")]
-    pub relative_residual: f64,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[schema(nullable = false)]
+    pub relative_residual: Option<f64>,
     /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
-    #[serde(serialize_with = "finite")]
-    pub native_norm_squared: f64,
-    /// |u(X) − Y|, unit of the values.
-    #[serde(serialize_with = "finite")]
-    pub misfit: f64,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[schema(nullable = false)]
+    pub native_norm_squared: Option<f64>,
+    /// |u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[schema(nullable = false)]
+    pub misfit: Option<f64>,
+    /// Standard deviation of the noise of the points across the surface, as estimated, length.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[schema(nullable = false)]
+    pub noise_deviation: Option<f64>,
     /// Points that were merged into an earlier one.
     pub n_merged_duplicates: usize,
     /// What was changed or limits the accuracy.

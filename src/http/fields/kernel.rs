@@ -7,6 +7,7 @@ use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::{present, word};
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
+use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::sampling::Scales;
 
 /// The families of kernels; `GET /v1/kernels` has their formulas.
@@ -153,6 +154,21 @@ impl Kernel {
                 };
                 Ok(Family::Wendland { smoothness })
             }
+        }
+    }
+}
+
+impl KernelUsed {
+    /// That of the heights of local regressions: Matérn 9/2.
+    pub fn heights(kernel: PatchKernel) -> Self {
+        let PatchKernel { length_scale, variance } = kernel;
+        Self {
+            family: KernelFamily::Matern,
+            length_scale,
+            variance,
+            epsilon: None,
+            nu: Some(4.5),
+            smoothness: None,
         }
     }
 }

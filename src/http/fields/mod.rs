@@ -8,7 +8,9 @@ mod diagnostics;
 mod fit;
 pub mod schemas;
 
-pub use choices::{DuplicatePolicy, OrientationChoice, SolverChoice, SurfaceChoice, SurfaceUsed};
+pub use choices::{
+    DuplicatePolicy, GeometryInclude, OrientationChoice, SolverChoice, SurfaceChoice, SurfaceUsed,
+};
 pub use cloud_ref::CloudRef;
 pub use diagnostics::{
     Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, Warning, WarningCode,

@@ -20,7 +20,7 @@ macro_rules! example_file {
 
 /// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
 /// sends the ones and compares the others.
-pub const EXAMPLES: [(&str, &str); 18] = [
+pub const EXAMPLES: [(&str, &str); 20] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
     example_file!("list_clouds"),
@@ -31,8 +31,10 @@ pub const EXAMPLES: [(&str, &str); 18] = [
     example_file!("compute_curvatures"),
     example_file!("compute_surface_gradient"),
     example_file!("assemble_surface_gradient_matrix"),
+    example_file!("assemble_surface_gradient_sparse_matrix"),
     example_file!("compute_laplace_beltrami"),
     example_file!("assemble_laplace_beltrami_matrix"),
+    example_file!("assemble_laplace_beltrami_sparse_matrix"),
     example_file!("check_live"),
     example_file!("check_ready"),
     example_file!("get_version"),

@@ -9,7 +9,7 @@ use crate::http::wire::negotiation::Format;
 /// What requests and answers may be beside JSON, by operation id.
 fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) {
     match operation_id {
-        "create_cloud" => (&[Format::Safetensors, Format::Npy], &[]),
+        "create_cloud" => (&[Format::Safetensors, Format::Npy, Format::Ply], &[]),
         "assemble_surface_gradient_matrix" | "assemble_laplace_beltrami_matrix" => {
             (&[Format::Safetensors], &[Format::Safetensors, Format::Npy])
         }
@@ -25,6 +25,11 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
         for &format in requests {
             let content = binary(match format {
                 Format::Npy => "The points, `[n, d]`, as little- or big-endian float64 or float32.",
+                Format::Ply => {
+                    "PLY 1.0, ascii or binary of either byte order. The properties x, y, z of element vertex are the points, and \
+                     nx, ny, nz their normals if all three are there, of any type of number; other properties and elements are \
+                     passed over."
+                }
                 Format::Json | Format::Safetensors => {
                     "F64 or F32 tensors named as the JSON arrays, those within objects as `cloud.points`; the other fields \
                      as JSON text in the metadata entry `request`. At most 64 tensors and a header of 64 KiB."
@@ -36,7 +41,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
         for &format in answers {
             let content = binary(match format {
                 Format::Npy => "The matrix as float64, row by row, NaN for null.",
-                Format::Json | Format::Safetensors => {
+                Format::Json | Format::Safetensors | Format::Ply => {
                     "F64 tensors named as the JSON arrays, NaN for null; the other members as JSON text in the metadata \
                      entry `response`."
                 }

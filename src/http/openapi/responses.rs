@@ -31,7 +31,8 @@ problem_set! {
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
     ProblemTooLarge,
     UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
-    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, Internal, Overloaded, DeadlineExceeded
+    KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, UnsupportedBySolver, Internal, Overloaded,
+    DeadlineExceeded
 }
 
 problem_set! {

@@ -248,7 +248,7 @@ impl Problem {
                 }
                 problem
             }
-            E::Unsupported { .. } => at(Slug::InvalidRequest, "/solver"),
+            E::Unsupported { .. } => at(Slug::UnsupportedBySolver, "/solver"),
             E::Overflow { .. } => {
                 Self::new(Slug::InvalidRequest, format!("{detail}; scale the values or the length scale"))
             }

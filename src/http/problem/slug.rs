@@ -16,6 +16,7 @@ pub enum Slug {
     KernelNotSmooth,
     KernelNotPositiveDefinite,
     NotPositiveDefinite,
+    UnsupportedBySolver,
     UnknownCloud,
     NotFound,
     MethodNotAllowed,
@@ -41,7 +42,7 @@ struct Entry {
 }
 
 impl Slug {
-    pub const ALL: [Slug; 23] = [
+    pub const ALL: [Slug; 24] = [
         Self::MalformedRequest,
         Self::MalformedJson,
         Self::MalformedBody,
@@ -53,6 +54,7 @@ impl Slug {
         Self::KernelNotSmooth,
         Self::KernelNotPositiveDefinite,
         Self::NotPositiveDefinite,
+        Self::UnsupportedBySolver,
         Self::UnknownCloud,
         Self::NotFound,
         Self::MethodNotAllowed,
@@ -111,8 +113,8 @@ impl Slug {
                 name: "malformed-body",
                 status: StatusCode::BAD_REQUEST,
                 title: "The body is not what its headers say",
-                explanation: "The body is not safetensors or npy as its Content-Type says, cannot be decompressed as its Content-Encoding \
-                 says, or ends early.",
+                explanation: "The body is not safetensors, npy or PLY as its Content-Type says, cannot be decompressed as its \
+                 Content-Encoding says, or ends early.",
             },
             Self::InvalidRequest => Entry {
                 name: "invalid-request",
@@ -167,6 +169,14 @@ impl Slug {
                 explanation: "The kernel is too smooth or too wide for this cloud at this alpha: no honest answer exists in float64. Set \
                  alpha to minimum_alpha or more, shorten the length_scale, or use a rougher kernel.",
             },
+            Self::UnsupportedBySolver => Entry {
+                name: "unsupported-by-solver",
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                title: "The solver does not serve what was asked for",
+                explanation: "The local solver answers each query from the points nearest to it: values and their variances, and the geometry \
+                 of surfaces in dimensions 2 to 4, for which it chooses kernel and noise by itself. Covariance, likelihood and matrices \
+                 need the dense solver. The detail names what to leave out, or which solver to take.",
+            },
             Self::UnknownCloud => Entry {
                 name: "unknown-cloud",
                 status: StatusCode::NOT_FOUND,
@@ -197,8 +207,8 @@ impl Slug {
                 name: "unsupported-media-type",
                 status: StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 title: "The body has an unknown media type or encoding",
-                explanation: "Send application/json or application/x-safetensors, clouds also as application/x-npy, and say so in the \
-                 Content-Type header. Content-Encoding may be gzip or zstd.",
+                explanation: "Send application/json or application/x-safetensors, clouds also as application/x-npy or model/ply, and say so in \
+                 the Content-Type header. Content-Encoding may be gzip or zstd.",
             },
             Self::RequestTimeout => Entry {
                 name: "request-timeout",
@@ -220,8 +230,9 @@ impl Slug {
                 status: StatusCode::PAYLOAD_TOO_LARGE,
                 title: "The problem is too large",
                 explanation: "Points, dimension, queries, the size of the answer or the memory for it are over this server's limits. limit \
-                 and required are in the unit that the detail names. Thin the cloud or register fewer points; split queries \
-                 over several requests, which share one factorization.",
+                 and required are in the unit that the detail names. The dense solver takes fewer points than a cloud may have: \
+                 take the one that the detail names, or thin the cloud. Split queries over several requests, which share \
+                 one factorization.",
             },
             Self::Unauthorized => Entry {
                 name: "unauthorized",

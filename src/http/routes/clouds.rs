@@ -16,15 +16,14 @@ use crate::http::fields::schemas::{CloudIdSchema, CursorSchema};
 use crate::http::openapi::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
-use crate::http::serve::intake::{Intake, read_body};
+use crate::http::serve::intake::read_body;
 use crate::http::serve::planner::{Planner, unknown_cloud};
 use crate::http::serve::sampling::find_sampling;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::numerics::points::sampling::{NearestRange, Scales};
-use crate::numerics::solver::choose::sampling_flops;
+use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
@@ -141,16 +140,20 @@ pub async fn create_cloud(
     request: Request,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
-    let formats = [Format::Json, Format::Safetensors, Format::Npy];
-    let Intake { body, memory } = read_body(&app, owner, &parts.headers, body, &formats).await?;
+    let formats = [Format::Json, Format::Safetensors, Format::Npy, Format::Ply];
+    let intake = read_body(&app, owner, &parts.headers, body, &formats).await?;
     let admission = app.compute.admit(owner)?;
-    let (shared, flops) = (app.clone(), body.flops_to_parse());
+    let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
     let job = move |observer: &JobObserver| {
-        let request: CloudRequest = body.parse(&ParseContext::new(&shared.config, observer))?;
+        let (request, mut memory) = intake.parse::<CloudRequest>(&shared, observer)?;
         let planner = Planner { app: &shared, owner };
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
-        let mut memory = memory;
-        memory.shrink_to(stored.n_bytes());
+        // With what looking at its neighbours takes.
+        memory.shrink_to(
+            stored
+                .n_bytes()
+                .saturating_add(sampling_bytes(stored.cloud.n_points(), stored.cloud.dimension())),
+        );
         Ok::<_, Problem>((stored, is_new, memory))
     };
     let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;

@@ -8,14 +8,16 @@ use axum::response::Response;
 
 use super::surfaces::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, OrientationChoice, SurfaceChoice, SurfaceUsed, request};
+use crate::http::fields::{
+    Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
-use crate::http::wire::read::members::{present, present_word};
+use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -37,6 +39,10 @@ request! {
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
+        /// What is wanted beside what every answer has.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<GeometryInclude>>,
     }
 }
 
@@ -66,6 +72,19 @@ answer! {
         levels: Array,
         /// The function whose level surface was used at each query; `signature` where there is no answer.
         surfaces: Vec<SurfaceUsed>,
+        /// Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
+        /// there is no answer or none is known.
+        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
+        normal_deviations: Option<Array>,
+        /// Standard deviations of the principal curvatures at each query, in their order, 1/length.
+        #[schema(value_type = Option<Vec<Option<Vec<f64>>>>, nullable = false)]
+        principal_curvature_deviations: Option<Array>,
+        /// Standard deviations of the mean curvatures, 1/length.
+        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
+        mean_curvature_deviations: Option<Array>,
+        /// Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
+        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
+        gaussian_curvature_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// How the answer came about.
@@ -103,8 +122,8 @@ impl Operation for CurvaturesRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = self.take_fit();
-        let request = geometry_request(self.surface, self.orientation, true);
-        plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + d + 3)
+        let request = geometry_request(self.surface, self.orientation, true, self.include.as_deref());
+        plan_geometry(planner, fit, self.queries, request, Purpose::Curvatures, |d| d * d + 2 * d + 5)
     }
 
     fn compute(
@@ -116,6 +135,12 @@ impl Operation for CurvaturesRequest {
         let geometry = &surface.geometry;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         let curvatures = geometry.curvatures(observer).map_err(|error| fits.surface().refused(error))?;
+        let (normal, principal, mean, gaussian) = match surface.deviations() {
+            None => (None, None, None, None),
+            Some(found) => {
+                (Some(found.normal), Some(found.principal), Some(found.mean), Some(found.gaussian))
+            }
+        };
         Ok(CurvaturesResponse {
             principal_curvatures: surface.per_query(curvatures.principal, &[m, d - 1]),
             principal_directions: surface.per_query(curvatures.directions, &[m, d - 1, d]),
@@ -126,7 +151,11 @@ impl Operation for CurvaturesRequest {
             levels: Array::new(geometry.levels().to_vec(), &[m]),
             surfaces: surface.surfaces(),
             degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits),
+            normal_deviations: normal,
+            principal_curvature_deviations: principal,
+            mean_curvature_deviations: mean,
+            gaussian_curvature_deviations: gaussian,
+            diagnostics: surface.diagnostics(fits)?,
         })
     }
 }

@@ -15,11 +15,11 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::Planner;
+use crate::http::serve::values::{ValuesAt, ValuesRequest};
 use crate::http::wire::read::members::present;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::defaults::Purpose;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::choose::{Asked, work_price};
 use crate::numerics::sums::jets::JetOrder;
@@ -62,7 +62,8 @@ answer! {
 /// Interpolate values
 ///
 /// Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at the queries. At
-/// alpha = 0 it takes the values at the points exactly.
+/// alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points that are factorized, each query is
+/// answered from the points nearest to it.
 #[utoipa::path(
     post,
     path = "/v1/interpolation",
@@ -97,13 +98,14 @@ impl Operation for InterpolationRequest {
         if derivatives > 2 {
             return Err(Problem::invalid_request("/derivatives", "derivatives must be 0, 1 or 2"));
         }
-        let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
+        let mut main = planner.values_fit(self.take_fit(), None)?;
         planner.check_values(&self.values, &main)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
         let per_query = [1, 1 + d, 1 + d + d * d][usize::from(derivatives)];
+        let asked = if main.is_moving() { Asked::Moving } else { Asked::Function };
         let cost = Cost {
-            work: work_price(Asked::Function, n, m, d),
+            work: work_price(asked, n, m, d),
             n_numbers: planner.check_answer(m.checked_mul(per_query))?,
             n_held: n + m * d,
         };
@@ -111,16 +113,16 @@ impl Operation for InterpolationRequest {
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
-        let interpolant = fits.interpolant(&work.values, observer)?;
         let order = [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian][usize::from(work.derivatives)];
-        let jets =
-            interpolant.at(&work.queries, order, observer).map_err(|error| fits.main.refused(error))?;
+        let asked =
+            ValuesRequest { values: &work.values, queries: &work.queries, order, has_variances: false };
+        let ValuesAt { jets, diagnostics, .. } = fits.values_at(asked, observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
             gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
             hessians: (work.derivatives >= 2).then(|| Array::new(jets.hessians(), &[m, d, d])),
-            diagnostics: fits.main.diagnostics(&interpolant.solution, m),
+            diagnostics,
         })
     }
 }

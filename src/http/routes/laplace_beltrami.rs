@@ -8,7 +8,7 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::surfaces::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use super::surfaces::{AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -22,7 +22,10 @@ use crate::http::wire::read::members::{present, present_object, present_word};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix};
+use crate::http::wire::write::integers::Integers;
+use crate::numerics::surface::operators::{
+    laplace_beltrami, laplace_beltrami_matrix, laplace_beltrami_stencils,
+};
 use crate::store::Owner;
 
 request! {
@@ -154,12 +157,20 @@ impl Operation for LaplaceBeltramiRequest {
     ) -> Result<LaplaceBeltramiResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
+        if let Some(nodes) = &work.nodes {
+            let values = work.by_stencils(fits, &surface, nodes, laplace_beltrami_stencils, observer)?;
+            return Ok(LaplaceBeltramiResponse {
+                values: surface.per_query(values, &[geometry.n_queries()]),
+                degenerate: surface.degenerate(),
+                diagnostics: surface.diagnostics(fits)?,
+            });
+        }
         let interpolant = fits.interpolant(&work.values, observer)?;
         let values = laplace_beltrami(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let m = geometry.n_queries();
-        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
             degenerate: surface.degenerate(),
@@ -187,7 +198,7 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrix = laplace_beltrami_matrix(geometry, fits.main.stored.solver(), &work.queries, observer)
+        let matrix = laplace_beltrami_matrix(geometry, fits.main.solver()?, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;
@@ -195,6 +206,95 @@ impl Operation for LaplaceBeltramiMatrixRequest {
             matrix: surface.per_query(fits.main.unmerge(matrix), &shape),
             degenerate: surface.degenerate(),
             diagnostics,
+        })
+    }
+}
+
+request! {
+    /// Nodes and queries of the operator as a sparse matrix.
+    pub struct LaplaceBeltramiSparseMatrixRequest {
+        /// Where rows are wanted; the points of the surface if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where it is not that of the request.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+    }
+}
+
+answer! {
+    /// The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
+    pub struct LaplaceBeltramiSparseMatrixResponse {
+        /// Queries, nodes.
+        #[schema(value_type = Vec<i64>)]
+        shape: Integers,
+        /// Where each row begins among the entries, and how many there are, from 0.
+        #[schema(value_type = Vec<i64>)]
+        indptr: Integers,
+        /// The column of each entry, from 0, ascending within a row.
+        #[schema(value_type = Vec<i64>)]
+        indices: Integers,
+        /// The entries row by row, 1/length²: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
+        #[schema(value_type = Vec<f64>)]
+        data: Array,
+        /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the surface came about.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Assemble the sparse matrix of the Laplace–Beltrami operator
+///
+/// Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
+/// these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+#[utoipa::path(
+    post,
+    path = "/v1/laplace-beltrami/sparse-matrix",
+    operation_id = "assemble_laplace_beltrami_sparse_matrix",
+    tag = "operators",
+    request_body = LaplaceBeltramiSparseMatrixRequest,
+    responses((status = 200, description = "The matrix", body = LaplaceBeltramiSparseMatrixResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn assemble_laplace_beltrami_sparse_matrix(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<LaplaceBeltramiSparseMatrixRequest>(app, owner, request).await
+}
+
+impl Operation for LaplaceBeltramiSparseMatrixRequest {
+    type Work = StencilWork;
+    type Answer = LaplaceBeltramiSparseMatrixResponse;
+    const HAS_SURFACE: bool = true;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
+        let fit = self.take_fit();
+        plan_stencils(planner, fit, self.geometry, self.queries, |_| 1)
+    }
+
+    fn compute(
+        work: StencilWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<LaplaceBeltramiSparseMatrixResponse, Problem> {
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
+        let matrix = work.matrix(fits, &surface, laplace_beltrami_stencils, observer)?;
+        let n_entries = matrix.indices.len();
+        let shape = vec![m as i64, n as i64];
+        let data = Array::new(matrix.data, &[n_entries]);
+        Ok(LaplaceBeltramiSparseMatrixResponse {
+            shape: Integers::new(shape),
+            indptr: Integers::new(matrix.indptr),
+            indices: Integers::new(matrix.indices),
+            data,
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits)?,
         })
     }
 }

@@ -8,14 +8,16 @@ use axum::response::Response;
 
 use super::surfaces::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, OrientationChoice, SurfaceChoice, SurfaceUsed, request};
+use crate::http::fields::{
+    Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
-use crate::http::wire::read::members::{present, present_word};
+use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -37,6 +39,10 @@ request! {
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
+        /// What is wanted beside what every answer has.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<GeometryInclude>>,
     }
 }
 
@@ -54,6 +60,10 @@ answer! {
         levels: Array,
         /// The function whose level surface was used at each query; `signature` where there is no answer.
         surfaces: Vec<SurfaceUsed>,
+        /// Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
+        /// there is no answer or none is known.
+        #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
+        normal_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// How the answer came about.
@@ -90,8 +100,8 @@ impl Operation for NormalsRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
         let fit = self.take_fit();
-        let request = geometry_request(self.surface, self.orientation, false);
-        plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 2)
+        let request = geometry_request(self.surface, self.orientation, false, self.include.as_deref());
+        plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 3)
     }
 
     fn compute(work: GeometryWork, fits: &Fits, observer: &JobObserver) -> Result<NormalsResponse, Problem> {
@@ -104,7 +114,8 @@ impl Operation for NormalsRequest {
             levels: Array::new(geometry.levels().to_vec(), &[m]),
             surfaces: surface.surfaces(),
             degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits),
+            normal_deviations: surface.deviations().map(|deviations| deviations.normal),
+            diagnostics: surface.diagnostics(fits)?,
         })
     }
 }

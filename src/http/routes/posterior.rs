@@ -17,13 +17,13 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::plan::PlannedFit;
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::serve::values::{ValuesAt, ValuesRequest};
 use crate::http::wire::read::members::{present, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::defaults::Purpose;
-use crate::numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
+use crate::numerics::function::posterior::{covariance, log_marginal_likelihood};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::choose::{Asked, work_price};
 use crate::numerics::sums::jets::JetOrder;
@@ -91,7 +91,8 @@ answer! {
 /// Compute the Gaussian process posterior
 ///
 /// With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
-/// queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+/// queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With `"solver": "local"`, and beyond the points
+/// that are factorized, each query is answered from the points nearest to it, without covariance and likelihood.
 #[utoipa::path(
     post,
     path = "/v1/posterior",
@@ -128,17 +129,22 @@ impl Operation for PosteriorRequest {
     const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let mut main = planner.fit(self.take_fit(), Purpose::Values)?;
+        let fit = self.take_fit();
+        let include = self.include.unwrap_or_default();
+        let mut main = planner.values_fit(fit, dense_only(&include))?;
         planner.check_values(&self.values, &main)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
-        let work = Work { values: self.values, queries, include: self.include.unwrap_or_default() };
+        let work = Work { values: self.values, queries, include };
         check_observation_noise(&work, &main)?;
         let (n, m, d) = (main.n_points(), work.queries.n_points(), work.queries.dimension());
         let has_covariance = work.wants(PosteriorQuantity::Covariance);
         let n_numbers = planner.check_answer(m.checked_mul(d + 3 + if has_covariance { m } else { 0 }))?;
         let variances =
             work.wants(PosteriorQuantity::Variance) || work.wants(PosteriorQuantity::ObservationVariance);
-        let asked = Asked::Posterior { variances, covariance: has_covariance };
+        let asked = match main.is_moving() {
+            true => Asked::Moving,
+            false => Asked::Posterior { variances, covariance: has_covariance },
+        };
         let n_held = n + m * d;
         Ok(Plan {
             main,
@@ -151,31 +157,29 @@ impl Operation for PosteriorRequest {
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
         use PosteriorQuantity as Q;
         let refused = |error| fits.main.refused(error);
-        let interpolant = fits.interpolant(&work.values, observer)?;
-        let (solver, queries) = (&interpolant.solver, &work.queries);
+        let (values, queries) = (&work.values, &work.queries);
         let order = if work.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value };
-        let jets = interpolant.at(queries, order, observer).map_err(refused)?;
+        let has_variances = work.wants(Q::Variance) || work.wants(Q::ObservationVariance);
+        let asked = ValuesRequest { values, queries, order, has_variances };
+        let ValuesAt { jets, variances: latent, mut diagnostics, interpolant } =
+            fits.values_at(asked, observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
-        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
-        let wants_variances = work.wants(Q::Variance) || work.wants(Q::ObservationVariance);
-        let latent = match wants_variances {
-            false => None,
-            true => Some(variances(solver, queries, observer).map_err(refused)?),
-        };
+        let dense = || interpolant.as_ref().ok_or_else(Problem::internal);
         let covariance = match work.wants(Q::Covariance) {
             false => None,
-            true => Some(covariance(solver, queries, observer).map_err(refused)?),
+            true => Some(covariance(&dense()?.solver, queries, observer).map_err(refused)?),
         };
         let clamped = latent.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
         warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
         let log_marginal_likelihood = match work.wants(Q::LogMarginalLikelihood) {
             false => None,
             true => {
-                let values = fits.main.merged(&work.values);
-                Some(log_marginal_likelihood(solver, &interpolant.solution, &values).map_err(refused)?)
+                let (dense, values) = (dense()?, fits.main.merged(values));
+                Some(log_marginal_likelihood(&dense.solver, &dense.solution, &values).map_err(refused)?)
             }
         };
-        let alpha = solver.regularization().at(0);
+        // With noise per point it is not asked for.
+        let alpha = diagnostics.alpha.unwrap_or_default();
         let of_latent = |quantity, noise: f64| {
             let latent = latent.as_ref().filter(|_| work.wants(quantity))?;
             Some(Array::new(latent.latent.iter().map(|v| v + noise).collect(), &[m]))
@@ -190,6 +194,18 @@ impl Operation for PosteriorRequest {
             diagnostics,
         })
     }
+}
+
+/// What is asked that only a dense factorization has.
+fn dense_only(include: &[PosteriorQuantity]) -> Option<DenseOnly> {
+    let name = include.iter().find_map(|quantity| match quantity {
+        PosteriorQuantity::Covariance => Some("covariance"),
+        PosteriorQuantity::LogMarginalLikelihood => Some("log_marginal_likelihood"),
+        PosteriorQuantity::Variance
+        | PosteriorQuantity::ObservationVariance
+        | PosteriorQuantity::Gradients => None,
+    })?;
+    Some(DenseOnly { name, pointer: "/include" })
 }
 
 /// A new observation's noise is only known if it is the same everywhere.

@@ -6,7 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::surfaces::{AppliedWork, MatrixWork, plan_applied, plan_matrix};
+use super::surfaces::{AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -20,7 +20,10 @@ use crate::http::wire::read::members::{present, present_object};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::surface::operators::{surface_gradient, surface_gradient_matrices};
+use crate::http::wire::write::integers::Integers;
+use crate::numerics::surface::operators::{
+    surface_gradient, surface_gradient_matrices, surface_gradient_stencils,
+};
 use crate::store::Owner;
 
 request! {
@@ -138,12 +141,22 @@ impl Operation for SurfaceGradientRequest {
     ) -> Result<SurfaceGradientResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
+        if let Some(nodes) = &work.nodes {
+            let (m, d) = (geometry.n_queries(), geometry.dimension());
+            let components = work.by_stencils(fits, &surface, nodes, surface_gradient_stencils, observer)?;
+            let gradients = (0..m * d).map(|at| components[at % d * m + at / d]).collect();
+            return Ok(SurfaceGradientResponse {
+                gradients: surface.per_query(gradients, &[m, d]),
+                degenerate: surface.degenerate(),
+                diagnostics: surface.diagnostics(fits)?,
+            });
+        }
         let interpolant = fits.interpolant(&work.values, observer)?;
         let gradients = surface_gradient(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
-        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
             degenerate: surface.degenerate(),
@@ -170,15 +183,103 @@ impl Operation for SurfaceGradientMatrixRequest {
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrices =
-            surface_gradient_matrices(geometry, fits.main.stored.solver(), &work.queries, observer)
-                .map_err(|error| fits.main.refused(error))?;
+        let matrices = surface_gradient_matrices(geometry, fits.main.solver()?, &work.queries, observer)
+            .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(SurfaceGradientMatrixResponse {
             matrices: Array::new(fits.main.unmerge(matrices), &shape).with_nulls(1, geometry.is_null()),
             degenerate: surface.degenerate(),
             diagnostics,
+        })
+    }
+}
+
+request! {
+    /// Nodes and queries of the operator as a sparse matrix.
+    pub struct SurfaceGradientSparseMatrixRequest {
+        /// Where rows are wanted; the points of the surface if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// The surface, where it is not that of the request.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub geometry: Option<Geometry>,
+    }
+}
+
+answer! {
+    /// The components of the surface gradient as sparse matrices with rows for the queries and columns for the nodes.
+    pub struct SurfaceGradientSparseMatrixResponse {
+        /// Components, queries, nodes.
+        #[schema(value_type = Vec<i64>)]
+        shape: Integers,
+        /// Where each row begins among the entries, and how many there are, from 0.
+        #[schema(value_type = Vec<i64>)]
+        indptr: Integers,
+        /// The column of each entry, from 0, ascending within a row.
+        #[schema(value_type = Vec<i64>)]
+        indices: Integers,
+        /// The entries row by row, 1/length, one list per component.
+        #[schema(value_type = Vec<Vec<f64>>)]
+        data: Array,
+        /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
+        degenerate: Vec<Degenerate>,
+        /// How the surface came about.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Assemble the sparse matrix of the surface gradient
+///
+/// Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
+/// these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+#[utoipa::path(
+    post,
+    path = "/v1/surface-gradient/sparse-matrix",
+    operation_id = "assemble_surface_gradient_sparse_matrix",
+    tag = "operators",
+    request_body = SurfaceGradientSparseMatrixRequest,
+    responses((status = 200, description = "The matrix", body = SurfaceGradientSparseMatrixResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn assemble_surface_gradient_sparse_matrix(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<SurfaceGradientSparseMatrixRequest>(app, owner, request).await
+}
+
+impl Operation for SurfaceGradientSparseMatrixRequest {
+    type Work = StencilWork;
+    type Answer = SurfaceGradientSparseMatrixResponse;
+    const HAS_SURFACE: bool = true;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
+        let fit = self.take_fit();
+        plan_stencils(planner, fit, self.geometry, self.queries, |d| d)
+    }
+
+    fn compute(
+        work: StencilWork,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<SurfaceGradientSparseMatrixResponse, Problem> {
+        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
+        let matrix = work.matrix(fits, &surface, surface_gradient_stencils, observer)?;
+        let (n_entries, d) = (matrix.indices.len(), surface.geometry.dimension());
+        let shape = vec![d as i64, m as i64, n as i64];
+        let data = Array::new(matrix.data, &[d, n_entries]);
+        Ok(SurfaceGradientSparseMatrixResponse {
+            shape: Integers::new(shape),
+            indptr: Integers::new(matrix.indptr),
+            indices: Integers::new(matrix.indices),
+            data,
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits)?,
         })
     }
 }

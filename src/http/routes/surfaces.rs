@@ -3,18 +3,27 @@
 use std::sync::Arc;
 
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Fit, Geometry, OrientationChoice, SurfaceChoice};
+use crate::http::fields::{Diagnostics, Fit, Geometry, GeometryInclude, OrientationChoice, SurfaceChoice};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::fitted::{Fits, SurfaceGeometry};
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::Planner;
+use crate::http::serve::plan::PlannedFit;
+use crate::http::serve::planner::{OperatorFits, Planner};
 use crate::http::wire::read::points::Points;
 use crate::numerics::defaults::Purpose;
+use crate::numerics::error::NumericsError;
+use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, Offsets, work_price};
-use crate::numerics::surface::geometry::{GeometryRequest, Orientation, SurfaceModel};
+use crate::numerics::points::neighbours::Neighbours;
+use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, Offsets, n_entries_per_row, work_price};
+use crate::numerics::surface::Surface;
+use crate::numerics::surface::geometry::{
+    Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
+};
+use crate::numerics::surface::operators::SparseMatrix;
+use crate::store::clouds::RegisteredCloud;
 
 /// A checked request for normals or curvatures.
 pub struct GeometryWork {
@@ -24,6 +33,8 @@ pub struct GeometryWork {
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {
+    /// The nodes of the values, where stencils and not a solver serve them.
+    pub nodes: Option<Arc<RegisteredCloud>>,
     pub values: Vec<f64>,
     pub queries: Arc<Cloud>,
     pub request: GeometryRequest,
@@ -47,12 +58,12 @@ impl MatrixWork {
         observer: &JobObserver,
     ) -> Result<Diagnostics, Problem> {
         let m = self.queries.n_points();
-        let constant = match &fits.surface {
-            None => surface.surface.signature().clone(),
-            Some(_) => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
+        let constant = match (&fits.surface, &*surface.surface) {
+            (None, Surface::Signature(surface)) => surface.signature().clone(),
+            _ => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
         };
-        let mut diagnostics = fits.main.diagnostics(&constant.solution, m);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        let mut diagnostics = fits.main.diagnostics(&constant.solution, m)?;
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         Ok(diagnostics)
     }
 }
@@ -69,17 +80,17 @@ pub fn plan_geometry(
     purpose: Purpose,
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<GeometryWork>, Problem> {
-    let mut main = planner.fit(fit, purpose)?;
+    let mut main = planner.surface_fit(fit, purpose, &request)?;
     check_is_surface(&main.stored.cloud)?;
     let queries = planner.queries(queries, &mut [&mut main])?;
     let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
     let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
     let offsets = match (request.model, request.checks_curvatures) {
         (SurfaceModel::Offset, _) => Offsets::Everywhere,
-        (SurfaceModel::Auto | SurfaceModel::Signature, true) => Offsets::Confirmations,
-        (SurfaceModel::Auto | SurfaceModel::Signature, false) => Offsets::Rescues,
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, true) => Offsets::Confirmations,
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, false) => Offsets::Rescues,
     };
-    let asked = Asked::Geometry { offsets };
+    let asked = if main.is_local() { Asked::LocalGeometry } else { Asked::Geometry { offsets } };
     let cost = Cost { work: work_price(asked, n, m, d), n_numbers, n_held: m * d };
     Ok(Plan { main, surface: None, work: GeometryWork { queries, request }, cost })
 }
@@ -97,19 +108,37 @@ pub fn plan_applied(
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<AppliedWork>, Problem> {
     let request = operator_request(&geometry);
-    let (mut main, mut surface) = planner.fits(fit, geometry)?;
-    check_is_surface(&main.stored.cloud)?;
-    planner.check_values(&values, &main)?;
-    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
-    let m = queries.n_points();
-    let d = queries.dimension();
-    let asked = Asked::Operator { n_surface_points: surface.n_points() };
-    let cost = Cost {
-        work: work_price(asked, main.n_points(), m, d),
-        n_numbers: planner.check_answer(m.checked_mul(numbers_per_query(d)))?,
-        n_held: main.n_points() + surface.n_points() + m * d,
+    let (mut main, mut surface, nodes) = match planner.operator_fits(fit, geometry, &request)? {
+        OperatorFits::Solved { values, surface } => (values, Some(surface), None),
+        OperatorFits::Stencils { nodes, surface } => (surface, None, Some(nodes)),
     };
-    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, cost })
+    check_is_surface(&main.stored.cloud)?;
+    let n_values = match &nodes {
+        Some(nodes) => {
+            planner.check_values_of(&values, &nodes.cloud)?;
+            nodes.cloud.n_points()
+        }
+        None => {
+            planner.check_values(&values, &main)?;
+            main.n_points()
+        }
+    };
+    let queries = match &mut surface {
+        None => planner.queries(queries, &mut [&mut main])?,
+        Some(surface) => planner.queries(queries, &mut [&mut main, surface])?,
+    };
+    let (m, d) = (queries.n_points(), queries.dimension());
+    let n_surface_points = surface.as_ref().map_or(0, PlannedFit::n_points);
+    let asked = match nodes {
+        Some(_) => Asked::Stencils,
+        None => Asked::Operator { n_surface_points },
+    };
+    let cost = Cost {
+        work: work_price(asked, n_values, m, d),
+        n_numbers: planner.check_answer(m.checked_mul(numbers_per_query(d)))?,
+        n_held: n_values + n_surface_points + m * d,
+    };
+    Ok(Plan { main, surface, work: AppliedWork { values, queries, request, nodes }, cost })
 }
 
 /// Plans an operator as a matrix, with so many rows per query.
@@ -124,7 +153,7 @@ pub fn plan_matrix(
     rows_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<MatrixWork>, Problem> {
     let request = operator_request(&geometry);
-    let (mut main, mut surface) = planner.fits(fit, geometry)?;
+    let (mut main, mut surface) = planner.fits(fit, geometry, &request)?;
     check_is_surface(&main.stored.cloud)?;
     let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
     let n = main.stored.cloud.n_points();
@@ -141,9 +170,98 @@ pub fn plan_matrix(
 }
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
+/// Checked work of an operator as a sparse matrix.
+pub struct StencilWork {
+    pub nodes: Arc<RegisteredCloud>,
+    pub queries: Arc<Cloud>,
+    pub request: GeometryRequest,
+}
+
+/// One of the operators as a sparse matrix.
+type Stencils = fn(
+    &SurfaceGeometryAtQueries,
+    &Cloud,
+    &Neighbours,
+    &Cloud,
+    &dyn Observer,
+) -> Result<SparseMatrix, NumericsError>;
+
+impl StencilWork {
+    /// The matrix.
+    ///
+    /// # Errors
+    /// Those of the numerics as a [`Problem`].
+    pub fn matrix(
+        &self,
+        fits: &Fits,
+        surface: &SurfaceGeometry,
+        stencils: Stencils,
+        observer: &JobObserver,
+    ) -> Result<SparseMatrix, Problem> {
+        let nodes = &self.nodes.cloud;
+        let of =
+            |neighbours: &Neighbours| stencils(&surface.geometry, nodes, neighbours, &self.queries, observer);
+        with_neighbours(&surface.surface, nodes, of).map_err(|error| fits.surface().refused(error))
+    }
+}
+
+impl AppliedWork {
+    /// An operator applied to the values by stencils, `[components, m]`.
+    ///
+    /// # Errors
+    /// Those of the numerics as a [`Problem`].
+    pub fn by_stencils(
+        &self,
+        fits: &Fits,
+        surface: &SurfaceGeometry,
+        nodes: &RegisteredCloud,
+        stencils: Stencils,
+        observer: &JobObserver,
+    ) -> Result<Vec<f64>, Problem> {
+        let of = |neighbours: &Neighbours| {
+            stencils(&surface.geometry, &nodes.cloud, neighbours, &self.queries, observer)
+        };
+        let matrix = with_neighbours(&surface.surface, &nodes.cloud, of);
+        Ok(matrix.map_err(|error| fits.surface().refused(error))?.apply(&self.values))
+    }
+}
+
+/// Plans an operator as a sparse matrix.
+///
+/// # Errors
+/// Those of the planner.
+pub fn plan_stencils(
+    planner: &Planner<'_>,
+    fit: Fit,
+    geometry: Option<Geometry>,
+    queries: Option<Points>,
+    n_components: impl Fn(usize) -> usize,
+) -> Result<Plan<StencilWork>, Problem> {
+    let request = operator_request(&geometry);
+    let (nodes, mut main) = planner.stencils(fit, geometry, &request)?;
+    check_is_surface(&main.stored.cloud)?;
+    let queries = planner.queries(queries, &mut [&mut main])?;
+    let (m, d) = (queries.n_points(), queries.dimension());
+    let n_entries = m.checked_mul(n_entries_per_row(d)).and_then(|n| n.checked_mul(1 + n_components(d)));
+    let cost = Cost {
+        work: work_price(Asked::Stencils, nodes.cloud.n_points(), m, d),
+        n_numbers: planner.check_answer(n_entries)?,
+        n_held: m * d,
+    };
+    Ok(Plan { main, surface: None, work: StencilWork { nodes, queries, request }, cost })
+}
+
+/// Who is near whom among nodes: known where they are the points of the surface.
+fn with_neighbours<T>(surface: &Surface, nodes: &Cloud, of: impl FnOnce(&Neighbours) -> T) -> T {
+    match surface.cloud() == nodes {
+        true => of(surface.neighbours()),
+        false => of(&Neighbours::of(nodes)),
+    }
+}
+
 fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
     let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
-    geometry_request(surface, Some(OrientationChoice::Gradient), true)
+    geometry_request(surface, Some(OrientationChoice::Gradient), true, None)
 }
 
 /// What a request asks of the geometry of its surface.
@@ -151,6 +269,7 @@ pub fn geometry_request(
     surface: Option<SurfaceChoice>,
     orientation: Option<OrientationChoice>,
     checks_curvatures: bool,
+    include: Option<&[GeometryInclude]>,
 ) -> GeometryRequest {
     GeometryRequest {
         orientation: match orientation.unwrap_or_default() {
@@ -161,9 +280,11 @@ pub fn geometry_request(
             SurfaceChoice::Auto => SurfaceModel::Auto,
             SurfaceChoice::Signature => SurfaceModel::Signature,
             SurfaceChoice::Offset => SurfaceModel::Offset,
+            SurfaceChoice::Local => SurfaceModel::Local,
         },
         checks_curvatures,
         max_offsets: MAX_OFFSETS,
+        has_deviations: include.is_some_and(|include| include.contains(&GeometryInclude::Deviations)),
     }
 }
 

@@ -3,24 +3,30 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::plan::FitPlan;
+use super::plan::{FitModel, FitPlan, LocalReason};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, SurfaceUsed, Warning,
-    WarningCode,
+    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, SurfaceUsed,
+    Warning, WarningCode,
 };
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::wire::write::array::Array;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::function::moving::MovingAnswer;
 use crate::numerics::kernel::Family;
+use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::{Method, Solution};
+use crate::numerics::solver::choose::AutoLocal;
+use crate::numerics::solver::{Method, Solution, Solver};
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
+use crate::numerics::surface::local::LocalSurface;
+use crate::numerics::surface::served::ServedBy;
+use crate::numerics::surface::signature::SignatureSurface;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::PreparedFit;
 
@@ -65,7 +71,7 @@ impl Fits {
         let surface = self.made.clone().ok_or_else(Problem::internal)?;
         let geometry =
             Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
-        Ok(SurfaceGeometry { surface, geometry, orientation: request.orientation })
+        Ok(SurfaceGeometry { surface, geometry, request: *request })
     }
 }
 
@@ -73,7 +79,15 @@ impl Fits {
 pub struct SurfaceGeometry {
     pub surface: Arc<Surface>,
     pub geometry: Geometry,
-    orientation: Orientation,
+    request: GeometryRequest,
+}
+
+/// Standard deviations, one entry per query.
+pub struct DeviationArrays {
+    pub normal: Array,
+    pub principal: Array,
+    pub mean: Array,
+    pub gaussian: Array,
 }
 
 /// A fit with its factorization.
@@ -88,9 +102,17 @@ impl Fitted {
         self.plan.refused(error)
     }
 
+    /// The solver of values.
+    ///
+    /// # Errors
+    /// None: fits of values are planned with one.
+    pub fn solver(&self) -> Result<&Arc<Solver>, Problem> {
+        self.stored.solver().ok_or_else(Problem::internal)
+    }
+
     /// Finds the weights of values that were solved before, or solves.
     fn interpolant(&self, app: &App, values: &[f64], observer: &JobObserver) -> Result<Interpolant, Problem> {
-        let solver = self.stored.solver().clone();
+        let solver = self.solver()?.clone();
         let key = ValuesKey::of(values);
         if let Some(solution) = app.prepared.solution(self.plan.key, key) {
             return Ok(Interpolant { solver, solution });
@@ -117,10 +139,57 @@ impl Fitted {
         }
     }
 
-    /// What the answer says of this fit.
-    pub fn diagnostics(&self, solution: &Solution, n_queries: usize) -> Diagnostics {
-        let (plan, solver) = (&self.plan, self.stored.solver());
-        let n_merged = plan.merge.as_ref().map_or(0, |merge| merge.n_merged());
+    /// What the answer says of this fit and of a function that was solved with it.
+    ///
+    /// # Errors
+    /// Those of [`Fitted::solver`].
+    pub fn diagnostics(&self, solution: &Solution, n_queries: usize) -> Result<Diagnostics, Problem> {
+        let (plan, solver) = (&self.plan, self.solver()?);
+        let FitModel::Dense { kernel, regularization } = &plan.model else { return Err(Problem::internal()) };
+        let reciprocal_condition = solver.reciprocal_condition();
+        Ok(Diagnostics {
+            kernel: kernel.into(),
+            alpha: uniform(regularization),
+            factorization: match solver.method() {
+                Method::Cholesky => FactorizationUsed::Cholesky,
+                Method::PivotedCholesky => FactorizationUsed::PivotedCholesky,
+            },
+            rank: Some(solver.rank()),
+            reciprocal_condition: Some(reciprocal_condition),
+            relative_residual: Some(solution.relative_residual),
+            native_norm_squared: Some(solution.native_norm_squared),
+            misfit: Some(solution.misfit),
+            warnings: self.warnings(solver, solution),
+            ..self.blank(SolverUsed::Dense, n_queries)
+        })
+    }
+
+    /// What is said of any fit.
+    fn blank(&self, solver: SolverUsed, n_queries: usize) -> Diagnostics {
+        let cloud = &self.plan.stored.cloud;
+        Diagnostics {
+            cloud_id: self.plan.stored.id.to_string(),
+            n_points: cloud.n_points(),
+            n_queries,
+            dimension: cloud.dimension(),
+            kernel: KernelUsed::heights(PatchKernel::default()),
+            alpha: None,
+            solver,
+            solver_reason: None,
+            factorization: FactorizationUsed::Local,
+            rank: None,
+            reciprocal_condition: None,
+            relative_residual: None,
+            native_norm_squared: None,
+            misfit: None,
+            noise_deviation: None,
+            n_merged_duplicates: self.plan.merge.as_ref().map_or(0, |merge| merge.n_merged()),
+            warnings: Vec::new(),
+            geometry: None,
+        }
+    }
+
+    fn warnings(&self, solver: &Solver, solution: &Solution) -> Vec<Warning> {
         let mut warnings = Vec::new();
         let mut warn = |code, detail| warnings.push(Warning { code, detail });
         let reciprocal_condition = solver.reciprocal_condition();
@@ -138,35 +207,87 @@ impl Fitted {
             let detail = format!("refined to a relative residual of {:.1e}", solution.relative_residual);
             warn(WarningCode::Refined, detail);
         }
-        if n_merged > 0 {
-            warn(WarningCode::DuplicatesMerged, format!("points merged into an earlier one: {n_merged}"));
+        warnings.extend(self.warnings_of_merging());
+        warnings
+    }
+
+    fn warnings_of_merging(&self) -> Vec<Warning> {
+        let Some(merge) = &self.plan.merge else { return Vec::new() };
+        let detail = format!("points merged into an earlier one: {}", merge.n_merged());
+        vec![Warning { code: WarningCode::DuplicatesMerged, detail }]
+    }
+
+    /// What the answer says of values from the points nearest to each query.
+    ///
+    /// # Errors
+    /// None: the fits that have such values have a kernel.
+    pub(super) fn moving_diagnostics(
+        &self,
+        found: &MovingAnswer,
+        n_neighbours: usize,
+    ) -> Result<Diagnostics, Problem> {
+        let FitModel::Moving { kernel, regularization, reason } = &self.plan.model else {
+            return Err(Problem::internal());
+        };
+        let m = found.jets.n_queries();
+        let mut warnings = self.warnings_of_merging();
+        if found.n_dependent > 0 {
+            let detail = format!(
+                "points that follow from nearer ones to rounding are left out of the {n_neighbours} nearest (queries: {} of {m})",
+                found.n_dependent
+            );
+            warnings.push(Warning { code: WarningCode::IllConditioned, detail });
         }
-        Diagnostics {
-            cloud_id: plan.stored.id.to_string(),
-            n_points: plan.stored.cloud.n_points(),
-            n_queries,
-            dimension: plan.stored.cloud.dimension(),
-            kernel: (&plan.kernel).into(),
-            alpha: match plan.regularization {
-                Regularization::Uniform(alpha) => Some(alpha),
-                Regularization::PerPoint(_) => None,
-            },
-            solver: SolverUsed::Dense,
-            factorization: match solver.method() {
-                Method::Cholesky => FactorizationUsed::Cholesky,
-                Method::PivotedCholesky => FactorizationUsed::PivotedCholesky,
-            },
-            rank: solver.rank(),
-            reciprocal_condition,
-            relative_residual: solution.relative_residual,
-            native_norm_squared: solution.native_norm_squared,
-            misfit: solution.misfit,
-            n_merged_duplicates: n_merged,
+        Ok(Diagnostics {
+            kernel: kernel.into(),
+            alpha: uniform(regularization),
+            solver_reason: reason.words().map(str::to_owned),
             warnings,
-            geometry: None,
+            ..self.blank(SolverUsed::Local, m)
+        })
+    }
+
+    /// What the answer says of local regressions.
+    fn local_diagnostics(&self, surface: &LocalSurface, n_queries: usize) -> Diagnostics {
+        let reason = match self.plan.model {
+            FitModel::Local(reason) => reason.words(),
+            FitModel::Dense { .. } | FitModel::Moving { .. } => None,
+        };
+        let noise = surface.patches().noise();
+        Diagnostics {
+            kernel: KernelUsed::heights(surface.patches().kernel()),
+            alpha: Some(noise * noise),
+            solver_reason: reason.map(str::to_owned),
+            misfit: Some(surface.misfit()),
+            noise_deviation: Some(noise),
+            ..self.blank(SolverUsed::Local, n_queries)
         }
     }
 }
+
+impl LocalReason {
+    /// As the diagnostics say it; nothing where it was asked for.
+    fn words(self) -> Option<&'static str> {
+        match self {
+            Self::Asked => None,
+            Self::Auto(AutoLocal::BeyondDense) => Some(BEYOND_DENSE),
+            Self::Auto(AutoLocal::ManyPoints) => Some(MANY_POINTS),
+            Self::Auto(AutoLocal::Deviations) => Some(DEVIATIONS),
+        }
+    }
+}
+
+fn uniform(regularization: &Regularization) -> Option<f64> {
+    match regularization {
+        Regularization::Uniform(alpha) => Some(*alpha),
+        Regularization::PerPoint(_) => None,
+    }
+}
+
+const BEYOND_DENSE: &str = "the cloud has more points than are factorized densely";
+const MANY_POINTS: &str =
+    "regressions from the nearest points take time linear in the points, of which there are many";
+const DEVIATIONS: &str = "standard deviations come from local regressions";
 
 impl SurfaceGeometry {
     /// The queries without answer or with a flag.
@@ -192,17 +313,45 @@ impl SurfaceGeometry {
 
     /// The function that serves each query.
     pub fn surfaces(&self) -> Vec<SurfaceUsed> {
-        let used =
-            |query| if self.geometry.is_offset(query) { SurfaceUsed::Offset } else { SurfaceUsed::Signature };
+        let used = |query| match self.geometry.served_by(query) {
+            ServedBy::Signature => SurfaceUsed::Signature,
+            ServedBy::Offset => SurfaceUsed::Offset,
+            ServedBy::Local => SurfaceUsed::Local,
+        };
         (0..self.geometry.n_queries()).map(used).collect()
     }
 
     /// What the answer says of the fit of this surface.
-    pub fn diagnostics(&self, fits: &Fits) -> Diagnostics {
-        let solution = &self.surface.signature().solution;
-        let mut diagnostics = fits.surface().diagnostics(solution, self.geometry.n_queries());
+    ///
+    /// # Errors
+    /// Those of [`Fitted::diagnostics`].
+    pub fn diagnostics(&self, fits: &Fits) -> Result<Diagnostics, Problem> {
+        let (fitted, m) = (fits.surface(), self.geometry.n_queries());
+        let mut diagnostics = match &*self.surface {
+            Surface::Signature(surface) => fitted.diagnostics(&surface.signature().solution, m)?,
+            Surface::Local(surface) => fitted.local_diagnostics(surface, m),
+        };
         diagnostics.warnings.extend(self.warnings());
-        diagnostics
+        Ok(diagnostics)
+    }
+
+    /// Deviations per query, null where there is no answer or no deviation of it.
+    pub fn deviations(&self) -> Option<DeviationArrays> {
+        let deviations = self.geometry.deviations()?;
+        let (m, k) = (self.geometry.n_queries(), self.geometry.dimension() - 1);
+        let is_null: Vec<bool> = deviations
+            .is_known
+            .iter()
+            .zip(self.geometry.is_null())
+            .map(|(is_known, is_null)| !is_known || *is_null)
+            .collect();
+        let array = |data: &[f64], shape: &[usize]| Array::new(data.to_vec(), shape).with_nulls(0, &is_null);
+        Some(DeviationArrays {
+            normal: array(&deviations.normal, &[m]),
+            principal: array(&deviations.principal, &[m, k]),
+            mean: array(&deviations.mean, &[m]),
+            gaussian: array(&deviations.gaussian, &[m]),
+        })
     }
 
     /// What was changed, and what the flags of single queries amount to.
@@ -210,23 +359,24 @@ impl SurfaceGeometry {
         let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
         let flagged =
             |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
-        let n_offset = (0..m).filter(|&query| self.geometry.is_offset(query)).count();
+        let n_offset = (0..m).filter(|&query| self.geometry.served_by(query) == ServedBy::Offset).count();
         let orientation = self.surface.orientation();
-        let too_rough = match self.surface.signature().solver.kernel().family() {
-            Family::Laplace { .. } => LAPLACE_TOO_ROUGH,
-            _ => KERNEL_TOO_ROUGH,
+        let too_rough = match &*self.surface {
+            Surface::Signature(surface) if is_laplace(surface) => LAPLACE_TOO_ROUGH,
+            Surface::Signature(_) | Surface::Local(_) => KERNEL_TOO_ROUGH,
         };
+        let disagrees = if self.request.checks_curvatures { DISAGREES } else { UNCERTAIN };
         let counted = [
             (n_offset, WarningCode::OffsetModelUsed, "served by the offset model"),
             (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
-            (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, DISAGREES),
+            (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, disagrees),
             (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
         ];
         let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
         let mut warnings: Vec<Warning> = counted
             .map(|(count, code, what)| Warning { code, detail: format!("{what} (queries: {count} of {m})") })
             .collect();
-        if self.orientation == Orientation::Gradient {
+        if self.request.orientation == Orientation::Gradient {
             return warnings;
         }
         if orientation.n_flipped > 0 {
@@ -240,9 +390,14 @@ impl SurfaceGeometry {
     }
 }
 
+fn is_laplace(surface: &SignatureSurface) -> bool {
+    matches!(surface.signature().solver.kernel().family(), Family::Laplace { .. })
+}
+
 const LAPLACE_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
 const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; take a smoother kernel";
 const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
+const UNCERTAIN: &str = "normals are uncertain by 17 degrees and more; see degenerate";
 const FAR: &str = "farther from the cloud than three spacings";
 const OPEN_CLOUD: &str =
     "the cloud has a rim, so that outward has no meaning; the side is that of most gradients";

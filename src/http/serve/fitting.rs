@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::fitted::{Fits, Fitted};
-use super::plan::{Cost, FitFailure, FitPlan};
+use super::plan::{Cost, FitFailure, FitModel, FitPlan};
 use super::report::Report;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes};
@@ -12,11 +12,15 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::function::moving::Moving;
+use crate::numerics::kernel::Kernel;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::choose::Choice;
 use crate::numerics::solver::{Solver, System, Workspace};
+use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
-use crate::numerics::surface::level::Signature;
+use crate::numerics::surface::local::LocalSurface;
+use crate::numerics::surface::signature::{Signature, SignatureSurface};
 use crate::store::budget::{BeyondBudget, Reservation};
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
@@ -256,6 +260,13 @@ async fn prepare(
     plan: FitPlan,
     mut memory: Reservation,
 ) -> Result<PreparedFit, FitFailure> {
+    let (kernel, regularization) = match plan.model.clone() {
+        FitModel::Dense { kernel, regularization } => (kernel, regularization),
+        FitModel::Moving { kernel, regularization, .. } => {
+            return prepare_moving(app, admission, plan, (kernel, regularization), memory).await;
+        }
+        FitModel::Local(_) => return Ok(PreparedFit::local(memory)),
+    };
     let flops = plan.choice(app.prepared.memory()).at_most.flops;
     let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {
@@ -266,7 +277,7 @@ async fn prepare(
             !is_short
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let system = System::new(plan.fitted, plan.kernel, plan.regularization);
+        let system = System::new(plan.fitted, kernel, regularization);
         let solver = system.and_then(|system| Solver::dense_in(workspace, system, observer));
         match solver {
             // The memory goes with the job: it may run on for a moment when nobody waits any more.
@@ -280,6 +291,41 @@ async fn prepare(
     Ok(PreparedFit::new(solver, times.gram, times.factor, memory))
 }
 
+/// Checks the system, and sees to it that the neighbours of its cloud can be found.
+async fn prepare_moving(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    plan: FitPlan,
+    (kernel, regularization): (Kernel, Regularization),
+    memory: Reservation,
+) -> Result<PreparedFit, FitFailure> {
+    let flops = plan.choice(app.prepared.memory()).expected.flops;
+    let sampling = sampling_unless_merged(&app, &admission, &plan).await?;
+    let job = move |observer: &JobObserver| {
+        let sampling = match sampling {
+            Some(sampling) => sampling,
+            None => Arc::new(Sampling::of(&plan.fitted, observer)?),
+        };
+        let system = System::new(plan.fitted, kernel, regularization)?;
+        Ok((Moving::new(system, sampling), memory))
+    };
+    let (outcome, _) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
+    let (moving, memory) = outcome.map_err(FitFailure::Refused)?;
+    Ok(PreparedFit::moving(moving, memory))
+}
+
+/// How the cloud of a fit is sampled; without the merged points it is another cloud, of which nobody knows.
+async fn sampling_unless_merged(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    plan: &FitPlan,
+) -> Result<Option<Arc<Sampling>>, FitFailure> {
+    match plan.merge {
+        None => find_sampling(app, admission, &plan.stored).await.map(Some).map_err(FitFailure::Broken),
+        Some(_) => Ok(None),
+    }
+}
+
 /// The surface of the signature function, with the client's normals if there are any.
 fn make_surface(
     app: Arc<App>,
@@ -291,19 +337,21 @@ fn make_surface(
     let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
     let flops = plan.choice(app.prepared.memory()).surface.flops;
     async move {
-        let sampling = match plan.merge {
-            None => Some(find_sampling(&app, &admission, &plan.stored).await.map_err(FitFailure::Broken)?),
-            Some(_) => None,
-        };
+        let sampling = sampling_unless_merged(&app, &admission, &plan).await?;
         let shared = app.clone();
         let job = move |observer: &JobObserver| {
-            let signature = signature(&shared, &plan, stored.solver(), observer)?;
-            // Without the merged points it is another cloud.
             let sampling = match sampling {
                 Some(sampling) => sampling,
                 None => Arc::new(Sampling::of(&plan.fitted, observer)?),
             };
-            let surface = Surface::over(sampling, signature, plan.fitted_normals().as_deref(), observer)?;
+            let given = plan.fitted_normals();
+            let surface = match stored.solver() {
+                None => LocalSurface::of(plan.fitted.clone(), sampling, given.as_deref(), observer)?.into(),
+                Some(solver) => {
+                    let signature = signature(&shared, &plan, solver, observer)?;
+                    SignatureSurface::over(sampling, signature, given.as_deref(), observer)?.into()
+                }
+            };
             // As with a factor, the memory goes with the job.
             Ok((surface, memory))
         };

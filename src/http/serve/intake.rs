@@ -5,6 +5,7 @@ use std::time::Duration;
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use http_body_util::BodyExt;
+use serde::de::DeserializeOwned;
 use tokio::time::{Instant, timeout_at};
 
 use crate::http::problem::Problem;
@@ -12,7 +13,8 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, announced};
 use crate::http::wire::read::body::RequestBody;
-use crate::http::wire::read::limits::SMALLER_BODY;
+use crate::http::wire::read::limits::{ParseContext, SMALLER_BODY};
+use crate::numerics::observer::Observer;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 
@@ -33,6 +35,29 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Intake {
     pub body: RequestBody,
     pub memory: Reservation,
+}
+
+impl Intake {
+    /// Parses it, and says what memory it holds. A body that is unpacked to more than usual takes the rest of its memory here,
+    /// where it cannot wait for it.
+    ///
+    /// # Errors
+    /// Those of [`RequestBody::parse`], 503 if there is no memory for what it is unpacked to.
+    pub fn parse<T: DeserializeOwned>(
+        self,
+        app: &App,
+        observer: &dyn Observer,
+    ) -> Result<(T, Reservation), Problem> {
+        let Self { body, mut memory } = self;
+        let (n_packed, parsing) = (body.n_bytes(), body.parsing());
+        let make_room = |n_bytes_plain: usize| {
+            let n_bytes = n_packed.saturating_add(parsing.n_bytes(n_bytes_plain, &app.config));
+            let n_more = n_bytes.saturating_sub(memory.n_bytes());
+            if n_more == 0 || memory.try_grow(n_more) { Ok(()) } else { Err(app.compute.out_of_memory()) }
+        };
+        let request = body.parse(&ParseContext::new(&app.config, observer), make_room)?;
+        Ok((request, memory))
+    }
 }
 
 /// Reads a body of at most `app.memory.body` bytes, in one of the formats.
@@ -76,8 +101,9 @@ pub async fn read_body(
     }
     let Reader { mut memory, bytes, .. } = reader;
     let body = RequestBody::new(format, coding, bytes, limit);
-    // All that parsing takes is taken before it begins.
-    if !app.intake.grow(&mut memory, body.n_bytes_to_parse(&app.config), PATIENCE).await {
+    // All that parsing takes is taken before it begins, as far as can be seen.
+    let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &app.config);
+    if !app.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
         return Err(app.compute.out_of_memory());
     }
     Ok(Intake { body, memory })

@@ -11,5 +11,6 @@ pub mod intake;
 pub mod plan;
 pub mod planner;
 pub mod sampling;
+pub mod values;
 
 mod report;

@@ -19,7 +19,6 @@ use crate::http::compute::{Admission, JobObserver, is_light};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
-use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
 use crate::store::Owner;
@@ -149,8 +148,7 @@ async fn prepare<O: Operation>(
     let (shared, admitted) = (app.clone(), admission.clone());
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
-        let Intake { body, mut memory } = intake;
-        let request: O = body.parse(&ParseContext::new(&shared.config, observer))?;
+        let (request, mut memory) = intake.parse::<O>(&shared, observer)?;
         let plan = request.plan(&Planner { app: &shared, owner: admitted.owner })?;
         memory.shrink_to(n_bytes_held(&plan));
         if lacking(&plan).is_some() {

@@ -11,7 +11,8 @@ use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::Kernel as NumericalKernel;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::Merge;
-use crate::numerics::solver::choose::{Choice, Price, choose};
+use crate::numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
+use crate::numerics::solver::kind::SolverKind;
 use crate::numerics::sums::regularization::Regularization;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
@@ -26,12 +27,41 @@ pub struct PlannedFit {
     pub(super) regularization: Option<Regularization>,
     pub(super) duplicates: DuplicatePolicy,
     pub(super) purpose: Purpose,
+    pub(super) way: Way,
+}
+
+/// How a fit is served.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// By a factorization of the whole matrix.
+    Dense,
+    /// Values from the points nearest to each query.
+    Moving(LocalReason),
+    /// A surface by local regressions.
+    Regressions(LocalReason),
+}
+
+/// Why a fit is served locally.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LocalReason {
+    Asked,
+    Auto(AutoLocal),
 }
 
 impl PlannedFit {
     /// Points that are factorized at most: without the duplicates that may be merged.
     pub fn n_points(&self) -> usize {
         self.stored.cloud.n_points()
+    }
+
+    /// Whether the surface is regressed locally.
+    pub fn is_local(&self) -> bool {
+        matches!(self.way, Way::Regressions(_))
+    }
+
+    /// Whether values come from the points nearest to each query.
+    pub fn is_moving(&self) -> bool {
+        matches!(self.way, Way::Moving(_))
     }
 
     /// Whether the noise is given for each point.
@@ -41,7 +71,9 @@ impl PlannedFit {
 
     /// Whether the lengths of the cloud decide, and are not known yet.
     pub fn lacks_scales(&self) -> bool {
-        !matches!(self.kernel, Some(PlannedKernel::Given(_))) && self.stored.scales().is_none()
+        !self.is_local()
+            && !matches!(self.kernel, Some(PlannedKernel::Given(_)))
+            && self.stored.scales().is_none()
     }
 
     /// Whether the noise of the points decides, and is not known yet.
@@ -50,7 +82,10 @@ impl PlannedFit {
     }
 
     fn needs_noise(&self) -> bool {
-        self.kernel.is_none() && self.regularization.is_none() && self.purpose != Purpose::Values
+        !self.is_local()
+            && self.kernel.is_none()
+            && self.regularization.is_none()
+            && self.purpose != Purpose::Values
     }
 
     /// Fills in what is left out, once the cloud has what it lacks.
@@ -58,7 +93,13 @@ impl PlannedFit {
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
     pub fn resolve(self) -> Result<FitPlan, Problem> {
-        let Self { owner, stored, pointers, .. } = self;
+        let (owner, pointers, is_moving) = (self.owner, self.pointers, self.is_moving());
+        let Self { stored, way, .. } = self;
+        if let Way::Regressions(reason) = way {
+            let (key, fitted) = (FitKey::of_local(owner, stored.id), stored.cloud.clone());
+            let model = FitModel::Local(reason);
+            return Ok(FitPlan { stored, fitted, merge: None, model, key, pointers });
+        }
         let refuse = |error| Problem::from_numerics(error, pointers);
         let (kernel, default_alpha) = match &self.kernel {
             Some(kernel) => (kernel.resolve(stored.scales(), pointers)?, DEFAULT_ALPHA),
@@ -77,12 +118,17 @@ impl PlannedFit {
         let merges =
             self.duplicates == DuplicatePolicy::Merge && regularization == Regularization::Uniform(0.0);
         let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
-        let key = FitKey::of_dense(owner, stored.id, &kernel, &regularization, merged.is_some());
+        let solver = if is_moving { SolverKind::Local } else { SolverKind::Dense };
+        let key = FitKey::of(solver, owner, stored.id, &kernel, &regularization, merged.is_some());
         let (fitted, merge) = match merged {
             None => (stored.cloud.clone(), None),
             Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
         };
-        Ok(FitPlan { stored, fitted, merge, kernel, regularization, key, pointers })
+        let model = match way {
+            Way::Moving(reason) => FitModel::Moving { kernel, regularization, reason },
+            Way::Dense | Way::Regressions(_) => FitModel::Dense { kernel, regularization },
+        };
+        Ok(FitPlan { stored, fitted, merge, model, key, pointers })
     }
 }
 
@@ -93,10 +139,26 @@ pub struct FitPlan {
     /// The cloud that is factorized: without the merged duplicates.
     pub fitted: Arc<Cloud>,
     pub merge: Option<Arc<Merge>>,
-    pub kernel: NumericalKernel,
-    pub regularization: Regularization,
+    pub model: FitModel,
     pub key: FitKey,
     pub pointers: Pointers,
+}
+
+/// What is fitted.
+#[derive(Debug, Clone)]
+pub enum FitModel {
+    Dense {
+        kernel: NumericalKernel,
+        regularization: Regularization,
+    },
+    /// Kriging from the points nearest to each query.
+    Moving {
+        kernel: NumericalKernel,
+        regularization: Regularization,
+        reason: LocalReason,
+    },
+    /// Local regressions, which choose all that they need.
+    Local(LocalReason),
 }
 
 impl FitPlan {
@@ -113,7 +175,12 @@ impl FitPlan {
 
     /// The solver of this fit with what it and the surface take, within so many bytes of memory.
     pub fn choice(&self, memory: usize) -> Choice {
-        choose(self.fitted.n_points(), self.fitted.dimension(), memory)
+        let (n, d) = (self.fitted.n_points(), self.fitted.dimension());
+        match self.model {
+            FitModel::Dense { .. } => choose(n, d, memory),
+            FitModel::Moving { .. } => choose_moving(n, d, self.merge.is_some()),
+            FitModel::Local(_) => choose_local(n, d),
+        }
     }
 
     /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.

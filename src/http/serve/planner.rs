@@ -2,17 +2,21 @@
 
 use std::sync::Arc;
 
-use super::plan::PlannedFit;
+use super::plan::{LocalReason, PlannedFit, Way};
 use crate::http::fields::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::app::App;
-use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
+use crate::http::wire::read::limits::{
+    too_many_coordinates, too_many_dense_points, too_many_points, too_many_queries, transposed,
+};
 use crate::http::wire::read::points::Points;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::error::NumericsError;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
 use crate::numerics::sums::regularization::Regularization;
+use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
@@ -27,27 +31,185 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// Checks the fit of a request.
+    /// Checks the fit of values. `dense_only` is what is asked that only a dense factorization has, if anything.
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn fit(&self, fit: Fit, purpose: Purpose) -> Result<PlannedFit, Problem> {
+    pub fn values_fit(&self, fit: Fit, dense_only: Option<DenseOnly>) -> Result<PlannedFit, Problem> {
         let pointers = pointers_of(&fit);
         let stored = self.cloud(fit.cloud, "/cloud")?;
-        let (SolverChoice::Auto | SolverChoice::Dense) = fit.solver;
+        let is_beyond = stored.cloud.n_points() > self.app.config.max_dense_points;
+        let way = match (fit.solver, dense_only) {
+            (SolverChoice::Local, None) => Way::Moving(LocalReason::Asked),
+            (SolverChoice::Local, Some(asked)) => return Err(asked.refused_by_local()),
+            (SolverChoice::Auto, None) if is_beyond => Way::Moving(LocalReason::Auto(AutoLocal::BeyondDense)),
+            (SolverChoice::Auto, Some(asked)) if is_beyond => {
+                return Err(self.beyond_dense(&stored, pointers).with_remedy(&asked.remedy()));
+            }
+            (SolverChoice::Auto | SolverChoice::Dense, _) => Way::Dense,
+        };
         let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
-        self.plan(stored, chosen, fit.duplicates, purpose, pointers)
+        self.plan(stored, chosen, way, fit.duplicates, Purpose::Values, pointers)
+    }
+
+    /// Checks the fit of a surface: of a signature function, or local regressions.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn surface_fit(
+        &self,
+        fit: Fit,
+        purpose: Purpose,
+        request: &GeometryRequest,
+    ) -> Result<PlannedFit, Problem> {
+        let pointers = pointers_of(&fit);
+        let stored = self.cloud(fit.cloud, "/cloud")?;
+        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
+        self.plan_surface(stored, chosen, fit.solver, fit.duplicates, (purpose, request), pointers)
+    }
+
+    fn plan_surface(
+        &self,
+        stored: Arc<RegisteredCloud>,
+        chosen: Chosen,
+        solver: SolverChoice,
+        duplicates: DuplicatePolicy,
+        (purpose, request): (Purpose, &GeometryRequest),
+        pointers: Pointers,
+    ) -> Result<PlannedFit, Problem> {
+        let Some(reason) = self.local_reason(&stored.cloud, &chosen, solver, request, pointers)? else {
+            return self.plan(stored, chosen, Way::Dense, duplicates, purpose, pointers);
+        };
+        let way = Way::Regressions(reason);
+        let (kernel, regularization) = (None, None);
+        Ok(PlannedFit {
+            owner: self.owner,
+            stored,
+            pointers,
+            kernel,
+            regularization,
+            duplicates,
+            purpose,
+            way,
+        })
+    }
+
+    /// Why a surface is regressed locally, if it is.
+    fn local_reason(
+        &self,
+        cloud: &Cloud,
+        chosen: &Chosen,
+        solver: SolverChoice,
+        request: &GeometryRequest,
+        pointers: Pointers,
+    ) -> Result<Option<LocalReason>, Problem> {
+        let (n, d) = (cloud.n_points(), cloud.dimension());
+        let given = [
+            (chosen.kernel.is_some(), pointers.kernel),
+            (chosen.alpha.is_some() || chosen.noise_variances.is_some(), pointers.regularization),
+        ];
+        let given = given.into_iter().find_map(|(is_given, pointer)| is_given.then_some(pointer));
+        if solver == SolverChoice::Local || request.model == SurfaceModel::Local {
+            let pointer = if solver == SolverChoice::Local { "/solver" } else { "/surface" };
+            if !(2..=MAX_LOCAL_DIMENSION).contains(&d) && d >= 2 {
+                let detail = format!(
+                    "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {d}"
+                );
+                return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
+            }
+            if let Some(pointer) = given {
+                let detail = "local regressions choose kernel and noise by their likelihood; leave this out, or take \
+                              \"surface\": \"signature\"";
+                return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
+            }
+            return Ok(Some(LocalReason::Asked));
+        }
+        if solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some() {
+            return Ok(None);
+        }
+        let max_dense_points = self.app.config.max_dense_points;
+        let reason = prefers_local(n, d, max_dense_points, request.has_deviations);
+        Ok(reason.map(LocalReason::Auto))
+    }
+
+    /// Whether an operator on values is asked of stencils: by name, or since there are more nodes than are factorized and nothing is said
+    /// of their kernel.
+    fn wants_stencils(&self, fit: &Fit, nodes: &RegisteredCloud) -> bool {
+        let is_free = fit.kernel.is_none() && fit.alpha.is_none() && fit.noise_variances.is_none();
+        match fit.solver {
+            SolverChoice::Local => true,
+            SolverChoice::Auto => is_free && nodes.cloud.n_points() > self.app.config.max_dense_points,
+            SolverChoice::Dense => false,
+        }
+    }
+
+    /// The nodes of stencils and the fit of the surface under them.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn stencils(
+        &self,
+        mut fit: Fit,
+        geometry: Option<Geometry>,
+        request: &GeometryRequest,
+    ) -> Result<(Arc<RegisteredCloud>, PlannedFit), Problem> {
+        let pointers = pointers_of(&fit);
+        let nodes = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+        // The nodes need no solver: what is said of them is said of the surface.
+        let (_, surface) = self.fits_over((nodes.clone(), pointers), fit, geometry, request, false)?;
+        Ok((nodes, surface))
+    }
+
+    /// [`Planner::stencils`] where they are wanted, else [`Planner::fits`].
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn operator_fits(
+        &self,
+        mut fit: Fit,
+        geometry: Option<Geometry>,
+        request: &GeometryRequest,
+    ) -> Result<OperatorFits, Problem> {
+        let pointers = pointers_of(&fit);
+        let nodes = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+        let wants_stencils = self.wants_stencils(&fit, &nodes);
+        let over = (nodes.clone(), pointers);
+        let (values, surface) = self.fits_over(over, fit, geometry, request, !wants_stencils)?;
+        Ok(match values {
+            None => OperatorFits::Stencils { nodes, surface },
+            Some(values) => OperatorFits::Solved { values, surface },
+        })
     }
 
     /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn fits(&self, fit: Fit, geometry: Option<Geometry>) -> Result<(PlannedFit, PlannedFit), Problem> {
-        let geometry = geometry.unwrap_or_default();
+    pub fn fits(
+        &self,
+        mut fit: Fit,
+        geometry: Option<Geometry>,
+        request: &GeometryRequest,
+    ) -> Result<(PlannedFit, PlannedFit), Problem> {
+        if fit.solver == SolverChoice::Local {
+            return Err(local_lacks_operators("/solver"));
+        }
         let pointers = pointers_of(&fit);
+        let cloud = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+        let (values, surface) = self.fits_over((cloud, pointers), fit, geometry, request, true)?;
+        Ok((values.ok_or_else(Problem::internal)?, surface))
+    }
+
+    fn fits_over(
+        &self,
+        (values_cloud, pointers): (Arc<RegisteredCloud>, Pointers),
+        fit: Fit,
+        geometry: Option<Geometry>,
+        request: &GeometryRequest,
+        has_values: bool,
+    ) -> Result<(Option<PlannedFit>, PlannedFit), Problem> {
+        let geometry = geometry.unwrap_or_default();
         let surface_pointers = pointers_of_surface(&geometry, pointers);
-        let values_cloud = self.cloud(fit.cloud, "/cloud")?;
         let surface_cloud = match geometry.cloud {
             None => values_cloud.clone(),
             Some(cloud) => self.cloud(cloud, "/geometry/cloud")?,
@@ -56,7 +218,7 @@ impl Planner<'_> {
         if expected != found {
             return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
         }
-        let (SolverChoice::Auto | SolverChoice::Dense) = geometry.solver.unwrap_or(fit.solver);
+        let solver = geometry.solver.unwrap_or(fit.solver);
         let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
         if inherits_noise && chosen.noise_variances.is_some() && surface_cloud.id != values_cloud.id {
@@ -64,17 +226,41 @@ impl Planner<'_> {
                 "noise_variances belong to the points of cloud; give alpha or noise_variances here as well";
             return Err(Problem::invalid_request("/geometry", detail));
         }
-        let surface_chosen = Chosen {
-            kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
-            alpha: if inherits_noise { chosen.alpha } else { geometry.alpha },
-            noise_variances: match inherits_noise {
-                true => chosen.noise_variances.clone(),
-                false => geometry.noise_variances,
-            },
+        // Local regressions take no kernel: that of the values is not meant for them.
+        let is_local = solver == SolverChoice::Local || request.model == SurfaceModel::Local;
+        let has_own = geometry.kernel.is_some() || !inherits_noise;
+        let surface_chosen = if is_local && !has_own && has_values {
+            Chosen { kernel: None, alpha: None, noise_variances: None }
+        } else {
+            Chosen {
+                kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
+                alpha: if inherits_noise { chosen.alpha } else { geometry.alpha },
+                noise_variances: match inherits_noise {
+                    true => chosen.noise_variances.clone(),
+                    false => geometry.noise_variances,
+                },
+            }
         };
-        let values = self.plan(values_cloud, chosen, fit.duplicates, Purpose::Values, pointers)?;
-        let surface =
-            self.plan(surface_cloud, surface_chosen, fit.duplicates, Purpose::Curvatures, surface_pointers)?;
+        let values = match has_values {
+            true => Some(self.plan(
+                values_cloud,
+                chosen,
+                Way::Dense,
+                fit.duplicates,
+                Purpose::Values,
+                pointers,
+            )?),
+            false => None,
+        };
+        let asked = (Purpose::Curvatures, request);
+        let surface = self.plan_surface(
+            surface_cloud,
+            surface_chosen,
+            solver,
+            fit.duplicates,
+            asked,
+            surface_pointers,
+        )?;
         Ok((values, surface))
     }
 
@@ -112,7 +298,15 @@ impl Planner<'_> {
     /// # Errors
     /// 422 `length-mismatch`.
     pub fn check_values(&self, values: &[f64], plan: &PlannedFit) -> Result<(), Problem> {
-        let (cloud, found) = (&plan.stored.cloud, values.len());
+        self.check_values_of(values, &plan.stored.cloud)
+    }
+
+    /// Checks one entry per point of a cloud.
+    ///
+    /// # Errors
+    /// 422 `length-mismatch`.
+    pub fn check_values_of(&self, values: &[f64], cloud: &Cloud) -> Result<(), Problem> {
+        let found = values.len();
         if cloud.n_points() == found { Ok(()) } else { Err(length_mismatch("/values", cloud, found)) }
     }
 
@@ -180,18 +374,84 @@ impl Planner<'_> {
         Ok(self.app.clouds.register(self.owner, cloud, normals))
     }
 
+    /// Admits a cloud to the dense solver. This is the one place that holds it to its limit: for solvers that never factorize all
+    /// points at once, it is [`Planner::register`] that has.
+    fn check_max_dense_points(&self, stored: &RegisteredCloud, pointers: Pointers) -> Result<(), Problem> {
+        if stored.cloud.n_points() <= self.app.config.max_dense_points {
+            return Ok(());
+        }
+        Err(self.beyond_dense(stored, pointers).with_remedy(TRY_LOCAL))
+    }
+
+    /// 413 for a cloud of too many points to be factorized at once.
+    fn beyond_dense(&self, stored: &RegisteredCloud, pointers: Pointers) -> Problem {
+        let (limit, required) = (self.app.config.max_dense_points, stored.cloud.n_points());
+        too_many_dense_points(limit, required).at(pointers.points)
+    }
+
     fn plan(
         &self,
         stored: Arc<RegisteredCloud>,
         chosen: Chosen,
+        way: Way,
         duplicates: DuplicatePolicy,
         purpose: Purpose,
         pointers: Pointers,
     ) -> Result<PlannedFit, Problem> {
+        if way == Way::Dense {
+            self.check_max_dense_points(&stored, pointers)?;
+        }
         let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(pointers)).transpose()?;
         let regularization = chosen.regularization(&stored, pointers)?;
-        Ok(PlannedFit { owner: self.owner, stored, pointers, kernel, regularization, duplicates, purpose })
+        Ok(PlannedFit {
+            owner: self.owner,
+            stored,
+            pointers,
+            kernel,
+            regularization,
+            duplicates,
+            purpose,
+            way,
+        })
     }
+}
+
+/// What is asked that only a dense factorization has: its word, and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct DenseOnly {
+    pub name: &'static str,
+    pub pointer: &'static str,
+}
+
+impl DenseOnly {
+    /// 422 where the local solver is asked for it.
+    fn refused_by_local(self) -> Problem {
+        let detail = format!(
+            "the local solver knows each query by itself and has no {}; leave it out, or take \"solver\": \"dense\"",
+            self.name
+        );
+        Problem::of_field(Slug::UnsupportedBySolver, self.pointer, detail)
+    }
+
+    fn remedy(self) -> String {
+        format!("leave out {}, which the local solver does not have, or thin the cloud", self.name)
+    }
+}
+
+const TRY_LOCAL: &str =
+    "set \"solver\" to \"local\", which takes time in proportion to the points, or thin the cloud";
+
+/// 422 for operators on values, which are those of one function.
+fn local_lacks_operators(pointer: &str) -> Problem {
+    let detail = "operators take values of one function, which the local solver does not have: take \"solver\": \"dense\", and \
+                  {\"geometry\": {\"surface\": \"local\"}} for the surface under an operator";
+    Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
+}
+
+/// What an operator on values is computed from.
+pub enum OperatorFits {
+    Solved { values: PlannedFit, surface: PlannedFit },
+    Stencils { nodes: Arc<RegisteredCloud>, surface: PlannedFit },
 }
 
 /// Where the fit of a request stands.
@@ -316,7 +576,8 @@ fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud,
         None => Ok(normals),
         Some(row) => {
             let detail = format!("normal {row} is zero and points nowhere");
-            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail))
+            Err(Problem::of_field(Slug::InvalidCloud, format!("{pointer}/{row}"), detail)
+                .with_remedy("leave out this point, or all normals: they are found from the points then"))
         }
     }
 }

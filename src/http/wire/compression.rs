@@ -68,17 +68,20 @@ const BLOCK_BYTES: usize = 64 << 10;
 /// Decompresses a request of at most `limit` bytes.
 ///
 /// Twice: the first time it only counts, so that the second one fills a buffer of the right size. A buffer that grows takes up
-/// to three times as much, and what a stream says of its own length may be wrong.
+/// to three times as much, and what a stream says of its own length may be wrong. In between `make_room` is told how many bytes
+/// there will be.
 ///
 /// # Errors
-/// 413 `body-too-large` beyond the limit, 504 once nobody waits for it, 400 `malformed-body` for what is not of this coding.
+/// Those of `make_room`, 413 `body-too-large` beyond the limit, 504 once nobody waits for it, 400 `malformed-body` for what is not of this coding.
 pub fn decompress(
     bytes: Vec<u8>,
     coding: Coding,
     limit: usize,
     observer: &dyn Observer,
+    make_room: impl FnOnce(usize) -> Result<(), Problem>,
 ) -> Result<Vec<u8>, Problem> {
     if coding == Coding::Identity {
+        make_room(bytes.len())?;
         return Ok(bytes);
     }
     let packed = || Packed { bytes: &bytes, observer };
@@ -100,6 +103,7 @@ pub fn decompress(
         let what = "bytes of decompressed body";
         return Err(Problem::too_large(Slug::BodyTooLarge, what, limit, None).with_remedy(SMALLER_BODY));
     }
+    make_room(length)?;
     let mut plain = Vec::with_capacity(length);
     read_blocks(open().map_err(refused)?, length, observer, |block| plain.extend_from_slice(block))
         .map_err(refused)?;
@@ -168,6 +172,10 @@ mod tests {
         out
     }
 
+    fn is_room(_n_bytes: usize) -> Result<(), Problem> {
+        Ok(())
+    }
+
     const CODINGS: [Coding; 3] = [Coding::Identity, Coding::Gzip, Coding::Zstd];
 
     #[test]
@@ -175,8 +183,22 @@ mod tests {
         let text = "0.123456789,".repeat(10_000).into_bytes();
         for coding in CODINGS {
             let body = compressed(coding, &[&text[..17], b"", &text[17..50_000], &text[50_000..]]);
-            assert_eq!(decompress(body, coding, text.len(), &Unobserved).unwrap(), text);
-            assert_eq!(decompress(compressed(coding, &[]), coding, 0, &Unobserved).unwrap(), b"");
+            assert_eq!(decompress(body, coding, text.len(), &Unobserved, is_room).unwrap(), text);
+            assert_eq!(decompress(compressed(coding, &[]), coding, 0, &Unobserved, is_room).unwrap(), b"");
+        }
+    }
+
+    #[test]
+    fn room_is_made_for_what_there_is_before_it_is_unpacked() {
+        for coding in CODINGS {
+            let told = std::cell::Cell::new(0);
+            let make_room = |n_bytes| {
+                told.set(n_bytes);
+                Err(Problem::overloaded(1))
+            };
+            let body = compressed(coding, &[&[7; 70_000]]);
+            let refused = decompress(body, coding, 100_000, &Unobserved, make_room).err();
+            assert_eq!((refused.map(|problem| problem.slug()), told.get()), (Some(Slug::Overloaded), 70_000));
         }
     }
 
@@ -185,8 +207,9 @@ mod tests {
         let zeros = vec![0; 100_000];
         for coding in [Coding::Gzip, Coding::Zstd] {
             let body = compressed(coding, &[&zeros]);
-            let slug =
-                |body: &[u8]| decompress(body.to_vec(), coding, 99_999, &Unobserved).err().map(|p| p.slug());
+            let slug = |body: &[u8]| {
+                decompress(body.to_vec(), coding, 99_999, &Unobserved, is_room).err().map(|p| p.slug())
+            };
             assert_eq!(slug(&body), Some(Slug::BodyTooLarge));
             for broken in [&body[..body.len() / 2], &body[..0], &body[1..], b"{}"] {
                 assert_eq!(slug(broken), Some(Slug::MalformedBody), "{coding:?} {broken:?}");
@@ -209,7 +232,7 @@ mod tests {
     fn what_nobody_waits_for_is_not_decompressed() {
         for coding in [Coding::Gzip, Coding::Zstd] {
             let body = compressed(coding, &[b"{}"]);
-            let refused = decompress(body, coding, 100, &Left).err().map(|problem| problem.slug());
+            let refused = decompress(body, coding, 100, &Left, is_room).err().map(|problem| problem.slug());
             assert_eq!(refused, Some(Slug::DeadlineExceeded));
         }
     }

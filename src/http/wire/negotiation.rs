@@ -13,6 +13,8 @@ pub enum Format {
     Safetensors,
     /// One array of `NumPy`.
     Npy,
+    /// Points, and normals if there are some, as scanners write them.
+    Ply,
 }
 
 impl Format {
@@ -21,6 +23,7 @@ impl Format {
             Self::Json => "application/json",
             Self::Safetensors => "application/x-safetensors",
             Self::Npy => "application/x-npy",
+            Self::Ply => "model/ply",
         }
     }
 }
@@ -101,7 +104,7 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
         (Some((_, weight)), ..) => weight,
         (None, Some((_, 0.0)), _) => 0.0,
         (None, _, Format::Json) => f64::MIN_POSITIVE,
-        (None, _, Format::Safetensors | Format::Npy) => 1.0,
+        (None, _, Format::Safetensors | Format::Npy | Format::Ply) => 1.0,
     };
     let codings = [(Coding::Zstd, weight("zstd")), (Coding::Gzip, weight("gzip"))];
     let first = if format == Format::Json { None } else { Some((Coding::Identity, identity)) };

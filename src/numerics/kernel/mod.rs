@@ -13,9 +13,11 @@ mod matern;
 mod profile;
 mod wendland;
 
-use pulp::Simd;
+use pulp::{Simd, WithSimd};
 
 use super::error::NumericsError;
+use super::machine::instruction_set::Portable;
+use super::machine::registers::{Block, Pack};
 pub use family::Family;
 pub use matern::MAX_MATERN_ORDER;
 pub(crate) use profile::{HUGE, Pairs, distance_and_inverse};
@@ -93,10 +95,50 @@ impl Kernel {
         self.inverse_square_length
     }
 
+    /// φ, φ′ and φ″ at 0, for families that have them there.
+    pub(crate) fn profile_at_zero(&self) -> [f64; 3] {
+        Portable {}.vectorize(AtZero(self))
+    }
+
     /// Runs over the pairs of a block with φ, φ′ and φ″. Derivatives that the loop body does not use are never computed.
     #[inline(always)]
     pub(crate) fn profiles<S: Simd>(&self, pairs: impl Pairs<S>) {
         self.family.profiles(pairs);
+    }
+}
+
+/// One block of pairs at a distance of 0.
+struct AtZero<'a>(&'a Kernel);
+
+impl WithSimd for AtZero<'_> {
+    type Output = [f64; 3];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let mut found = [Block::ZERO; 3];
+        self.0.profiles(Zero { simd, found: &mut found });
+        found.map(|block| block.0[0])
+    }
+}
+
+struct Zero<'a, S: Simd> {
+    simd: S,
+    found: &'a mut [Block; 3],
+}
+
+impl<S: Simd> Pairs<S> for Zero<'_, S> {
+    type Others = ();
+
+    #[inline(always)]
+    fn pack(&mut self, _at: usize) -> (Pack<S>, ()) {
+        (Pack::splat(self.simd, 0.0), ())
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
+        for (block, value) in self.found.iter_mut().zip(profile) {
+            value.store(block, at);
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! Everything here is safe code: [`pulp`] compiles a loop that is generic over [`pulp::Simd`] for AVX-512, for AVX2 with
 //! FMA, for NEON and for the portable baseline.
 
-use pulp::WithSimd;
+use pulp::{Simd, WithSimd};
 
 /// What the kernel loops are compiled for.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +32,11 @@ impl InstructionSet {
         sets
     }
 
+    /// Numbers in a register.
+    pub(crate) fn n_lanes(self) -> usize {
+        self.dispatch(Lanes)
+    }
+
     /// As `GET /version` says it.
     pub fn name(self) -> &'static str {
         match self.0 {
@@ -50,5 +55,16 @@ impl InstructionSet {
             pulp::Arch::Scalar => op.with_simd(Portable {}),
             arch => arch.dispatch(op),
         }
+    }
+}
+
+struct Lanes;
+
+impl WithSimd for Lanes {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> usize {
+        S::F64_LANES
     }
 }

@@ -65,6 +65,17 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         registers.as_chunks_mut().0[at] = self.registers;
     }
 
+    /// The numbers of a list of registers from `at · N` on.
+    #[inline(always)]
+    pub(crate) fn read(simd: S, registers: &[S::f64s], at: usize) -> Self {
+        Self { simd, registers: registers.as_chunks().0[at] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn write(self, registers: &mut [S::f64s], at: usize) {
+        registers.as_chunks_mut().0[at] = self.registers;
+    }
+
     /// `self·b + c`, rounded once where the instruction set has it (elsewhere a library call would cost more than it is
     /// worth).
     #[inline(always)]

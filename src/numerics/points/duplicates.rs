@@ -34,24 +34,32 @@ fn bits(x: &[f64]) -> Box<[u64]> {
 
 /// Number of points that coincide with an earlier one.
 pub fn count_duplicates(cloud: &Cloud) -> usize {
-    // Sorted, equal points are neighbours. A table would leave the allocator thousands of small holes among what is kept.
+    let order = sorted(cloud, |_| true);
+    order.windows(2).filter(|pair| coincide(cloud, pair[0], pair[1])).count()
+}
+
+/// Points for which `counts` holds by their coordinates. Sorted, equal points are neighbours. A table would leave the allocator thousands
+/// of small holes among what is kept.
+fn sorted(cloud: &Cloud, counts: impl Fn(usize) -> bool) -> Vec<u32> {
     let row = |point: u32| cloud.point(point as usize);
     let compare = |&a: &u32, &b: &u32| {
         let different = row(a).iter().zip(row(b)).map(|(x, y)| x.total_cmp(y)).find(|order| order.is_ne());
         different.unwrap_or(Ordering::Equal)
     };
-    let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
+    let mut order: Vec<u32> = (0..cloud.n_points() as u32).filter(|&point| counts(point as usize)).collect();
     order.sort_unstable_by(compare);
-    order.windows(2).filter(|pair| row(pair[0]) == row(pair[1])).count()
+    order
+}
+
+fn coincide(cloud: &Cloud, a: u32, b: u32) -> bool {
+    cloud.point(a as usize) == cloud.point(b as usize)
 }
 
 /// All points that share their position with another one, ascending, among those for which `counts` holds.
 pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -> Vec<usize> {
-    let mut members: HashMap<Box<[u64]>, Vec<usize>> = HashMap::with_capacity(cloud.n_points());
-    for (point, x) in cloud.points().enumerate().filter(|(point, _)| counts(*point)) {
-        members.entry(bits(x)).or_default().push(point);
-    }
-    let mut points: Vec<usize> = members.into_values().filter(|m| m.len() > 1).flatten().collect();
+    let order = sorted(cloud, counts);
+    let groups = order.chunk_by(|&a, &b| coincide(cloud, a, b)).filter(|group| group.len() > 1);
+    let mut points: Vec<usize> = groups.flatten().map(|&point| point as usize).collect();
     points.sort_unstable();
     points
 }

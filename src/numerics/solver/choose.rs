@@ -5,8 +5,10 @@
 
 use super::dense::Dense;
 use super::kind::SolverKind;
+use crate::numerics::points::monomials::n_stencil_nodes;
 use crate::numerics::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
 use crate::numerics::points::quadric::{n_coefficients, n_quadric_neighbours};
+use crate::numerics::points::thinning::n_coarse;
 
 /// Why a solver was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +17,8 @@ pub enum Reason {
     Fits,
     /// Nothing smaller is there: it serves if it is there already, and else is refused for its memory.
     NothingSmaller,
+    /// It takes no matrix.
+    Linear,
 }
 
 /// Bytes and flops.
@@ -54,6 +58,96 @@ pub fn choose(n_points: usize, dimension: usize, memory: usize) -> Choice {
     Choice { solver: SolverKind::Dense, reason, expected, at_most, surface }
 }
 
+/// Points from which `auto` regresses a surface locally where nothing else is given: the factorization alone takes more than a second.
+pub const LOCAL_FROM: usize = 5_000;
+
+/// The greatest dimension of local regressions; beyond it neighbourhoods say too little.
+pub const MAX_LOCAL_DIMENSION: usize = 4;
+
+/// Why `auto` chose local regressions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AutoLocal {
+    /// The cloud has more points than are factorized.
+    BeyondDense,
+    /// Their work is linear in the points, of which there are many.
+    ManyPoints,
+    /// Standard deviations are asked for, which are theirs.
+    Deviations,
+}
+
+/// Whether a surface of which nothing is given but its points is better regressed locally.
+pub fn prefers_local(
+    n_points: usize,
+    dimension: usize,
+    max_dense_points: usize,
+    has_deviations: bool,
+) -> Option<AutoLocal> {
+    match dimension {
+        2..=MAX_LOCAL_DIMENSION if n_points > max_dense_points => Some(AutoLocal::BeyondDense),
+        2..=MAX_LOCAL_DIMENSION if has_deviations => Some(AutoLocal::Deviations),
+        2..=MAX_LOCAL_DIMENSION if n_points >= LOCAL_FROM => Some(AutoLocal::ManyPoints),
+        _ => None,
+    }
+}
+
+/// Flops of a local regression at one query: 20 to 60 µs were measured at some 5 Gflop/s.
+const FLOPS_PER_REGRESSION: f64 = 2e5;
+
+/// Entries of a row of a sparse operator, at most.
+pub fn n_entries_per_row(dimension: usize) -> usize {
+    n_stencil_nodes(dimension.max(2))
+}
+
+/// Flops of the weights of a stencil: a small system by elimination.
+const FLOPS_PER_STENCIL: f64 = 3e5;
+
+/// Local regressions of n points, with the side chosen by a coarse signature function.
+pub fn choose_local(n_points: usize, dimension: usize) -> Choice {
+    let (n, coarse) = (n_points as f64, n_coarse(n_points));
+    let of_coarse = choose(coarse, dimension, usize::MAX);
+    let per_point = 700 + 16 * dimension * dimension;
+    let surface = Price {
+        n_bytes: n_points.saturating_mul(per_point).saturating_add(of_coarse.expected.n_bytes),
+        flops: n * FLOPS_PER_REGRESSION
+            + 60.0 * n * coarse as f64
+            + of_coarse.expected.flops
+            + sampling_flops(n_points, dimension),
+    };
+    // A trifle, but something: what takes nothing is not missing.
+    let nothing = Price { n_bytes: 1 << 10, flops: 0.0 };
+    Choice { solver: SolverKind::Local, reason: Reason::Linear, expected: nothing, at_most: nothing, surface }
+}
+
+/// Kriging around queries: a check of the system, and how its cloud is sampled, which is looked at here only where its duplicates are
+/// merged.
+pub fn choose_moving(n_points: usize, dimension: usize, is_merged: bool) -> Choice {
+    let numbers = n_points.saturating_mul((dimension + 4) * size_of::<f64>());
+    let looking = if is_merged { sampling_flops(n_points, dimension) } else { 0.0 };
+    let price = Price {
+        n_bytes: sampling_bytes(n_points, dimension).saturating_add(numbers).saturating_add(1 << 10),
+        // Coinciding points are found by sorting.
+        flops: 100.0 * n_points as f64 + looking,
+    };
+    let surface = Price::default();
+    Choice { solver: SolverKind::Local, reason: Reason::Linear, expected: price, at_most: price, surface }
+}
+
+/// Points of a moving neighbourhood. For Matérn 3/2 in three dimensions with little noise, means are within 3 to 5 % of the deviation of
+/// the dense posterior, with 64 within 9 to 13 % (docs/scale.md).
+pub const NEIGHBOURS: usize = 128;
+
+/// Flops of kriging at one query, and of the search for its neighbours.
+const FLOPS_PER_KRIGING: f64 = 1e6;
+
+/// Queries that are solved side by side, and threads that do so at most as far as memory is counted.
+const KRIGED_AT_ONCE: usize = 8;
+const MAX_KRIGING_THREADS: usize = 64;
+
+/// Numbers in the room of a thread: a triangle for each query, and some rows.
+fn numbers_to_krige(dimension: usize) -> usize {
+    KRIGED_AT_ONCE * NEIGHBOURS * (NEIGHBOURS / 2 + 12 + dimension)
+}
+
 /// The sums at the points, two searches and a quadric at each. Jets, normals and quadrics are kept; while they are made, half as
 /// much again is there beside the lists of neighbours.
 fn surface_price(n_points: usize, dimension: usize) -> Price {
@@ -70,6 +164,11 @@ pub fn sampling_flops(n_points: usize, dimension: usize) -> f64 {
     let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
     // Distance, comparison and descent.
     n * visited * (3.0 * dimension as f64 + 10.0)
+}
+
+/// Bytes that it takes at its peak: the tree with the points in its order, and four numbers a point.
+pub fn sampling_bytes(n_points: usize, dimension: usize) -> usize {
+    n_points.saturating_mul((dimension + 6) * size_of::<f64>())
 }
 
 /// Flops of [`crate::numerics::points::noise::estimate_noise`]: searches, and two quadrics each by orthogonal factorization.
@@ -121,8 +220,14 @@ pub enum Asked {
     Function,
     /// The same as a Gaussian process.
     Posterior { variances: bool, covariance: bool },
+    /// Values, derivatives and variances from the points nearest to each query.
+    Moving,
     /// Normals or curvatures.
     Geometry { offsets: Offsets },
+    /// Normals and curvatures by local regressions.
+    LocalGeometry,
+    /// An operator by stencils of the nearest nodes, on local geometry or another.
+    Stencils,
     /// An operator on the surface of `n_surface_points`, applied to values.
     Operator { n_surface_points: usize },
     /// The same as a matrix with so many rows per query.
@@ -149,9 +254,24 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
             let n_numbers = whitened.saturating_add(numbers_at_point(dimension)).saturating_mul(n_points);
             (flops, n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)))
         }
+        Asked::Moving => {
+            let n_threads = n_queries.div_ceil(KRIGED_AT_ONCE).min(MAX_KRIGING_THREADS);
+            let rooms = n_threads * numbers_to_krige(dimension);
+            // Searches in many dimensions visit most of the cloud.
+            let visited = n.min(5.0 * NEIGHBOURS as f64 * 2f64.powi(dimension.min(60) as i32));
+            let flops = m * (FLOPS_PER_KRIGING + visited * (3.0 * d + 10.0));
+            (flops, rooms.saturating_add(n_points).saturating_add(jets).saturating_add(2 * n_queries))
+        }
         Asked::Geometry { offsets } => {
             let flops = 60.0 * n * (n + m) + 30.0 * m * d.powi(3) + offsets.flops(n_queries);
             (flops, (4 * n_points).saturating_add(at_queries))
+        }
+        Asked::LocalGeometry => (FLOPS_PER_REGRESSION * m, at_queries),
+        Asked::Stencils => {
+            // A column, its place among the ordered ones and a number per component, once more while they are put together.
+            let n_entries = 4 * (2 + dimension) * n_stencil_nodes(dimension.max(2));
+            let flops = (FLOPS_PER_REGRESSION + FLOPS_PER_STENCIL) * m + sampling_flops(n_points, dimension);
+            (flops, at_queries.saturating_add(n_queries.saturating_mul(n_entries)))
         }
         Asked::Operator { n_surface_points } => {
             let n_all = n_points + n_surface_points;
@@ -216,6 +336,7 @@ mod tests {
                 Asked::Posterior { variances: false, covariance: false },
                 Asked::Posterior { variances: true, covariance: false },
                 Asked::Posterior { variances: true, covariance: true },
+                Asked::Moving,
                 Asked::Geometry { offsets: Offsets::Rescues },
                 Asked::Geometry { offsets: Offsets::Confirmations },
                 Asked::Geometry { offsets: Offsets::Everywhere },

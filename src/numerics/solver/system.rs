@@ -54,7 +54,7 @@ impl System {
     }
 
     /// Bytes held on the heap, those of the cloud included: the system may outlive whoever shares it.
-    pub(super) fn n_bytes(&self) -> usize {
+    pub(in crate::numerics) fn n_bytes(&self) -> usize {
         let noise = match &self.regularization {
             Regularization::Uniform(_) => 0,
             Regularization::PerPoint(variances) => vec_bytes(variances),

@@ -6,7 +6,7 @@ use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
 use super::degeneracy::Degeneracy;
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
-use super::serving::{Served, serve};
+use super::served::{Deviations, Served, ServedBy};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
@@ -48,7 +48,7 @@ impl Geometry {
         request: &GeometryRequest,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        let served = serve(surface, queries, request, observer)?;
+        let served = surface.serve(queries, request, observer)?;
         let (m, d) = (queries.n_points(), queries.dimension());
         let gradient_norms: Vec<f64> = (0..m).map(|query| norm(served.gradient(query))).collect();
         let mut normals = vec![0.0; m * d];
@@ -86,9 +86,14 @@ impl Geometry {
         &self.degenerate
     }
 
-    /// Whether a query is served by the offset model.
-    pub fn is_offset(&self, query: usize) -> bool {
-        self.served.verdict(query).is_offset
+    /// The model that serves a query.
+    pub fn served_by(&self, query: usize) -> ServedBy {
+        self.served.verdict(query).by
+    }
+
+    /// Standard deviations, if they were asked for.
+    pub fn deviations(&self) -> Option<&Deviations> {
+        self.served.deviations()
     }
 
     /// u at the queries, `[m]`: 1 on the surface at α = 0.

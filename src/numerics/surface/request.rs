@@ -16,6 +16,8 @@ pub enum SurfaceModel {
     Auto,
     Signature,
     Offset,
+    /// Local regressions.
+    Local,
 }
 
 /// What is asked of a geometry.
@@ -28,6 +30,8 @@ pub struct GeometryRequest {
     /// Queries at which the offset model may be asked where the signature function has no answer; beyond them the answer is
     /// null. With more queries than that it confirms no curvatures either.
     pub max_offsets: usize,
+    /// Whether standard deviations are asked for.
+    pub has_deviations: bool,
 }
 
 impl GeometryRequest {
@@ -37,5 +41,6 @@ impl GeometryRequest {
         model: SurfaceModel::Auto,
         checks_curvatures: true,
         max_offsets: usize::MAX,
+        has_deviations: false,
     };
 }

@@ -7,6 +7,7 @@ use crate::numerics::observer::Unobserved;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::System;
 use crate::numerics::solver::choose::choose;
+use crate::numerics::solver::kind::SolverKind;
 use crate::numerics::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;
@@ -19,7 +20,7 @@ fn key(alpha: f64) -> FitKey {
     let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let id = CloudId::of(&cloud, None);
-    FitKey::of_dense(Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
+    FitKey::of(SolverKind::Dense, Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
 }
 
 async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'static str> {

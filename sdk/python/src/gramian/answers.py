@@ -9,12 +9,16 @@ pickled and used by several threads. `repr` shows arrays by their shapes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from .describe import described
 from .fit import Fit, OperatorFit, fit_used, operator_fit_used
 from .rest.models import Degenerate, Diagnostics, SurfaceUsed
+from .sparse import csr_matrices
 from .tensors import Array, Members
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 class Answer:
@@ -114,18 +118,21 @@ class Posterior(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Normals(Answer):
-    """Unit normals of the surface at the queries.
+    """Unit normals of the surface at the queries. Deviations are None unless asked for.
 
     Attributes
     ----------
     normals
         `[m, d]`, of length 1, outward unless asked for otherwise.
     gradient_norms
-        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
     levels
         `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
     surfaces
         m entries. The function whose level surface was used.
+    normal_deviations
+        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
+        where none is known.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
@@ -138,6 +145,7 @@ class Normals(Answer):
     gradient_norms: Array
     levels: Array
     surfaces: tuple[SurfaceUsed, ...]
+    normal_deviations: Array | None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: Fit
@@ -151,6 +159,7 @@ class Normals(Answer):
             gradient_norms=members.array("gradient_norms"),
             levels=members.array("levels"),
             surfaces=_surfaces(members),
+            normal_deviations=members.optional("normal_deviations"),
             degenerate=members.degenerate,
             diagnostics=diagnostics,
             fit=fit_used(diagnostics, members.request),
@@ -160,6 +169,8 @@ class Normals(Answer):
 @dataclass(frozen=True, eq=False, repr=False)
 class Curvatures(Answer):
     """Curvatures of the surface at the queries: with outward normals, a sphere of radius r has +1/r everywhere.
+
+    Deviations are None unless asked for.
 
     Attributes
     ----------
@@ -175,11 +186,20 @@ class Curvatures(Answer):
     normals
         `[m, d]`, of length 1.
     gradient_norms
-        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`.
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
     levels
         `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
     surfaces
         m entries. The function whose level surface was used.
+    normal_deviations
+        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
+        where none is known.
+    principal_curvature_deviations
+        `[m, d − 1]`, 1/L. Standard deviations of the principal curvatures.
+    mean_curvature_deviations
+        `[m]`, 1/L.
+    gaussian_curvature_deviations
+        `[m]`, 1/L^(d − 1).
     degenerate
         The queries without curvatures, or with doubtful ones.
     diagnostics
@@ -196,6 +216,10 @@ class Curvatures(Answer):
     gradient_norms: Array
     levels: Array
     surfaces: tuple[SurfaceUsed, ...]
+    normal_deviations: Array | None
+    principal_curvature_deviations: Array | None
+    mean_curvature_deviations: Array | None
+    gaussian_curvature_deviations: Array | None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: Fit
@@ -214,6 +238,10 @@ class Curvatures(Answer):
             gradient_norms=members.array("gradient_norms"),
             levels=members.array("levels"),
             surfaces=_surfaces(members),
+            normal_deviations=members.optional("normal_deviations"),
+            principal_curvature_deviations=members.optional("principal_curvature_deviations", d - 1),
+            mean_curvature_deviations=members.optional("mean_curvature_deviations"),
+            gaussian_curvature_deviations=members.optional("gaussian_curvature_deviations"),
             degenerate=members.degenerate,
             diagnostics=diagnostics,
             fit=fit_used(diagnostics, members.request),
@@ -279,6 +307,36 @@ class SurfaceGradientMatrix(Answer):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradientSparseMatrix(Answer):
+    """The surface gradient as sparse matrices, one per coordinate.
+
+    Attributes
+    ----------
+    matrices
+        d of `scipy.sparse.csr_matrix`, `[m, n]`, 1/L, with their entries at the same places. `matrices[i] @ values` is
+        the component i at the queries. Rows of queries without a normal have no entries.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the surface: nothing is fitted to values.
+    fit
+        The surface: `**answer.fit` in a call repeats it.
+    """
+
+    matrices: list[csr_matrix]
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient/sparse-matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(csr_matrices(members), members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class LaplaceBeltrami(Answer):
     """The Laplace–Beltrami operator of the values at the queries: on the unit circle Δ cos θ = −cos θ.
 
@@ -334,6 +392,37 @@ class LaplaceBeltramiMatrix(Answer):
         diagnostics = members.diagnostics
         fit = operator_fit_used(diagnostics, members.request)
         return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltramiSparseMatrix(Answer):
+    """The Laplace–Beltrami operator as a sparse matrix: on the unit circle `matrix @ cos θ` is −cos θ.
+
+    Attributes
+    ----------
+    matrix
+        `scipy.sparse.csr_matrix`, `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric. Rows of
+        queries without a normal have no entries.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the surface: nothing is fitted to values.
+    fit
+        The surface: `**answer.fit` in a call repeats it.
+    """
+
+    matrix: csr_matrix
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami/sparse-matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        [matrix] = csr_matrices(members)
+        return cls(matrix, members.degenerate, diagnostics, fit)
 
 
 def _surfaces(members: Members) -> tuple[SurfaceUsed, ...]:

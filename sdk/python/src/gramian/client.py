@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from types import TracebackType
-from typing import Any, NoReturn, Self, SupportsFloat, TypeVar
+from typing import Any, NoReturn, Self, SupportsFloat, TypeVar, cast
 
 import httpx
 import numpy as np
@@ -19,7 +20,7 @@ from .fit import Whole
 from .keywords import suggest_names
 from .normalise import CLIENT, REQUEST, normalise
 from .problems import Problem
-from .registration import register
+from .registration import register, register_file
 from .rest.models import CloudList, KernelDescription, KernelList, Version
 from .tensors import Array, Format, available_format
 from .transport import Connection, RetryingClient
@@ -125,22 +126,31 @@ class Client:
         client = rest.Client(base_url=str(http.base_url), headers=key, timeout=http.timeout)
         return client.set_httpx_client(http)
 
-    def cloud(self, points: npt.ArrayLike, normals: npt.ArrayLike | None = None) -> Cloud:
+    def cloud(
+        self, points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.ArrayLike | None = None
+    ) -> Cloud:
         """Registers points, and remembers them in case the service forgets them.
 
         Parameters
         ----------
-        points : array_like, `[n, d]`
-            A row of coordinates for each, also on a line: `[[0.0], [0.5]]`.
+        points : array_like, `[n, d]`, or str, os.PathLike or bytes
+            A row of coordinates for each, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners write it: a path
+            that ends in `.ply`, or the bytes. Its vertices are the points, with their normals. It is the service that
+            reads it, so that the cloud has no `points` here.
         normals : array_like, `[n, d]`, optional
-            Of any length but 0, if known: their side is the outward one.
+            Of any length but 0, if known: their side is the outward one. Not beside a file, which has its own.
 
         Examples
         --------
         >>> gramian.Client().cloud([[0, 0], [1, 0], [0, 1]])
         Cloud(id='f70083fe…', n_points=3, dimension=2)
         """
-        own_points = _own_array("points", points)
+        file = _ply_file(points)
+        if file is not None:
+            if normals is not None:
+                raise TypeError("normals are given with points: a PLY file has its own, as nx, ny and nz")
+            return Cloud(self._connection, register_file(self._connection, file), file=file)
+        own_points = _own_array("points", cast("npt.ArrayLike", points))
         n, d = own_points.shape
         own_normals = None if normals is None else _own_array("normals", normals, {"n": n, "d": d})
         try:
@@ -188,6 +198,15 @@ class Client:
 
     def _get(self, path: str, kind: type[T], parameters: Mapping[str, Any] | None = None) -> T:
         return self._connection.read(kind.from_dict, self._connection.send("GET", path, params=parameters))
+
+
+def _ply_file(points: object) -> bytes | None:
+    """Returns the bytes of a PLY file, if that is what is given: by its path, or as they are."""
+    if isinstance(points, bytes):
+        return points if points.startswith(b"ply") else None
+    if isinstance(points, str | os.PathLike) and str(points).lower().endswith(".ply"):
+        return Path(points).read_bytes()
+    return None
 
 
 def _own_array(name: str, rows: npt.ArrayLike, sizes: Sizes | None = None) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+from typing import Any, cast
 
 import numpy as np
 
@@ -28,6 +29,8 @@ def in_words(value: object) -> str:
     """
     if isinstance(value, np.ndarray):
         return f"array{list(value.shape)}"
+    if hasattr(value, "tocsr"):  # of SciPy, which may not be there
+        return f"{type(value).__name__}{list(cast(Any, value).shape)}"
     if isinstance(value, Enum):
         return repr(value.value)
     if isinstance(value, tuple | list):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from .rest import models
 from .rest.models import (
     Diagnostics,
     DuplicatePolicy,
+    GeometryInclude,
     KernelDescription,
     KernelFamily,
     KernelUsed,
@@ -38,9 +39,10 @@ Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
 
 # Every enumeration of the service may also be given as a plain string; tests/test_types.py compares the two.
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
-Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense"]
+Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
-Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset"]
+Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
+Deviations: TypeAlias = GeometryInclude | Literal["deviations"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
 Quantity: TypeAlias = (
     PosteriorQuantity
@@ -211,7 +213,9 @@ class OperatorFit(Fit, total=False):
 def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
     """Returns the fit that an answer says was used, with what only the request says."""
     fit = Fit(kernel=diagnostics.kernel, solver=diagnostics.solver)
-    if isinstance(diagnostics.alpha, Unset):
+    if diagnostics.solver is SolverUsed.LOCAL:
+        del fit["kernel"]  # local regressions choose it, and alpha, by their likelihood: they take none
+    elif isinstance(diagnostics.alpha, Unset):
         fit["noise_variances"] = _own_copy(request.get("noise_variances"))
     else:
         fit["alpha"] = diagnostics.alpha
@@ -223,17 +227,27 @@ def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
 def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> OperatorFit:
     """Returns the same with the surface's fit."""
     fit, surface = fit_used(diagnostics, request), diagnostics.geometry
-    if isinstance(surface, Unset):
-        return cast(OperatorFit, fit)
+    if isinstance(surface, Unset):  # by stencils, which fit nothing to the values
+        surface = diagnostics
+        fit = Fit(solver=SolverChoice.LOCAL)
+        if "duplicates" in request:
+            fit["duplicates"] = DuplicatePolicy(request["duplicates"])
     asked = request.get("geometry", {})
     noise_variances = asked.get("noise_variances", request.get("noise_variances"))
+    cloud = None if surface.cloud_id == request["cloud"]["id"] else surface.cloud_id
+    choice = SurfaceChoice(asked["surface"]) if "surface" in asked else None
+    if surface.solver is SolverUsed.LOCAL:
+        # It takes no kernel, not even that of the values, which therefore was the service's choice, and will be again.
+        fit.pop("kernel", None)
+        fit.pop("alpha", None)
+        return OperatorFit(**fit, geometry=Geometry(cloud=cloud, solver=surface.solver, surface=choice))
     geometry = Geometry(
-        cloud=None if surface.cloud_id == diagnostics.cloud_id else surface.cloud_id,
+        cloud=cloud,
         kernel=surface.kernel,
         alpha=None if isinstance(surface.alpha, Unset) else surface.alpha,
         noise_variances=_own_copy(noise_variances) if isinstance(surface.alpha, Unset) else None,
         solver=surface.solver,
-        surface=SurfaceChoice(asked["surface"]) if "surface" in asked else None,
+        surface=choice,
     )
     return OperatorFit(**fit, geometry=geometry)
 

@@ -7,6 +7,7 @@
 | an array | lists, tuples, buffers, NumPy arrays of any real type and layout, and what has `__array__`: data frames |
 | a word | a string, or a member of an enumeration |
 | words | a word, or several |
+| a truth | `bool`, of Python or NumPy |
 | a kernel | a family, a mapping, `Kernel`, or as an answer or `Client.kernels()` says it: `diagnostics.kernel` |
 | a geometry | `Geometry`, a mapping, another `Cloud`, or as an answer says it: `diagnostics.geometry` |
 
@@ -26,6 +27,7 @@ from .arrays import Sizes, as_array
 from .rest.models import (
     Diagnostics,
     DuplicatePolicy,
+    GeometryInclude,
     KernelDescription,
     KernelFamily,
     OrientationChoice,
@@ -36,7 +38,7 @@ from .rest.models import (
 )
 from .rest.models import Geometry as GeneratedGeometry
 from .rest.types import Unset
-from .scalars import as_number, as_whole, as_word, as_words, nearest, unwrapped
+from .scalars import as_number, as_truth, as_whole, as_word, as_words, nearest, unwrapped
 
 Rule: TypeAlias = Callable[[str, object, Sizes], object]
 """From a name, what was given under it, and the lengths that are known, to what is sent."""
@@ -52,7 +54,7 @@ def normalise(
     fields
         What was given, by name.
     rules
-        A rule for each field that there is: `REQUEST`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `KERNEL`, `GEOMETRY`, `CLIENT`.
     sizes
         The lengths of the axes of arrays, by name, as far as they are known: n points, d coordinates.
     path
@@ -116,6 +118,14 @@ def words(*words: str) -> Rule:
     return lambda name, value, _: as_words(name, value, known)
 
 
+def with_deviations(include: object, deviations: object) -> object:
+    """Returns what `include` says, with `"deviations"` where they are asked for by their own name."""
+    if _is_absent(deviations) or not as_truth("deviations", deviations):
+        return include
+    wanted = [] if _is_absent(include) else as_words("include", include, GeometryInclude)
+    return list(dict.fromkeys([*wanted, GeometryInclude.DEVIATIONS.value]))
+
+
 def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """The rule for kernels."""
     value = unwrapped(name, value)
@@ -134,7 +144,9 @@ def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
 def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """The rule for the surface of an operator."""
     if isinstance(value, Diagnostics):
-        value = {"cloud": value, "kernel": value.kernel, "alpha": value.alpha, "solver": value.solver}
+        is_local = value.solver is SolverUsed.LOCAL  # which takes neither, but chooses them by its likelihood
+        fit = {} if is_local else {"kernel": value.kernel, "alpha": value.alpha}
+        value = {"cloud": value, **fit, "solver": value.solver}
     elif isinstance(value, GeneratedGeometry):
         # Its UNSET is what nobody has said, not what diagnostics lack.
         value = {field: None if _is_absent(said := getattr(value, field)) else said for field in GEOMETRY}
@@ -204,6 +216,9 @@ REQUEST: Mapping[str, Rule] = {
     "orientation": word(*OrientationChoice),
     "geometry": geometry,
 }
+
+GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
+"""Those of normals and curvatures."""
 
 CLIENT: Mapping[str, Rule] = {
     "timeout": duration,

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import numpy.typing as npt
 
-from .answers import LaplaceBeltrami, LaplaceBeltramiMatrix, SurfaceGradient, SurfaceGradientMatrix
+from .answers import (
+    LaplaceBeltrami,
+    LaplaceBeltramiMatrix,
+    LaplaceBeltramiSparseMatrix,
+    SurfaceGradient,
+    SurfaceGradientMatrix,
+    SurfaceGradientSparseMatrix,
+)
 from .fit import Duplicates, GeometryLike, KernelLike, Number, Solver
 from .keywords import suggest_names
 from .registration import RegisteredCloud
+from .sparse import require_scipy
 
 
 @suggest_names
@@ -45,7 +53,8 @@ class OperatorsOnCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, `"local"` for weights of the points near each query, which take no `kernel` or `alpha` and
+            any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
@@ -133,6 +142,75 @@ class OperatorsOnCloud(RegisteredCloud):
             duplicates=duplicates,
         )
 
+    def surface_gradient_sparse_matrix(
+        self,
+        queries: npt.ArrayLike | None = None,
+        *,
+        geometry: GeometryLike | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> SurfaceGradientSparseMatrix:
+        """Assembles sparse matrices, one per coordinate, that turn values at the points into surface gradients.
+
+        From the points near each query, with no kernel for the values: `kernel` and `alpha` are those of the surface.
+        Takes any number of points, and SciPy.
+
+        Parameters
+        ----------
+        queries : array_like, `[m, d]`, optional
+            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+        geometry : Geometry, dict, Cloud or Diagnostics, optional
+            The surface, where its points are those of another cloud.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, instead of `alpha`.
+        solver : str, optional
+            How the surface is fitted: `"dense"`, `"local"` for regressions of the points near each query, or `"auto"`
+            to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        SurfaceGradientSparseMatrix
+            `matrices`, d of `scipy.sparse.csr_matrix` with the shape `[m, n]`, whose rows have no entries where there
+            is no gradient; `degenerate` says why.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If SciPy is not installed.
+
+        Examples
+        --------
+        >>> angles = np.arange(100) * np.pi / 50
+        >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> answer = circle.surface_gradient_sparse_matrix([[0.8, 0.6]], solver="local")
+        >>> [matrix.shape for matrix in answer.matrices]
+        [(1, 100), (1, 100)]
+        >>> np.array([matrix @ np.cos(angles) for matrix in answer.matrices]).round(2).T
+        array([[ 0.36, -0.48]])
+        """
+        require_scipy()
+        return self._compute(
+            SurfaceGradientSparseMatrix.read,
+            "/v1/surface-gradient/sparse-matrix",
+            queries=queries,
+            geometry=geometry,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )
+
     def laplace_beltrami(
         self,
         values: npt.ArrayLike,
@@ -164,7 +242,8 @@ class OperatorsOnCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, `"local"` for weights of the points near each query, which take no `kernel` or `alpha` and
+            any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
@@ -243,6 +322,73 @@ class OperatorsOnCloud(RegisteredCloud):
         return self._compute(
             LaplaceBeltramiMatrix.read,
             "/v1/laplace-beltrami/matrix",
+            queries=queries,
+            geometry=geometry,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+        )
+
+    def laplace_beltrami_sparse_matrix(
+        self,
+        queries: npt.ArrayLike | None = None,
+        *,
+        geometry: GeometryLike | None = None,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        noise_variances: npt.ArrayLike | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+    ) -> LaplaceBeltramiSparseMatrix:
+        """Assembles the sparse matrix that turns values at the points into Δu at the queries.
+
+        From the points near each query, with no kernel for the values: `kernel` and `alpha` are those of the surface.
+        Takes any number of points, and SciPy.
+
+        Parameters
+        ----------
+        queries : array_like, `[m, d]`, optional
+            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+        geometry : Geometry, dict, Cloud or Diagnostics, optional
+            The surface, where its points are those of another cloud.
+        kernel : str, dict or Kernel, optional
+            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
+            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+        alpha : float, optional
+            Added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
+        noise_variances : array_like, `[n]`, optional
+            The variance of the noise at each point, instead of `alpha`.
+        solver : str, optional
+            How the surface is fitted: `"dense"`, `"local"` for regressions of the points near each query, or `"auto"`
+            to let the service choose, as it does if absent.
+        duplicates : str, optional
+            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+
+        Returns
+        -------
+        LaplaceBeltramiSparseMatrix
+            `matrix`, a `scipy.sparse.csr_matrix` with the shape `[m, n]`, whose rows have no entries where there is no
+            value; `degenerate` says why.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If SciPy is not installed.
+
+        Examples
+        --------
+        >>> angles = np.arange(100) * np.pi / 50
+        >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> answer = circle.laplace_beltrami_sparse_matrix(solver="local")
+        >>> answer.matrix.shape, (answer.matrix @ np.cos(angles)).round(2)[0]
+        ((100, 100), np.float64(-1.0))
+        """
+        require_scipy()
+        return self._compute(
+            LaplaceBeltramiSparseMatrix.read,
+            "/v1/laplace-beltrami/sparse-matrix",
             queries=queries,
             geometry=geometry,
             kernel=kernel,

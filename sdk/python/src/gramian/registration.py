@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NoReturn, TypeVar
 
-from .normalise import REQUEST, normalise
+from .normalise import REQUEST, Rule, normalise
 from .problems import UnknownCloud
 from .rest import models
-from .tensors import JSON, Array, Members
+from .tensors import JSON, PLY, Array, Members
 from .transport import Connection
 
 T = TypeVar("T")
@@ -23,12 +23,14 @@ class RegisteredCloud:
         description: models.Cloud,
         points: Array | None = None,
         normals: Array | None = None,
+        file: bytes | None = None,
     ) -> None:
         """Takes what the service said of the cloud; `Client.cloud` and `Client.clouds` make clouds."""
         self._connection = connection
         self.description = description
         self._points = points
         self._normals = normals
+        self._file = file
 
     def __repr__(self) -> str:
         return f"Cloud(id='{self.id[:8]}…', n_points={self.n_points}, dimension={self.dimension})"
@@ -53,7 +55,7 @@ class RegisteredCloud:
 
     @property
     def points(self) -> Array | None:
-        """`[n, d]`, read-only; None if the cloud was not made from points."""
+        """`[n, d]`, read-only; None if the cloud was not made from points, but from a file or a list of clouds."""
         return self._points
 
     @property
@@ -68,14 +70,16 @@ class RegisteredCloud:
         except UnknownCloud:
             return
 
-    def _compute(self, read: Callable[[Members], T], path: str, **fields: object) -> T:
+    def _compute(
+        self, read: Callable[[Members], T], path: str, rules: Mapping[str, Rule] = REQUEST, **fields: object
+    ) -> T:
         """Asks for something about this cloud, and perhaps the surface of another one.
 
-        Where the service has forgotten a cloud, both are posted again if their points are at hand, and the request is
-        repeated once: the ids in it are still right.
+        Where the service has forgotten a cloud, both are posted again if their points or files are at hand, and the
+        request is repeated once: the ids in it are still right.
         """
         sizes = {"n": self.n_points, "d": self.dimension}
-        request = {"cloud": {"id": self.id}, **normalise(fields, REQUEST, sizes)}
+        request = {"cloud": {"id": self.id}, **normalise(fields, rules, sizes)}
         try:
             return self._connection.compute(path, request, read)
         except UnknownCloud:
@@ -84,9 +88,10 @@ class RegisteredCloud:
         return self._connection.compute(path, request, read)
 
     def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
-        """Posts those clouds whose points are at hand, and says whether there was one."""
-        kept = [(cloud._points, cloud._normals) for cloud in clouds if cloud is not None]
-        posted = [register(self._connection, points, normals) for points, normals in kept if points is not None]
+        """Posts those clouds whose points or file are at hand, and says whether there was one."""
+        kept = [(cloud._points, cloud._normals, cloud._file) for cloud in clouds if cloud is not None]
+        posted = [register(self._connection, points, normals) for points, normals, _ in kept if points is not None]
+        posted += [register_file(self._connection, file) for _, _, file in kept if file is not None]
         return bool(posted)
 
 
@@ -100,3 +105,10 @@ def register(connection: Connection, points: Array, normals: Array | None) -> mo
     """Posts points, and says what the service knows of them."""
     fields = {"points": points} if normals is None else {"points": points, "normals": normals}
     return connection.read(models.Cloud.from_dict, connection.post("/v1/clouds", fields, accept=JSON))
+
+
+def register_file(connection: Connection, file: bytes) -> models.Cloud:
+    """Posts a PLY file, and says what the service knows of its points."""
+    headers = {"Content-Type": PLY, "Accept": JSON}
+    response = connection.send("POST", "/v1/clouds", content=file, headers=headers)
+    return connection.read(models.Cloud.from_dict, response)

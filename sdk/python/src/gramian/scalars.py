@@ -57,6 +57,20 @@ def as_whole(name: str, value: object) -> int:
     return int(number)
 
 
+def as_truth(name: str, value: object) -> bool:
+    """Returns a truth value; numbers are none.
+
+    Raises
+    ------
+    TypeError
+        If it is something else.
+    """
+    value = unwrapped(name, value)
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} is to be True or False, not {_kind(value)}")
+    return bool(value)
+
+
 def as_word(name: str, value: object, words: Iterable[str]) -> str:
     """Returns one of these words, given as such or as member of an enumeration.
 

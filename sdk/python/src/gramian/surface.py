@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy.typing as npt
 
 from .answers import Curvatures, Normals
-from .fit import Duplicates, KernelLike, Number, Orientation, Solver, Surface
+from .fit import Deviations, Duplicates, KernelLike, Number, Orientation, Solver, Surface
 from .keywords import suggest_names
+from .normalise import GEOMETRIC, with_deviations
 from .registration import RegisteredCloud
 
 
@@ -20,6 +23,8 @@ class SurfaceOfCloud(RegisteredCloud):
         *,
         surface: Surface | None = None,
         orientation: Orientation | None = None,
+        include: Deviations | Iterable[Deviations] | None = None,
+        deviations: bool | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
         noise_variances: npt.ArrayLike | None = None,
@@ -33,9 +38,14 @@ class SurfaceOfCloud(RegisteredCloud):
         queries : array_like, `[m, d]`, optional
             Where normals are wanted, a row of coordinates each; the points if absent.
         surface : str, optional
-            `"signature"` or `"offset"` to forbid the other function; `"auto"` if absent.
+            `"signature"`, `"offset"` or `"local"` to forbid the other functions; `"auto"` if absent.
         orientation : str, optional
             `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+        include : str or several, optional
+            What is wanted beside: `"deviations"`; nothing if absent.
+        deviations : bool, optional
+            Whether standard deviations are wanted, as by `include="deviations"`; by local regressions, unless `kernel`,
+            `alpha`, `surface` or `solver` say otherwise.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
             `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
@@ -45,14 +55,15 @@ class SurfaceOfCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, `"local"` for regressions of the points near each query, which take no `kernel` or `alpha` and
+            any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
         Returns
         -------
         Normals
-            `normals` at the queries, NaN where there is none; `degenerate` says why.
+            `normals` at the queries, NaN where there is none; `degenerate` says why. `normal_deviations` if asked for.
 
         Examples
         --------
@@ -68,9 +79,11 @@ class SurfaceOfCloud(RegisteredCloud):
         return self._compute(
             Normals.read,
             "/v1/normals",
+            GEOMETRIC,
             queries=queries,
             surface=surface,
             orientation=orientation,
+            include=with_deviations(include, deviations),
             kernel=kernel,
             alpha=alpha,
             noise_variances=noise_variances,
@@ -84,6 +97,8 @@ class SurfaceOfCloud(RegisteredCloud):
         *,
         surface: Surface | None = None,
         orientation: Orientation | None = None,
+        include: Deviations | Iterable[Deviations] | None = None,
+        deviations: bool | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
         noise_variances: npt.ArrayLike | None = None,
@@ -99,9 +114,14 @@ class SurfaceOfCloud(RegisteredCloud):
         queries : array_like, `[m, d]`, optional
             Where curvatures are wanted, a row of coordinates each; the points if absent.
         surface : str, optional
-            `"signature"` or `"offset"` to forbid the other function; `"auto"` if absent.
+            `"signature"`, `"offset"` or `"local"` to forbid the other functions; `"auto"` if absent.
         orientation : str, optional
             `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+        include : str or several, optional
+            What is wanted beside: `"deviations"`; nothing if absent.
+        deviations : bool, optional
+            Whether standard deviations are wanted, as by `include="deviations"`; by local regressions, unless `kernel`,
+            `alpha`, `surface` or `solver` say otherwise.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
             `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
@@ -111,7 +131,8 @@ class SurfaceOfCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, `"local"` for regressions of the points near each query, which take no `kernel` or `alpha` and
+            any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
@@ -119,7 +140,7 @@ class SurfaceOfCloud(RegisteredCloud):
         -------
         Curvatures
             `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN where there
-            are none; `degenerate` says why.
+            are none; `degenerate` says why. Standard deviations of each if asked for.
 
         Examples
         --------
@@ -128,13 +149,23 @@ class SurfaceOfCloud(RegisteredCloud):
         >>> circle.curvatures([[5, 0], [0, 5]]).principal_curvatures.round(2)
         array([[0.2],
                [0.2]])
+
+        With standard deviations, of noise of 0.01 in the points:
+
+        >>> noise = 0.01 * np.random.default_rng(0).normal(size=(64, 1))
+        >>> noisy = gramian.Client().cloud((5 + noise) * np.column_stack([np.cos(angles), np.sin(angles)]))
+        >>> answer = noisy.curvatures([[5, 0]], deviations=True)
+        >>> answer.mean_curvatures.round(2), answer.mean_curvature_deviations.round(2)
+        (array([0.2]), array([0.01]))
         """
         return self._compute(
             Curvatures.read,
             "/v1/curvatures",
+            GEOMETRIC,
             queries=queries,
             surface=surface,
             orientation=orientation,
+            include=with_deviations(include, deviations),
             kernel=kernel,
             alpha=alpha,
             noise_variances=noise_variances,

@@ -2,7 +2,7 @@
 
 In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`), and all
 other fields are JSON text in the metadata entry `request`; an answer has the entry `response`, and NaN where JSON has
-null. Both ways numbers are float64 and keep every bit.
+null. Both ways numbers are float64 and keep every bit; the integers of sparse matrices are int64.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import httpx
 import numpy as np
@@ -27,11 +27,20 @@ except ModuleNotFoundError:  # the extra gramian[safetensors] is not installed
 Array: TypeAlias = npt.NDArray[np.float64]
 """Numbers in float64, little-endian, row major."""
 
+Integers: TypeAlias = npt.NDArray[np.int64]
+"""Whole numbers, those of sparse matrices."""
+
 Format: TypeAlias = Literal["safetensors", "json"]
 """How arrays travel."""
 
+T = TypeVar("T", bound=np.generic)
+
+DTYPES = {"F64": "<f8", "I64": "<i8"}
+"""What answers have in tensors: numbers, and where those of sparse matrices stand."""
+
 JSON = "application/json"
 SAFETENSORS = "application/x-safetensors"
+PLY = "model/ply"
 
 
 def available_format() -> Format:
@@ -82,7 +91,7 @@ def _split(request: Mapping[str, object], path: str = "") -> tuple[dict[str, Arr
 class Members:
     """The members of an answer, however it was written."""
 
-    tensors: Mapping[str, Array]
+    tensors: Mapping[str, npt.NDArray[Any]]
     fields: Mapping[str, Any]
     request: Mapping[str, Any]
     """What was asked."""
@@ -109,6 +118,12 @@ class Members:
             return self.tensors[name]
         return _frozen(np.stack([_filled(rows, entry) for rows in self.fields[name]]))
 
+    def integers(self, name: str) -> Integers:
+        """Returns a list of whole numbers."""
+        if name in self.tensors:
+            return self.tensors[name]
+        return _frozen(np.array(self.fields[name], dtype=np.int64))
+
     def optional(self, name: str, *entry: int) -> Array | None:
         """Returns an array, or None if the answer has no such member."""
         return self.array(name, *entry) if name in self.tensors or name in self.fields else None
@@ -125,12 +140,12 @@ def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
     return Members({name: _view(body, start, tensor) for name, tensor in header.items()}, fields, request)
 
 
-def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> Array:
+def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> npt.NDArray[Any]:
     shape: Sequence[int] = tensor["shape"]
-    if tensor["dtype"] != "F64":
-        raise TypeError(f"the answer has a tensor of dtype {tensor['dtype']}, not F64")
+    if tensor["dtype"] not in DTYPES:
+        raise TypeError(f"the answer has a tensor of dtype {tensor['dtype']}, none of {', '.join(DTYPES)}")
     offset: int = tensor["data_offsets"][0]
-    numbers = np.frombuffer(body, dtype="<f8", count=int(np.prod(shape)), offset=start + offset)
+    numbers = np.frombuffer(body, DTYPES[tensor["dtype"]], count=int(np.prod(shape)), offset=start + offset)
     return numbers.reshape(shape)
 
 
@@ -143,7 +158,7 @@ def _filled(rows: Sequence[Any], entry: tuple[int, ...]) -> Array:
     return array
 
 
-def _frozen(array: Array) -> Array:
+def _frozen(array: npt.NDArray[T]) -> npt.NDArray[T]:
     """Makes an array as read-only as the views of an answer's bytes are."""
     array.flags.writeable = False
     return array

@@ -108,9 +108,16 @@ pub(super) struct Excess {
 /// 413 for a cloud of too many points.
 pub fn too_many_points(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "points", limit, Some(required)).with_remedy(
-        "thin the cloud, or register fewer points: the dense solver, the only one there is, takes 4 n² bytes and n³/3 flops \
-         (operators raise the limit by GRAMIAN_MAX_POINTS)",
+        "thin the cloud, or cut it into parts that overlap (operators raise the limit by GRAMIAN_MAX_POINTS)",
     )
+}
+
+/// 413 for a cloud of too many points to be factorized at once.
+pub fn too_many_dense_points(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "points in a dense factorization", limit, Some(required))
+        .with_remedy(
+            "it takes 4 n² bytes and n³/3 flops (operators raise the limit by GRAMIAN_MAX_DENSE_POINTS)",
+        )
 }
 
 /// 413 for too many queries.

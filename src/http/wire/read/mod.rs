@@ -1,4 +1,4 @@
-//! Bodies in: JSON, safetensors and npy, read by the same types within the same limits.
+//! Bodies in: JSON, safetensors, npy and PLY, read by the same types within the same limits.
 
 pub mod body;
 pub mod limits;
@@ -8,4 +8,5 @@ pub mod points;
 
 mod guarded;
 mod plain_json;
+mod ply;
 mod tensors;

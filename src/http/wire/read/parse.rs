@@ -166,6 +166,23 @@ mod tests {
     }
 
     #[test]
+    fn room_for_points_is_made_once_and_never_for_more_than_there_can_be() {
+        let room = |text: &str| {
+            let request: Request = parse_json(text.as_bytes(), &ParseContext::UNLIMITED).unwrap();
+            (request.points.coordinates.len(), request.points.coordinates.capacity())
+        };
+        for n in [2, 7, 1000] {
+            let rows = vec!["[0.25, -1e3 ,\n7]"; n].join(" ,");
+            assert_eq!(room(&format!(r#"{{"alpha": 1, "points": [ {rows} ] }}"#)), (3 * n, 3 * n));
+        }
+        // Rows of other lengths than the first one, which is refused later on.
+        let (_, capacity) = room(&format!(r#"{{"points": [[1, 2, 3]{}]}}"#, ",[]".repeat(1000)));
+        assert!(capacity <= 1006, "{capacity}");
+        let (_, capacity) = room(&format!(r#"{{"points": [[]{}]}}"#, ",[1]".repeat(1000)));
+        assert!(capacity <= 1006, "{capacity}");
+    }
+
+    #[test]
     fn lists_may_be_as_long_as_the_limits_and_no_longer() {
         let context =
             ParseContext { max_points: 3, max_queries: 2, max_dimension: 2, ..ParseContext::UNLIMITED };

@@ -195,6 +195,27 @@ impl<'de> SeqAccess<'de> for Entries<'_, 'de> {
         }
         seed.deserialize(&mut *self.json).map(Some)
     }
+
+    /// A guess, and never more numbers than the text has room for.
+    fn size_hint(&self) -> Option<usize> {
+        if self.is_first { expected_entries(self.json.rest) } else { None }
+    }
+}
+
+/// Entries of a list that begins here, if it is one of numbers, or of rows of numbers that are as long as the first one.
+fn expected_entries(text: &[u8]) -> Option<usize> {
+    let text = text.trim_ascii_start();
+    // A number takes a digit and a comma.
+    let n_numbers = |list: &[u8]| 1 + list.iter().filter(|&&byte| byte == b',').count().min(list.len() / 2);
+    let end_of_row = text.iter().position(|&byte| byte == b']')?;
+    if text.first() != Some(&b'[') {
+        return Some(n_numbers(&text[..end_of_row]));
+    }
+    let mut end = end_of_row;
+    while text[end + 1..].trim_ascii_start().first() != Some(&b']') {
+        end += 1 + text[end + 1..].iter().position(|&byte| byte == b']')?;
+    }
+    Some(n_numbers(&text[..end]).div_ceil(n_numbers(&text[..end_of_row])))
 }
 
 impl<'de> MapAccess<'de> for Entries<'_, 'de> {

@@ -29,6 +29,9 @@ impl<'de> Visitor<'de> for PointsVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Points, A::Error> {
         let mut points = Points::default();
+        // Room is made at once where the length is known, so that a million points are not copied while their list grows. Every
+        // hint is bounded by the bytes that are there.
+        let n_more = rows.size_hint().unwrap_or(0).saturating_sub(1);
         loop {
             let start = points.coordinates.len();
             if rows.next_element_seed(Row(&mut points.coordinates))?.is_none() {
@@ -37,6 +40,7 @@ impl<'de> Visitor<'de> for PointsVisitor {
             let length = points.coordinates.len() - start;
             if points.n_rows == 0 {
                 points.dimension = length;
+                points.coordinates.reserve_exact(n_more.saturating_mul(length));
             }
             if points.ragged.is_some() || length != points.dimension {
                 points.ragged = points.ragged.or(Some((points.n_rows, length)));

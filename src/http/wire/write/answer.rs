@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::array::Array;
 use super::chunk::{Chunk, ChunkBuilder};
+use super::integers::Integers;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::wire::negotiation::Format;
@@ -99,6 +100,7 @@ pub struct Parts(Vec<(&'static str, Part)>);
 
 enum Part {
     Numbers(Array),
+    Integers(Integers),
     /// JSON text.
     Json(Vec<u8>),
 }
@@ -115,6 +117,10 @@ impl Parts {
         Ok(())
     }
 
+    pub(super) fn add_integers(&mut self, name: &'static str, numbers: Integers) {
+        self.0.push((name, Part::Integers(numbers)));
+    }
+
     /// The body in pieces.
     ///
     /// # Errors
@@ -124,6 +130,7 @@ impl Parts {
             Format::Json => Ok(self.into_json().finish()),
             Format::Safetensors => self.write_safetensors().ok_or_else(Problem::internal),
             Format::Npy => self.write_npy().ok_or_else(Problem::internal),
+            Format::Ply => Err(Problem::internal()),
         }
     }
 
@@ -136,6 +143,10 @@ impl Parts {
             separator = ',';
             match part {
                 Part::Numbers(array) => chunks.numbers(Arc::new(array)),
+                // Plain integers: the encoder has no objection.
+                Part::Integers(numbers) => {
+                    chunks.text(&serde_json::to_vec(&numbers).unwrap_or_else(|_| b"[]".to_vec()));
+                }
                 Part::Json(text) => chunks.text(&text),
             }
         }
@@ -143,21 +154,23 @@ impl Parts {
         chunks
     }
 
-    /// One float64 tensor per array; all other members are one JSON object in the metadata entry `response`.
+    /// One tensor per array, float64 or int64; all other members are one JSON object in the metadata entry `response`.
     fn write_safetensors(self) -> Option<Vec<Chunk>> {
         let (arrays, others): (Vec<_>, Vec<_>) =
-            self.0.into_iter().partition(|(_, part)| matches!(part, Part::Numbers(_)));
+            self.0.into_iter().partition(|(_, part)| !matches!(part, Part::Json(_)));
         let mut response = Vec::new();
         Parts(others).into_json().finish().iter().for_each(|chunk| chunk.write(&mut response));
         let metadata = HashMap::from([("response".to_owned(), String::from_utf8(response).ok()?)]);
         let (mut tensors, mut bodies, mut start) = (Vec::new(), Vec::new(), 0);
         for (name, part) in arrays {
-            let Part::Numbers(array) = part else { continue };
-            let shape = array.shape().to_vec();
-            let data = array.into_bytes();
+            let (shape, dtype, data) = match part {
+                Part::Numbers(array) => (array.shape().to_vec(), Dtype::F64, array.into_bytes()),
+                Part::Integers(numbers) => (vec![numbers.len()], Dtype::I64, numbers.into_bytes()),
+                Part::Json(_) => continue,
+            };
             let data_offsets = (start, start + data.len());
             start = data_offsets.1;
-            tensors.push((name.to_owned(), TensorInfo { dtype: Dtype::F64, shape, data_offsets }));
+            tensors.push((name.to_owned(), TensorInfo { dtype, shape, data_offsets }));
             bodies.push(data);
         }
         let mut header = serde_json::to_vec(&Metadata::new(Some(metadata), tensors).ok()?).ok()?;
@@ -171,7 +184,7 @@ impl Parts {
     fn write_npy(self) -> Option<Vec<Chunk>> {
         let mut arrays = self.0.into_iter().filter_map(|(_, part)| match part {
             Part::Numbers(array) => Some(array),
-            Part::Json(_) => None,
+            Part::Integers(_) | Part::Json(_) => None,
         });
         let array = arrays.next()?;
         let shape: String = array.shape().iter().map(|length| format!("{length}, ")).collect();

@@ -217,6 +217,17 @@ pub fn finite<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> 
     if x.is_finite() { serializer.serialize_f64(*x) } else { Err(S::Error::custom("a number is not finite")) }
 }
 
+/// [`finite`] of what may be absent.
+///
+/// # Errors
+/// Those of [`finite`].
+pub fn finite_if_any<S: Serializer>(x: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    match x {
+        Some(x) => finite(x, serializer),
+        None => serializer.serialize_none(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -4,3 +4,4 @@ pub mod answer;
 pub mod array;
 pub mod chunk;
 pub mod encode;
+pub mod integers;

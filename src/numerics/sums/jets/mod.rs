@@ -38,12 +38,16 @@ pub enum JetOrder {
 
 /// One query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two magnitudes.
 #[derive(Debug, Clone, Copy)]
-struct Layout {
+pub(crate) struct Layout {
     order: JetOrder,
     dimension: usize,
 }
 
 impl Layout {
+    pub(crate) fn new(order: JetOrder, dimension: usize) -> Self {
+        Self { order, dimension }
+    }
+
     fn gradient(self) -> usize {
         1
     }
@@ -56,7 +60,7 @@ impl Layout {
         self.hessian() + self.dimension * (self.dimension + 1) / 2
     }
 
-    fn width(self) -> usize {
+    pub(crate) fn width(self) -> usize {
         match self.order {
             JetOrder::Value => 1,
             JetOrder::Gradient => self.hessian(),
@@ -74,7 +78,7 @@ impl Layout {
     /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
     ///
     /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
-    fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
+    pub(crate) fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
         let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
         let trace = 2.0 * variance * sums[self.magnitudes()] * inverse * inverse;
         let (mut row, mut column) = (0, 0);
@@ -174,6 +178,11 @@ impl Jets {
         let expansion = Expansion { nodes, kernel, weights: &blocked(weights) };
         let packed = centres::jets(expansion, cloud, layout, observer)?;
         Ok(Self { packed, layout })
+    }
+
+    /// Of numbers that were summed elsewhere, `[m, width]`.
+    pub(crate) fn of(layout: Layout, packed: Vec<f64>) -> Self {
+        Self { packed, layout }
     }
 
     pub fn n_queries(&self) -> usize {

@@ -23,7 +23,7 @@ impl<'de, 'g, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'g, A, IS_BARE> {
     pub(super) fn new(inner: A, guard: &'g Guard<'g>, list: List) -> Self {
         let max_length = guard.context.max_entries(list);
         // A row is granted its first coordinates with itself. Of a tensor it knows its length, and may be too long from the start.
-        let fits = inner.size_hint().is_none_or(|length| length <= max_length);
+        let fits = known_length(&inner, guard).is_none_or(|length| length <= max_length);
         let is_granted = list == List::Coordinates && fits;
         let n_granted = if is_granted { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
         Self { inner, guard, list, max_length, n_granted, n_left: n_granted }
@@ -65,8 +65,9 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> SeqAccess<'de> for Entries<'_,
         }
     }
 
+    /// Of no more entries than will be kept: room is made for as many.
     fn size_hint(&self) -> Option<usize> {
-        self.inner.size_hint()
+        self.inner.size_hint().map(|length| length.min(self.max_length))
     }
 }
 
@@ -75,7 +76,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
         self.guard.tick()?;
         let n_free = self.max_length - self.n_granted;
         // Tensors know their length beforehand.
-        if self.inner.size_hint().is_some_and(|n_rest| n_rest > n_free) {
+        if known_length(&self.inner, self.guard).is_some_and(|n_rest| n_rest > n_free) {
             return Ok(false);
         }
         self.n_left = n_free.min(ENTRIES_PER_GRANT);
@@ -87,7 +88,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
     #[cold]
     fn end<T>(&mut self, width: Option<usize>) -> Result<Option<T>, A::Error> {
         let mut length = self.length();
-        match self.inner.size_hint() {
+        match known_length(&self.inner, self.guard) {
             Some(n_rest) => length += n_rest,
             None => loop {
                 if length.is_multiple_of(ENTRIES_PER_GRANT) {
@@ -110,6 +111,11 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
         }
         Err(self.guard.stopped(Stop::TooLarge(Excess { list: self.list, length, width })))
     }
+}
+
+/// Entries that are left, of a list whose length is known for certain: that of a tensor. Plain JSON has but a guess.
+fn known_length<'de, A: SeqAccess<'de>>(entries: &A, guard: &Guard<'_>) -> Option<usize> {
+    entries.size_hint().filter(|_| guard.asks_for_any)
 }
 
 /// A number, or a row of numbers, that is not kept.

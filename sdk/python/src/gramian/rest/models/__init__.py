@@ -14,6 +14,7 @@ from .duplicate_policy import DuplicatePolicy
 from .factorization_used import FactorizationUsed
 from .field_error import FieldError
 from .geometry import Geometry
+from .geometry_include import GeometryInclude
 from .health import Health
 from .interpolation_request import InterpolationRequest
 from .interpolation_response import InterpolationResponse
@@ -27,6 +28,8 @@ from .laplace_beltrami_matrix_request import LaplaceBeltramiMatrixRequest
 from .laplace_beltrami_matrix_response import LaplaceBeltramiMatrixResponse
 from .laplace_beltrami_request import LaplaceBeltramiRequest
 from .laplace_beltrami_response import LaplaceBeltramiResponse
+from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
+from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
 from .matrix_format import MatrixFormat
 from .normals_request import NormalsRequest
 from .normals_response import NormalsResponse
@@ -44,6 +47,8 @@ from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
 from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
 from .surface_gradient_request import SurfaceGradientRequest
 from .surface_gradient_response import SurfaceGradientResponse
+from .surface_gradient_sparse_matrix_request import SurfaceGradientSparseMatrixRequest
+from .surface_gradient_sparse_matrix_response import SurfaceGradientSparseMatrixResponse
 from .surface_used import SurfaceUsed
 from .version import Version
 from .warning import Warning_
@@ -64,6 +69,7 @@ __all__ = (
     "FactorizationUsed",
     "FieldError",
     "Geometry",
+    "GeometryInclude",
     "Health",
     "InterpolationRequest",
     "InterpolationResponse",
@@ -77,6 +83,8 @@ __all__ = (
     "LaplaceBeltramiMatrixResponse",
     "LaplaceBeltramiRequest",
     "LaplaceBeltramiResponse",
+    "LaplaceBeltramiSparseMatrixRequest",
+    "LaplaceBeltramiSparseMatrixResponse",
     "MatrixFormat",
     "NormalsRequest",
     "NormalsResponse",
@@ -94,6 +102,8 @@ __all__ = (
     "SurfaceGradientMatrixResponse",
     "SurfaceGradientRequest",
     "SurfaceGradientResponse",
+    "SurfaceGradientSparseMatrixRequest",
+    "SurfaceGradientSparseMatrixResponse",
     "SurfaceUsed",
     "Version",
     "WarningCode",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
+from ..models.geometry_include import GeometryInclude
 from ..models.orientation_choice import OrientationChoice
 from ..models.solver_choice import SolverChoice
 from ..models.surface_choice import SurfaceChoice
@@ -38,6 +39,7 @@ class CurvaturesRequest:
         queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.
         surface (SurfaceChoice | Unset): Which function's level surface is meant.
         orientation (OrientationChoice | Unset): Which way normals point.
+        include (list[GeometryInclude] | Unset): What is wanted beside what every answer has.
     """
 
     cloud: CloudRef
@@ -49,6 +51,7 @@ class CurvaturesRequest:
     queries: list[list[float]] | Unset = UNSET
     surface: SurfaceChoice | Unset = UNSET
     orientation: OrientationChoice | Unset = UNSET
+    include: list[GeometryInclude] | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -89,6 +92,13 @@ class CurvaturesRequest:
         if not isinstance(self.orientation, Unset):
             orientation = self.orientation.value
 
+        include: list[str] | Unset = UNSET
+        if not isinstance(self.include, Unset):
+            include = []
+            for include_item_data in self.include:
+                include_item = include_item_data.value
+                include.append(include_item)
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -112,6 +122,8 @@ class CurvaturesRequest:
             field_dict["surface"] = surface
         if orientation is not UNSET:
             field_dict["orientation"] = orientation
+        if include is not UNSET:
+            field_dict["include"] = include
 
         return field_dict
 
@@ -171,6 +183,15 @@ class CurvaturesRequest:
         else:
             orientation = OrientationChoice(_orientation)
 
+        _include = d.pop("include", UNSET)
+        include: list[GeometryInclude] | Unset = UNSET
+        if _include is not UNSET:
+            include = []
+            for include_item_data in _include:
+                include_item = GeometryInclude(include_item_data)
+
+                include.append(include_item)
+
         curvatures_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -181,6 +202,7 @@ class CurvaturesRequest:
             queries=queries,
             surface=surface,
             orientation=orientation,
+            include=include,
         )
 
         return curvatures_request

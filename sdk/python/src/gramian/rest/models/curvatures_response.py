@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.surface_used import SurfaceUsed
-from ..types import without_unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
@@ -38,6 +38,14 @@ class CurvaturesResponse:
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
         diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
             well.
+        normal_deviations (list[float | None] | Unset): Standard deviation of the angle of the normal at each query,
+            radians: within 1.96 of it lie 95 % of the angles; null where
+            there is no answer or none is known.
+        principal_curvature_deviations (list[list[float] | None] | Unset): Standard deviations of the principal
+            curvatures at each query, in their order, 1/length.
+        mean_curvature_deviations (list[float | None] | Unset): Standard deviations of the mean curvatures, 1/length.
+        gaussian_curvature_deviations (list[float | None] | Unset): Standard deviations of the Gaussian curvatures,
+            1/length to the d − 1.
     """
 
     principal_curvatures: list[list[float] | None]
@@ -50,6 +58,10 @@ class CurvaturesResponse:
     surfaces: list[SurfaceUsed]
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
+    normal_deviations: list[float | None] | Unset = UNSET
+    principal_curvature_deviations: list[list[float] | None] | Unset = UNSET
+    mean_curvature_deviations: list[float | None] | Unset = UNSET
+    gaussian_curvature_deviations: list[float | None] | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -117,6 +129,42 @@ class CurvaturesResponse:
 
         diagnostics = self.diagnostics.to_dict()
 
+        normal_deviations: list[float | None] | Unset = UNSET
+        if not isinstance(self.normal_deviations, Unset):
+            normal_deviations = []
+            for normal_deviations_item_data in self.normal_deviations:
+                normal_deviations_item: float | None
+                normal_deviations_item = normal_deviations_item_data
+                normal_deviations.append(normal_deviations_item)
+
+        principal_curvature_deviations: list[list[float] | None] | Unset = UNSET
+        if not isinstance(self.principal_curvature_deviations, Unset):
+            principal_curvature_deviations = []
+            for principal_curvature_deviations_item_data in self.principal_curvature_deviations:
+                principal_curvature_deviations_item: list[float] | None
+                if isinstance(principal_curvature_deviations_item_data, list):
+                    principal_curvature_deviations_item = principal_curvature_deviations_item_data
+
+                else:
+                    principal_curvature_deviations_item = principal_curvature_deviations_item_data
+                principal_curvature_deviations.append(principal_curvature_deviations_item)
+
+        mean_curvature_deviations: list[float | None] | Unset = UNSET
+        if not isinstance(self.mean_curvature_deviations, Unset):
+            mean_curvature_deviations = []
+            for mean_curvature_deviations_item_data in self.mean_curvature_deviations:
+                mean_curvature_deviations_item: float | None
+                mean_curvature_deviations_item = mean_curvature_deviations_item_data
+                mean_curvature_deviations.append(mean_curvature_deviations_item)
+
+        gaussian_curvature_deviations: list[float | None] | Unset = UNSET
+        if not isinstance(self.gaussian_curvature_deviations, Unset):
+            gaussian_curvature_deviations = []
+            for gaussian_curvature_deviations_item_data in self.gaussian_curvature_deviations:
+                gaussian_curvature_deviations_item: float | None
+                gaussian_curvature_deviations_item = gaussian_curvature_deviations_item_data
+                gaussian_curvature_deviations.append(gaussian_curvature_deviations_item)
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -133,6 +181,14 @@ class CurvaturesResponse:
                 "diagnostics": diagnostics,
             }
         )
+        if normal_deviations is not UNSET:
+            field_dict["normal_deviations"] = normal_deviations
+        if principal_curvature_deviations is not UNSET:
+            field_dict["principal_curvature_deviations"] = principal_curvature_deviations
+        if mean_curvature_deviations is not UNSET:
+            field_dict["mean_curvature_deviations"] = mean_curvature_deviations
+        if gaussian_curvature_deviations is not UNSET:
+            field_dict["gaussian_curvature_deviations"] = gaussian_curvature_deviations
 
         return field_dict
 
@@ -258,6 +314,80 @@ class CurvaturesResponse:
 
         diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
 
+        _normal_deviations = d.pop("normal_deviations", UNSET)
+        normal_deviations: list[float | None] | Unset = UNSET
+        if _normal_deviations is not UNSET:
+            normal_deviations = []
+            for normal_deviations_item_data in _normal_deviations:
+
+                def _parse_normal_deviations_item(data: object) -> float | None:
+                    if data is None:
+                        return data
+                    return cast(float | None, data)
+
+                normal_deviations_item = _parse_normal_deviations_item(normal_deviations_item_data)
+
+                normal_deviations.append(normal_deviations_item)
+
+        _principal_curvature_deviations = d.pop("principal_curvature_deviations", UNSET)
+        principal_curvature_deviations: list[list[float] | None] | Unset = UNSET
+        if _principal_curvature_deviations is not UNSET:
+            principal_curvature_deviations = []
+            for principal_curvature_deviations_item_data in _principal_curvature_deviations:
+
+                def _parse_principal_curvature_deviations_item(data: object) -> list[float] | None:
+                    if data is None:
+                        return data
+                    try:
+                        if not isinstance(data, list):
+                            raise TypeError()
+                        principal_curvature_deviations_item_type_0 = cast(list[float], data)
+
+                        return principal_curvature_deviations_item_type_0
+                    except (TypeError, ValueError, AttributeError, KeyError):
+                        pass
+                    return cast(list[float] | None, data)
+
+                principal_curvature_deviations_item = _parse_principal_curvature_deviations_item(
+                    principal_curvature_deviations_item_data
+                )
+
+                principal_curvature_deviations.append(principal_curvature_deviations_item)
+
+        _mean_curvature_deviations = d.pop("mean_curvature_deviations", UNSET)
+        mean_curvature_deviations: list[float | None] | Unset = UNSET
+        if _mean_curvature_deviations is not UNSET:
+            mean_curvature_deviations = []
+            for mean_curvature_deviations_item_data in _mean_curvature_deviations:
+
+                def _parse_mean_curvature_deviations_item(data: object) -> float | None:
+                    if data is None:
+                        return data
+                    return cast(float | None, data)
+
+                mean_curvature_deviations_item = _parse_mean_curvature_deviations_item(
+                    mean_curvature_deviations_item_data
+                )
+
+                mean_curvature_deviations.append(mean_curvature_deviations_item)
+
+        _gaussian_curvature_deviations = d.pop("gaussian_curvature_deviations", UNSET)
+        gaussian_curvature_deviations: list[float | None] | Unset = UNSET
+        if _gaussian_curvature_deviations is not UNSET:
+            gaussian_curvature_deviations = []
+            for gaussian_curvature_deviations_item_data in _gaussian_curvature_deviations:
+
+                def _parse_gaussian_curvature_deviations_item(data: object) -> float | None:
+                    if data is None:
+                        return data
+                    return cast(float | None, data)
+
+                gaussian_curvature_deviations_item = _parse_gaussian_curvature_deviations_item(
+                    gaussian_curvature_deviations_item_data
+                )
+
+                gaussian_curvature_deviations.append(gaussian_curvature_deviations_item)
+
         curvatures_response = cls(
             principal_curvatures=principal_curvatures,
             principal_directions=principal_directions,
@@ -269,6 +399,10 @@ class CurvaturesResponse:
             surfaces=surfaces,
             degenerate=degenerate,
             diagnostics=diagnostics,
+            normal_deviations=normal_deviations,
+            principal_curvature_deviations=principal_curvature_deviations,
+            mean_curvature_deviations=mean_curvature_deviations,
+            gaussian_curvature_deviations=gaussian_curvature_deviations,
         )
 
         curvatures_response.additional_properties = d

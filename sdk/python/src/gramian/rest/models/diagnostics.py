@@ -34,15 +34,18 @@ class Diagnostics:
         factorization (FactorizationUsed): How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`,
             `conjugate_gradients` and `local` are reserved: no
             answer has them yet.
-        rank (int): Numerical rank of the matrix.
-        reciprocal_condition (float): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a
-            fraction of all.
-        relative_residual (float): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
-        native_norm_squared (float): ‖u‖² = ΛᵀKΛ in the native space of the kernel.
         misfit (float): |u(X) − Y|, unit of the values.
         n_merged_duplicates (int): Points that were merged into an earlier one.
         warnings (list[Warning_]): What was changed or limits the accuracy.
         alpha (float | Unset): What was added to the diagonal; absent with `noise_variances`.
+        solver_reason (str | Unset): Why it was chosen, where `auto` chose another one than the dense one.
+        rank (int | Unset): Numerical rank of the matrix.
+        reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as
+            a fraction of all.
+        relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+        native_norm_squared (float | Unset): ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+        noise_deviation (float | Unset): Standard deviation of the noise of the points across the surface, as estimated,
+            length.
         geometry (Diagnostics | Unset): What an answer says of itself: the numbers used, how the system was solved, and
             how well.
     """
@@ -54,14 +57,16 @@ class Diagnostics:
     kernel: KernelUsed
     solver: SolverUsed
     factorization: FactorizationUsed
-    rank: int
-    reciprocal_condition: float
-    relative_residual: float
-    native_norm_squared: float
     misfit: float
     n_merged_duplicates: int
     warnings: list[Warning_]
     alpha: float | Unset = UNSET
+    solver_reason: str | Unset = UNSET
+    rank: int | Unset = UNSET
+    reciprocal_condition: float | Unset = UNSET
+    relative_residual: float | Unset = UNSET
+    native_norm_squared: float | Unset = UNSET
+    noise_deviation: float | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -82,14 +87,6 @@ class Diagnostics:
 
         factorization = self.factorization.value
 
-        rank = self.rank
-
-        reciprocal_condition = self.reciprocal_condition
-
-        relative_residual = self.relative_residual
-
-        native_norm_squared = self.native_norm_squared
-
         misfit = self.misfit
 
         n_merged_duplicates = self.n_merged_duplicates
@@ -100,6 +97,18 @@ class Diagnostics:
             warnings.append(warnings_item)
 
         alpha = self.alpha
+
+        solver_reason = self.solver_reason
+
+        rank = self.rank
+
+        reciprocal_condition = self.reciprocal_condition
+
+        relative_residual = self.relative_residual
+
+        native_norm_squared = self.native_norm_squared
+
+        noise_deviation = self.noise_deviation
 
         geometry: dict[str, Any] | Unset = UNSET
         if not isinstance(self.geometry, Unset):
@@ -116,10 +125,6 @@ class Diagnostics:
                 "kernel": kernel,
                 "solver": solver,
                 "factorization": factorization,
-                "rank": rank,
-                "reciprocal_condition": reciprocal_condition,
-                "relative_residual": relative_residual,
-                "native_norm_squared": native_norm_squared,
                 "misfit": misfit,
                 "n_merged_duplicates": n_merged_duplicates,
                 "warnings": warnings,
@@ -127,6 +132,18 @@ class Diagnostics:
         )
         if alpha is not UNSET:
             field_dict["alpha"] = alpha
+        if solver_reason is not UNSET:
+            field_dict["solver_reason"] = solver_reason
+        if rank is not UNSET:
+            field_dict["rank"] = rank
+        if reciprocal_condition is not UNSET:
+            field_dict["reciprocal_condition"] = reciprocal_condition
+        if relative_residual is not UNSET:
+            field_dict["relative_residual"] = relative_residual
+        if native_norm_squared is not UNSET:
+            field_dict["native_norm_squared"] = native_norm_squared
+        if noise_deviation is not UNSET:
+            field_dict["noise_deviation"] = noise_deviation
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
 
@@ -152,14 +169,6 @@ class Diagnostics:
 
         factorization = FactorizationUsed(d.pop("factorization"))
 
-        rank = d.pop("rank")
-
-        reciprocal_condition = d.pop("reciprocal_condition")
-
-        relative_residual = d.pop("relative_residual")
-
-        native_norm_squared = d.pop("native_norm_squared")
-
         misfit = d.pop("misfit")
 
         n_merged_duplicates = d.pop("n_merged_duplicates")
@@ -172,6 +181,18 @@ class Diagnostics:
             warnings.append(warnings_item)
 
         alpha = d.pop("alpha", UNSET)
+
+        solver_reason = d.pop("solver_reason", UNSET)
+
+        rank = d.pop("rank", UNSET)
+
+        reciprocal_condition = d.pop("reciprocal_condition", UNSET)
+
+        relative_residual = d.pop("relative_residual", UNSET)
+
+        native_norm_squared = d.pop("native_norm_squared", UNSET)
+
+        noise_deviation = d.pop("noise_deviation", UNSET)
 
         _geometry = d.pop("geometry", UNSET)
         geometry: Diagnostics | Unset
@@ -188,14 +209,16 @@ class Diagnostics:
             kernel=kernel,
             solver=solver,
             factorization=factorization,
-            rank=rank,
-            reciprocal_condition=reciprocal_condition,
-            relative_residual=relative_residual,
-            native_norm_squared=native_norm_squared,
             misfit=misfit,
             n_merged_duplicates=n_merged_duplicates,
             warnings=warnings,
             alpha=alpha,
+            solver_reason=solver_reason,
+            rank=rank,
+            reciprocal_condition=reciprocal_condition,
+            relative_residual=relative_residual,
+            native_norm_squared=native_norm_squared,
+            noise_deviation=noise_deviation,
             geometry=geometry,
         )
 

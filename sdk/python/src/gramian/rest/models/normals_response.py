@@ -7,7 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.surface_used import SurfaceUsed
-from ..types import without_unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
@@ -31,6 +31,9 @@ class NormalsResponse:
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
         diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
             well.
+        normal_deviations (list[float | None] | Unset): Standard deviation of the angle of the normal at each query,
+            radians: within 1.96 of it lie 95 % of the angles; null where
+            there is no answer or none is known.
     """
 
     normals: list[list[float] | None]
@@ -39,6 +42,7 @@ class NormalsResponse:
     surfaces: list[SurfaceUsed]
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
+    normal_deviations: list[float | None] | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -70,6 +74,14 @@ class NormalsResponse:
 
         diagnostics = self.diagnostics.to_dict()
 
+        normal_deviations: list[float | None] | Unset = UNSET
+        if not isinstance(self.normal_deviations, Unset):
+            normal_deviations = []
+            for normal_deviations_item_data in self.normal_deviations:
+                normal_deviations_item: float | None
+                normal_deviations_item = normal_deviations_item_data
+                normal_deviations.append(normal_deviations_item)
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -82,6 +94,8 @@ class NormalsResponse:
                 "diagnostics": diagnostics,
             }
         )
+        if normal_deviations is not UNSET:
+            field_dict["normal_deviations"] = normal_deviations
 
         return field_dict
 
@@ -132,6 +146,21 @@ class NormalsResponse:
 
         diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
 
+        _normal_deviations = d.pop("normal_deviations", UNSET)
+        normal_deviations: list[float | None] | Unset = UNSET
+        if _normal_deviations is not UNSET:
+            normal_deviations = []
+            for normal_deviations_item_data in _normal_deviations:
+
+                def _parse_normal_deviations_item(data: object) -> float | None:
+                    if data is None:
+                        return data
+                    return cast(float | None, data)
+
+                normal_deviations_item = _parse_normal_deviations_item(normal_deviations_item_data)
+
+                normal_deviations.append(normal_deviations_item)
+
         normals_response = cls(
             normals=normals,
             gradient_norms=gradient_norms,
@@ -139,6 +168,7 @@ class NormalsResponse:
             surfaces=surfaces,
             degenerate=degenerate,
             diagnostics=diagnostics,
+            normal_deviations=normal_deviations,
         )
 
         normals_response.additional_properties = d

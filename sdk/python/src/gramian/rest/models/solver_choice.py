@@ -4,6 +4,7 @@ from enum import StrEnum
 class SolverChoice(StrEnum):
     AUTO = "auto"
     DENSE = "dense"
+    LOCAL = "local"
 
     def __str__(self) -> str:
         return str(self.value)

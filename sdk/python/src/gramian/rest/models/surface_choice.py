@@ -3,6 +3,7 @@ from enum import StrEnum
 
 class SurfaceChoice(StrEnum):
     AUTO = "auto"
+    LOCAL = "local"
     OFFSET = "offset"
     SIGNATURE = "signature"
 

@@ -2,6 +2,7 @@ from enum import StrEnum
 
 
 class SurfaceUsed(StrEnum):
+    LOCAL = "local"
     OFFSET = "offset"
     SIGNATURE = "signature"
 

@@ -28,7 +28,10 @@ def _get_kwargs(
         headers["Content-Type"] = "application/json"
     if isinstance(body, File):
         _kwargs["content"] = body.payload
-        headers["Content-Type"] = body.mime_type or "application/x-npy"
+        headers["Content-Type"] = body.mime_type or "application/x-safetensors"
+    if isinstance(body, File):
+        _kwargs["content"] = body.payload
+        headers["Content-Type"] = body.mime_type or "application/x-safetensors"
     if isinstance(body, File):
         _kwargs["content"] = body.payload
         headers["Content-Type"] = body.mime_type or "application/x-safetensors"
@@ -131,6 +134,9 @@ def sync_detailed(
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
+        body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
+            element vertex are the points, and nx, ny, nz their normals if all three are there, of any
+            type of number; other properties and elements are passed over.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -169,6 +175,9 @@ def sync(
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
+        body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
+            element vertex are the points, and nx, ny, nz their normals if all three are there, of any
+            type of number; other properties and elements are passed over.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -202,6 +211,9 @@ async def asyncio_detailed(
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
+        body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
+            element vertex are the points, and nx, ny, nz their normals if all three are there, of any
+            type of number; other properties and elements are passed over.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -238,6 +250,9 @@ async def asyncio(
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
+        body (File): PLY 1.0, ascii or binary of either byte order. The properties x, y, z of
+            element vertex are the points, and nx, ny, nz their normals if all three are there, of any
+            type of number; other properties and elements are passed over.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -1,7 +1,6 @@
 //! Normals at the points before their signs are made consistent.
 
-use super::degeneracy::is_no_normal;
-use super::level::Signature;
+use super::function::Signature;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
@@ -9,39 +8,31 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::local_quadrics::LocalQuadrics;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::sums::jets::{JetOrder, Jets};
+use crate::numerics::surface::degeneracy::is_no_normal;
+use crate::numerics::surface::orientation::Directions;
 
 /// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the points.
 const DIFFERENCE_STEP: f64 = 0.25;
 
 /// What is known of the normals from the signature function and the quadrics.
-pub(crate) struct Directions {
-    /// Unit vectors at the points, `[n, d]`: `−∇u/|∇u|` where reliable, a normal of unknown sign elsewhere, or zero.
-    pub normals: Vec<f64>,
-    /// Whether the sign means something, `[n]`.
-    pub has_sign: Vec<bool>,
-    /// Whether the point is at the rim of an open surface, `[n]`.
-    pub is_at_rim: Vec<bool>,
-}
-
-impl Directions {
-    /// # Errors
-    /// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
-    pub(crate) fn of(
-        signature: &Signature,
-        sampling: &Sampling,
-        quadrics: &LocalQuadrics,
-        observer: &dyn Observer,
-    ) -> Result<Self, NumericsError> {
-        let n = signature.function().solver.n_points();
-        let (normals, has_sign) = match signature.jets() {
-            Some(jets) => along_gradients(signature, jets, sampling, quadrics),
-            None => along_quadrics(signature, sampling, quadrics, observer)?,
-        };
-        // The tip of a hairpin looks like the end of a curve; no quadric fits there.
-        let is_at_rim =
-            |point| quadrics.at(point).is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable());
-        Ok(Self { normals, has_sign, is_at_rim: (0..n).map(is_at_rim).collect() })
-    }
+///
+/// # Errors
+/// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
+pub(crate) fn directions(
+    signature: &Signature,
+    sampling: &Sampling,
+    quadrics: &LocalQuadrics,
+    observer: &dyn Observer,
+) -> Result<Directions, NumericsError> {
+    let n = signature.function().solver.n_points();
+    let (normals, has_sign) = match signature.jets() {
+        Some(jets) => along_gradients(signature, jets, sampling, quadrics),
+        None => along_quadrics(signature, sampling, quadrics, observer)?,
+    };
+    // The tip of a hairpin looks like the end of a curve; no quadric fits there.
+    let is_at_rim =
+        |point| quadrics.at(point).is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable());
+    Ok(Directions { normals, has_sign, is_at_rim: (0..n).map(is_at_rim).collect() })
 }
 
 fn along_gradients(

@@ -2,7 +2,7 @@
 
 mod layers;
 
-use super::Surface;
+use super::SignatureSurface;
 use crate::numerics::machine::vector::{dot, norm};
 use crate::numerics::points::patch::Patch;
 use crate::numerics::points::quadric::n_coefficients;
@@ -25,7 +25,7 @@ const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
 ///
 /// `None` where the cloud does not support it: x far from all points, too few points on one sheet around it, or an
 /// interpolant that is no distance.
-pub(crate) fn offset_jet_at(surface: &Surface, x: &[f64]) -> Option<OffsetJet> {
+pub(crate) fn offset_jet_at(surface: &SignatureSurface, x: &[f64]) -> Option<OffsetJet> {
     let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
     let nearest = surface.sampling().neighbours().nearest_positions(cloud, x, n_patch_points(d));
     let first = nearest.first()?;

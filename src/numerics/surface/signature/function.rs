@@ -1,20 +1,14 @@
-//! How a surface answers at a query: the function whose level surface it is.
+//! The function whose level surface it is.
 
 use std::sync::Arc;
 
-use super::degeneracy::roundings;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
 use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::{JetOrder, Jets};
-
-/// What answers at a query.
-pub enum Level {
-    /// One global function.
-    Signature(Signature),
-}
+use crate::numerics::surface::degeneracy::roundings;
 
 /// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the points.
 ///

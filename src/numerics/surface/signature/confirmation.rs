@@ -7,12 +7,12 @@
 //! the points nearby, had each of them been left out. It is there for all points at the price of a few patches, so where
 //! the quadric nearly agrees it is asked before the patch is.
 
-use super::Surface;
-use super::curvature::principal_curvatures;
+use super::SignatureSurface;
 use super::offset::offset_jet_at;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::points::local_quadrics::LocalQuadric;
 use crate::numerics::points::sampling::SPACING_NEIGHBOURS;
+use crate::numerics::surface::curvature::principal_curvatures;
 
 /// Differences, against the largest curvature, up to which the quadric confirms, and up to which the patch does.
 const CONFIRMED_BY_QUADRIC: f64 = 0.07;
@@ -64,7 +64,7 @@ pub(crate) struct Unconfirmed<'a> {
 
 impl Unconfirmed<'_> {
     /// Whether the points around x confirm the curvatures.
-    pub(crate) fn is_confirmed_by(&self, surface: &Surface) -> bool {
+    pub(crate) fn is_confirmed_by(&self, surface: &SignatureSurface) -> bool {
         let is_noisy = self.is_noisy(surface);
         let difference = self.difference_from_quadric(surface).unwrap_or(f64::INFINITY);
         if self.is_offset {
@@ -93,7 +93,7 @@ impl Unconfirmed<'_> {
 
     /// Whether what the quadric leaves, taken for noise, makes up a tenth of the curvatures. A flat cloud counts as curved by half
     /// of one over its radius.
-    fn is_noisy(&self, surface: &Surface) -> bool {
+    fn is_noisy(&self, surface: &SignatureSurface) -> bool {
         let scale = self.largest().max(0.5 / surface.radius());
         self.quadric.is_some_and(|quadric| quadric.uncertainty > NOISY * scale)
     }
@@ -107,13 +107,13 @@ impl Unconfirmed<'_> {
             && difference <= CONFIRMED_BY_QUADRIC
     }
 
-    fn difference_from_quadric(&self, surface: &Surface) -> Option<f64> {
+    fn difference_from_quadric(&self, surface: &SignatureSurface) -> Option<f64> {
         let quadric = self.quadric.filter(|quadric| quadric.is_reliable())?;
         Some(self.difference(surface, &quadric.curvatures_for(self.normal)))
     }
 
     /// `None` where there is no patch.
-    fn is_confirmed_by_patch(&self, surface: &Surface) -> Option<bool> {
+    fn is_confirmed_by_patch(&self, surface: &SignatureSurface) -> Option<bool> {
         let jet = offset_jet_at(surface, self.x)?;
         let side = dot(&jet.gradient, self.normal).signum();
         let (curvatures, _) = principal_curvatures(&jet.gradient, &jet.hessian, side);
@@ -121,7 +121,7 @@ impl Unconfirmed<'_> {
     }
 
     /// Largest difference against the largest curvature.
-    fn difference(&self, surface: &Surface, other: &[f64]) -> f64 {
+    fn difference(&self, surface: &SignatureSurface, other: &[f64]) -> f64 {
         let floor = FLAT / surface.radius();
         let largest = other.iter().fold(self.largest().max(floor), |a, k| a.max(k.abs()));
         self.curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
@@ -129,7 +129,7 @@ impl Unconfirmed<'_> {
 
     /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ share · |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
     /// that is left out (Rippa 1999).
-    fn is_predicted(&self, surface: &Surface, share: f64) -> bool {
+    fn is_predicted(&self, surface: &SignatureSurface, share: f64) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
         let nearest =
             surface.sampling().neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);

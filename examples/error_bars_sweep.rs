@@ -1,0 +1,73 @@
+//! Prints how many true values lie within the error bars: the table of docs/error-bars.md.
+//!
+//! `cargo run --release --example error_bars_sweep [points per row]`, 10,000 if not said; a few minutes.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/error_bars/jet.rs"]
+mod jet;
+#[path = "../tests/error_bars/sampling.rs"]
+mod sampling;
+#[path = "../tests/error_bars/shapes.rs"]
+mod shapes;
+#[path = "../tests/error_bars/sweep.rs"]
+mod sweep;
+
+use rayon::prelude::*;
+use sampling::SAMPLINGS;
+use shapes::SHAPES;
+use sweep::{Case, NOISES, Row, quantile};
+
+const SIZES: [usize; 4] = [300, 1000, 4000, 10_000];
+
+/// Per cent, but for the errors: median of the larger error of a principal curvature over the larger curvature, and of the angle.
+const HEADER: &str = "\
+| shape | sampling | n | noise | normal | mean | κ₁ | κ₂ | error | angle | flagged | off by half | |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+
+fn main() {
+    let n_wanted: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(10_000);
+    let mut cases = Vec::new();
+    for n_points in SIZES {
+        for shape in SHAPES {
+            for sampling in SAMPLINGS {
+                cases.extend(NOISES.map(|noise| Case { shape, sampling, n_points, noise }));
+            }
+        }
+    }
+    let run = |case: &Case| case.run(n_wanted.div_ceil(case.n_points));
+    let rows: Vec<Row> = cases.par_iter().map(run).collect();
+    println!("{HEADER}");
+    cases.iter().zip(&rows).for_each(|(case, row)| print_row(case, row));
+    let holds = |keep: &dyn Fn(&Case) -> bool| {
+        let kept = || cases.iter().zip(&rows).filter(|(case, _)| keep(case));
+        (kept().filter(|(case, row)| row.holds(case.noise)).count(), kept().count())
+    };
+    println!();
+    for noise in NOISES {
+        let (n_held, n) = holds(&|case| case.noise == noise);
+        println!("Noise {} %: {n_held} of {n} rows hold.", 100.0 * noise);
+    }
+    for size in SIZES {
+        let (n_held, n) = holds(&|case| case.n_points == size);
+        println!("{size} points: {n_held} of {n} rows hold.");
+    }
+    let (n_held, n) = holds(&|_| true);
+    println!("All: {n_held} of {n} rows hold.");
+}
+
+fn print_row(case: &Case, row: &Row) {
+    let [normal, mean, first, second] = row.coverages();
+    println!(
+        "| {:?} | {:?} | {} | {} | {normal:.1} | {mean:.1} | {first:.1} | {second:.1} | {:.1e} | {:.2}° | {:.1} | {:.2} | {} |",
+        case.shape,
+        case.sampling,
+        case.n_points,
+        100.0 * case.noise,
+        quantile(&row.errors, 0.5),
+        quantile(&row.angles, 0.5).to_degrees(),
+        row.flagged(),
+        row.off(),
+        if row.holds(case.noise) { "" } else { "†" }
+    );
+}

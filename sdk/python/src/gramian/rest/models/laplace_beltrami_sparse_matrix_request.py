@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+
+from ..models.duplicate_policy import DuplicatePolicy
+from ..models.solver_choice import SolverChoice
+from ..types import UNSET, Unset, without_unset
+
+if TYPE_CHECKING:
+    from ..models.cloud_ref import CloudRef
+    from ..models.geometry import Geometry
+    from ..models.kernel import Kernel
+
+
+T = TypeVar("T", bound="LaplaceBeltramiSparseMatrixRequest")
+
+
+@_attrs_define
+class LaplaceBeltramiSparseMatrixRequest:
+    """Nodes and queries of the operator as a sparse matrix.
+
+    Attributes:
+        cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+        kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
+            another family is refused.
+        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
+            interpolates, the variance
+            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
+            the noise of the points, 1e-3 at least.
+        noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
+            list counts as absent.
+        solver (SolverChoice | Unset): How the linear system is solved.
+        duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
+        queries (list[list[float]] | Unset): Where rows are wanted; the points of the surface if absent.
+        geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
+            the values. What is absent is as in
+            the request.
+    """
+
+    cloud: CloudRef
+    kernel: Kernel | Unset = UNSET
+    alpha: float | Unset = UNSET
+    noise_variances: list[float] | Unset = UNSET
+    solver: SolverChoice | Unset = UNSET
+    duplicates: DuplicatePolicy | Unset = UNSET
+    queries: list[list[float]] | Unset = UNSET
+    geometry: Geometry | Unset = UNSET
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        cloud = self.cloud.to_dict()
+
+        kernel: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.kernel, Unset):
+            kernel = self.kernel.to_dict()
+
+        alpha = self.alpha
+
+        noise_variances: list[float] | Unset = UNSET
+        if not isinstance(self.noise_variances, Unset):
+            noise_variances = self.noise_variances
+
+        solver: str | Unset = UNSET
+        if not isinstance(self.solver, Unset):
+            solver = self.solver.value
+
+        duplicates: str | Unset = UNSET
+        if not isinstance(self.duplicates, Unset):
+            duplicates = self.duplicates.value
+
+        queries: list[list[float]] | Unset = UNSET
+        if not isinstance(self.queries, Unset):
+            queries = []
+            for queries_item_data in self.queries:
+                queries_item = queries_item_data
+
+                queries.append(queries_item)
+
+        geometry: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.geometry, Unset):
+            geometry = self.geometry.to_dict()
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "cloud": cloud,
+            }
+        )
+        if kernel is not UNSET:
+            field_dict["kernel"] = kernel
+        if alpha is not UNSET:
+            field_dict["alpha"] = alpha
+        if noise_variances is not UNSET:
+            field_dict["noise_variances"] = noise_variances
+        if solver is not UNSET:
+            field_dict["solver"] = solver
+        if duplicates is not UNSET:
+            field_dict["duplicates"] = duplicates
+        if queries is not UNSET:
+            field_dict["queries"] = queries
+        if geometry is not UNSET:
+            field_dict["geometry"] = geometry
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.cloud_ref import CloudRef
+        from ..models.geometry import Geometry
+        from ..models.kernel import Kernel
+
+        d = dict(src_dict)
+        cloud = CloudRef.from_dict(d.pop("cloud"))
+
+        _kernel = d.pop("kernel", UNSET)
+        kernel: Kernel | Unset
+        if isinstance(_kernel, Unset):
+            kernel = UNSET
+        else:
+            kernel = Kernel.from_dict(_kernel)
+
+        alpha = d.pop("alpha", UNSET)
+
+        noise_variances = cast(list[float], d.pop("noise_variances", UNSET))
+
+        _solver = d.pop("solver", UNSET)
+        solver: SolverChoice | Unset
+        if isinstance(_solver, Unset):
+            solver = UNSET
+        else:
+            solver = SolverChoice(_solver)
+
+        _duplicates = d.pop("duplicates", UNSET)
+        duplicates: DuplicatePolicy | Unset
+        if isinstance(_duplicates, Unset):
+            duplicates = UNSET
+        else:
+            duplicates = DuplicatePolicy(_duplicates)
+
+        _queries = d.pop("queries", UNSET)
+        queries: list[list[float]] | Unset = UNSET
+        if _queries is not UNSET:
+            queries = []
+            for queries_item_data in _queries:
+                queries_item = cast(list[float], queries_item_data)
+
+                queries.append(queries_item)
+
+        _geometry = d.pop("geometry", UNSET)
+        geometry: Geometry | Unset
+        if isinstance(_geometry, Unset):
+            geometry = UNSET
+        else:
+            geometry = Geometry.from_dict(_geometry)
+
+        laplace_beltrami_sparse_matrix_request = cls(
+            cloud=cloud,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+            queries=queries,
+            geometry=geometry,
+        )
+
+        return laplace_beltrami_sparse_matrix_request

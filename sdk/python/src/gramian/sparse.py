@@ -1,0 +1,35 @@
+"""Sparse matrices, for which SciPy is needed: the extra `gramian[scipy]`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .tensors import Members
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+def require_scipy() -> None:
+    """Imports SciPy, which takes a moment: here, where it is needed, and before anything is sent.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        If it is not installed.
+    """
+    try:
+        import scipy.sparse  # noqa: F401
+    except ModuleNotFoundError as error:
+        message = "sparse matrices are those of SciPy, which is not installed: pip install 'gramian[scipy]'"
+        raise ModuleNotFoundError(message, name="scipy") from error
+
+
+def csr_matrices(members: Members) -> list[csr_matrix]:
+    """Reads the matrices of an answer, one per component, with their entries at the same places."""
+    from scipy.sparse import csr_matrix
+
+    *_, m, n = members.integers("shape").tolist()
+    indptr, indices = members.integers("indptr"), members.integers("indices")
+    data = members.array("data", len(indices)) if len(members.integers("shape")) == 3 else members.array("data")[None]
+    return [csr_matrix((entries, indices, indptr), shape=(m, n)) for entries in data]

@@ -1,0 +1,103 @@
+//! Clouds as scanners write them: PLY 1.0, in text or binary of either byte order.
+//!
+//! Of a file the vertices are read, x y z as `points` and, where all three are there, nx ny nz as `normals`; other properties
+//! and elements are passed over, and what follows the vertices is not looked at. The numbers come one by one out of the body
+//! into the same types as those of JSON, under the same guard, so that limits, pointers and cancellation are those of every
+//! format, and nothing is kept beside the two flat arrays. The crates that read PLY make a map or a structure of every element
+//! and take memory by the counts of the header, which anybody may write.
+
+mod data;
+mod header;
+mod rows;
+
+use std::cell::Cell;
+
+use serde::de::DeserializeOwned;
+use serde::de::value::MapDeserializer;
+
+use super::guarded::Guard;
+use super::limits::ParseContext;
+use super::members::object;
+use super::parse::refusal;
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use data::Cursor;
+use header::{Element, Header};
+use rows::Rows;
+
+/// Bytes of a header at most, as of the other formats; what scanners write takes some hundreds.
+const MAX_HEADER_BYTES: usize = 64 << 10;
+
+const COORDINATES: [&str; 3] = ["x", "y", "z"];
+const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
+
+/// Why a body is not the PLY that it says it is.
+#[derive(Debug, thiserror::Error)]
+enum PlyError {
+    #[error("the body is not PLY: its first line is not \"ply\"")]
+    NoMagic,
+    #[error("the header does not end: there is no line \"end_header\" in its first {MAX_HEADER_BYTES} bytes")]
+    EndlessHeader,
+    #[error("line {line} of the header: {reason}")]
+    Header { line: usize, reason: String },
+    #[error(
+        "the header announces {announced} of element {element}, but at most {room} fit into what follows it"
+    )]
+    Announced { element: String, announced: usize, room: usize },
+    #[error("the body ends within element {element}, at number {index} of {announced}")]
+    EndsEarly { element: String, index: usize, announced: usize },
+    #[error("{element} {index}: a list has {length} entries")]
+    ListLength { element: String, index: usize, length: f64 },
+    #[error("line {line}, element {element}: {reason}")]
+    Text { line: usize, element: String, reason: String },
+}
+
+fn malformed(error: PlyError) -> Problem {
+    Problem::new(Slug::MalformedBody, error.to_string())
+        .with_remedy("write the file again, as PLY 1.0 with the counts that it has")
+}
+
+/// Parses the vertices of a file into the fields `points` and `normals`.
+///
+/// # Errors
+/// 400 for what is not PLY, or ends before its vertices do, 413 for too many of them, 422 with a pointer for vertices without
+/// coordinates and numbers that are not finite.
+pub fn parse_ply<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
+    let (header, data) = Header::parse(bytes).map_err(malformed)?;
+    let (before, vertices) = split_at_vertices(&header)?;
+    let columns = |names: [&str; 3]| vertices.columns(names);
+    let Some(coordinates) = columns(COORDINATES) else { return Err(without_coordinates(vertices)) };
+    let mut cursor = Cursor::new(data, &header);
+    before.iter().try_for_each(|element| cursor.skip(element)).map_err(malformed)?;
+    cursor.check_room(vertices).map_err(malformed)?;
+    let failure = Cell::new(None);
+    let lists = [("points", Some(coordinates)), ("normals", columns(NORMAL))];
+    let members = lists
+        .into_iter()
+        .filter_map(|(name, columns)| Some((name, Rows::new(cursor, vertices, columns?, &failure))));
+    let guard = Guard::asking_for_any(context);
+    object(guard.around(MapDeserializer::new(members))).map_err(|error| match failure.take() {
+        Some(failure) => malformed(failure),
+        None => refusal(&error, &guard, context, b"{}"),
+    })
+}
+
+/// The elements before the vertices, and the vertices.
+fn split_at_vertices<'h, 'a>(
+    header: &'h Header<'a>,
+) -> Result<(&'h [Element<'a>], &'h Element<'a>), Problem> {
+    let at = header.elements.iter().position(|element| element.name == "vertex");
+    match at.map(|at| header.elements.split_at(at)) {
+        Some((before, [vertices, ..])) => Ok((before, vertices)),
+        _ => Err(Problem::invalid_request("/points", "the file has no element vertex")),
+    }
+}
+
+fn without_coordinates(vertices: &Element<'_>) -> Problem {
+    let missing = COORDINATES.into_iter().find(|name| vertices.column(name).is_none()).unwrap_or_default();
+    let detail = format!("element vertex has no number {missing}");
+    Problem::invalid_request("/points", detail).with_remedy("give it the properties x, y and z")
+}
+
+#[cfg(test)]
+mod tests;

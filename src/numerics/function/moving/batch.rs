@@ -1,0 +1,74 @@
+//! The neighbourhoods of several queries side by side, one in each lane.
+
+use super::kriging::COLUMNS;
+use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::solver::System;
+
+/// The nearest points of a few queries, as many for each.
+pub(super) struct Batch {
+    pub dimension: usize,
+    /// Points of a neighbourhood.
+    pub count: usize,
+    lanes: usize,
+    /// From the nearest point to each of the others, `[d, places, lanes]`, unit L: differences are what distances are made of, and
+    /// from a query far away all of them would be the same.
+    pub points: Vec<f64>,
+    /// From the nearest point to the query, `[d, lanes]`, unit L.
+    pub query: Vec<f64>,
+    /// `[places, lanes]`, unit V; 0 in places that are left empty.
+    pub values: Vec<f64>,
+    /// `[places, lanes]`, unit V².
+    pub noise: Vec<f64>,
+}
+
+impl Batch {
+    pub(super) fn new(dimension: usize, count: usize, lanes: usize) -> Self {
+        let n_places = count.next_multiple_of(COLUMNS);
+        Self {
+            dimension,
+            count,
+            lanes,
+            points: vec![0.0; dimension * n_places * lanes],
+            query: vec![0.0; dimension * lanes],
+            values: vec![0.0; n_places * lanes],
+            noise: vec![0.0; n_places * lanes],
+        }
+    }
+
+    /// Places for points, of which the last few may be left empty.
+    pub(super) fn n_places(&self) -> usize {
+        self.count.next_multiple_of(COLUMNS)
+    }
+
+    /// Puts a query with its nearest points, the nearest one first, into a lane.
+    pub(super) fn put(
+        &mut self,
+        lane: usize,
+        x: &[f64],
+        nearest: &[Neighbour],
+        system: &System,
+        values: &[f64],
+    ) {
+        let (lanes, n_places) = (self.lanes, self.n_places());
+        let Some(origin) = nearest.first().map(|first| system.cloud().point(first.point)) else { return };
+        for (axis, (x, o)) in x.iter().zip(origin).enumerate() {
+            self.query[axis * lanes + lane] = x - o;
+        }
+        for (j, neighbour) in nearest.iter().enumerate() {
+            let at = j * lanes + lane;
+            for (axis, (x, o)) in system.cloud().point(neighbour.point).iter().zip(origin).enumerate() {
+                self.points[axis * n_places * lanes + at] = x - o;
+            }
+            self.values[at] = values[neighbour.point];
+            self.noise[at] = system.regularization().at(neighbour.point);
+        }
+    }
+
+    /// Fills an unused lane with what another has, so that it takes no exceptions.
+    pub(super) fn copy_lane(&mut self, from: usize, to: usize) {
+        let lanes = self.lanes;
+        for list in [&mut self.points, &mut self.query, &mut self.values, &mut self.noise] {
+            list.chunks_exact_mut(lanes).for_each(|row| row[to] = row[from]);
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Fewer points, spread as the cloud is.
+
+use super::cloud::Cloud;
+
+/// Points of the coarse cloud at most: their factorization takes half a second on two cores.
+const MAX_COARSE: usize = 4000;
+
+/// Points of the cloud per point of the coarse one, where that leaves more than [`LEAST_COARSE`].
+const POINTS_PER_COARSE: usize = 4;
+const LEAST_COARSE: usize = 600;
+
+/// Points of the coarse cloud for one of n.
+pub(crate) fn n_coarse(n_points: usize) -> usize {
+    (n_points / POINTS_PER_COARSE).clamp(LEAST_COARSE, MAX_COARSE).min(n_points)
+}
+
+/// At most `count` points of a cloud, one for each of as many parts with equally many points: parts by halving the cloud across its
+/// widest side, of each the point in the middle of its last halving.
+pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
+    let n = cloud.n_points();
+    if count >= n {
+        return cloud.clone();
+    }
+    let mut order: Vec<u32> = (0..n as u32).collect();
+    let mut chosen = Vec::with_capacity(count);
+    choose(cloud, &mut order, count.max(1), &mut chosen);
+    chosen.sort_unstable();
+    cloud.select(&chosen)
+}
+
+/// Chooses so many of these points.
+fn choose(cloud: &Cloud, points: &mut [u32], count: usize, chosen: &mut Vec<usize>) {
+    if count == 0 || points.is_empty() {
+        return;
+    }
+    let axis = widest_axis(cloud, points);
+    let coordinate = |point: u32| cloud.point(point as usize)[axis];
+    let middle = (points.len() - 1) / 2;
+    points.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)).then(a.cmp(&b)));
+    if count == 1 {
+        chosen.push(points[middle] as usize);
+        return;
+    }
+    let (left, right) = points.split_at_mut(points.len().div_ceil(2));
+    choose(cloud, left, count.div_ceil(2), chosen);
+    choose(cloud, right, count / 2, chosen);
+}
+
+/// The axis along which some points of a cloud spread most; the first of several.
+pub(crate) fn widest_axis(cloud: &Cloud, points: &[u32]) -> usize {
+    let extent = |axis: usize| {
+        let along = || points.iter().map(|&point| cloud.point(point as usize)[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let wider = |best: (usize, f64), axis: usize| match extent(axis) {
+        extent if extent > best.1 => (axis, extent),
+        _ => best,
+    };
+    (0..cloud.dimension()).fold((0, f64::NEG_INFINITY), wider).0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::testing::fibonacci_sphere;
+
+    #[test]
+    fn thinned_clouds_have_as_many_points_as_asked_for_all_over() {
+        let cloud = fibonacci_sphere(1000);
+        for count in [1, 2, 7, 100, 999] {
+            let few = thinned(&cloud, count);
+            assert_eq!(few.n_points(), count);
+            assert!(few.points().all(|x| cloud.points().any(|y| x == y)));
+        }
+        assert_eq!(thinned(&cloud, 2000), cloud);
+        let few = thinned(&cloud, 100);
+        let n_near = |x: &[f64]| {
+            few.points().filter(|y| x.iter().zip(*y).map(|(a, b)| a * b).sum::<f64>() > 0.8).count()
+        };
+        // A tenth of the sphere lies within that angle.
+        assert!(cloud.points().all(|x| (4..=17).contains(&n_near(x))));
+    }
+
+    #[test]
+    fn copies_of_one_point_are_thinned_too() {
+        let cloud = Cloud::new(vec![1.0; 30], 3).unwrap();
+        assert_eq!(thinned(&cloud, 4).n_points(), 4);
+    }
+}

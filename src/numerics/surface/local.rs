@@ -1,0 +1,306 @@
+//! The surface of local regressions, with one side chosen for all of it.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::coarse::outward_directions;
+use super::curvature::principal_curvatures;
+use super::degeneracy::{DegeneracyReason, is_far};
+use super::orientation::{Directions, Oriented, SurfaceOrientation};
+use super::request::{GeometryRequest, Orientation};
+use super::served::{Deviations, Served, ServedBy, Verdict};
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::observer::{Observer, Stage};
+use crate::numerics::patches::{CurvatureDeviations, PatchGeometry, Patches};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::neighbourhoods::Neighbourhoods;
+use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+
+/// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
+const SAYS_SIGN: f64 = 0.2;
+
+/// Deviations of a curvature that must stay below this fraction of the largest one.
+const RESOLVED_DEVIATIONS: f64 = 3.0;
+const RESOLVED_FRACTION: f64 = 0.5;
+
+/// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
+/// that are off by 30°.
+const UNCERTAIN_NORMAL: f64 = 0.3;
+
+/// Curvature times the radius of the cloud up to which a surface counts as flat.
+const FLAT: f64 = 0.1;
+
+/// Local regressions of a cloud with consistently oriented normals, d ≥ 2.
+pub struct LocalSurface {
+    cloud: Arc<Cloud>,
+    sampling: Arc<Sampling>,
+    patches: Patches,
+    /// What they say at the points, normals outward.
+    at_points: PatchGeometry,
+    orientation: SurfaceOrientation,
+    radius: f64,
+}
+
+impl LocalSurface {
+    /// Regresses the surface at every point and chooses its side; `given` are normals of the points, `[n, d]`, of any length but 0.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn of(
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        observer.enter(Stage::Evaluate);
+        let patches = Patches::of(cloud.clone(), sampling.clone(), observer)?;
+        let mut at_points = patches.at(&cloud, true, true, observer)?;
+        let oriented = orient(&cloud, &sampling, &patches, &at_points, given, observer)?;
+        let d = cloud.dimension();
+        let outward = |point: usize| &oriented.normals[point * d..][..d];
+        at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
+        let orientation = oriented.how;
+        let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
+        Ok(Self { cloud, sampling, patches, at_points, orientation, radius })
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        &self.cloud
+    }
+
+    pub fn orientation(&self) -> SurfaceOrientation {
+        self.orientation
+    }
+
+    pub(super) fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
+    pub fn patches(&self) -> &Patches {
+        &self.patches
+    }
+
+    /// `|h|` of the heights h of the points above the surface, L.
+    pub fn misfit(&self) -> f64 {
+        norm(&self.at_points.heights)
+    }
+
+    /// Bytes held on the heap beside the cloud and its sampling.
+    pub fn n_bytes(&self) -> usize {
+        self.patches.n_bytes() + self.at_points.n_bytes() + block_bytes(arc_payload::<Self>())
+    }
+
+    /// What is known at queries: that of a function with |∇u| = 1 that grows outward.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn serve(
+        &self,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<Served, NumericsError> {
+        observer.enter(Stage::Evaluate);
+        let are_points = *queries == *self.cloud;
+        let found;
+        let geometry = match are_points {
+            true => &self.at_points,
+            false => {
+                let mut own = self.patches.at(queries, false, true, observer)?;
+                self.turn_outward(queries, &mut own);
+                found = own;
+                &found
+            }
+        };
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let sign = match request.orientation {
+            Orientation::Outward => 1.0,
+            // Functions of a surface grow inward.
+            Orientation::Gradient => -1.0,
+        };
+        let verdict = |query: usize| {
+            let reason = self.reason(queries.point(query), geometry, query, request, are_points);
+            Verdict { sign, by: ServedBy::Local, reason }
+        };
+        Ok(Served {
+            dimension: d,
+            gradients: geometry.normals.clone(),
+            hessians: geometry.shapes.clone(),
+            verdicts: (0..m).into_par_iter().map(verdict).collect(),
+            levels: geometry.heights.iter().map(|height| 1.0 - height).collect(),
+            deviations: request.has_deviations.then(|| deviations(geometry, sign, d)),
+        })
+    }
+
+    fn reason(
+        &self,
+        x: &[f64],
+        geometry: &PatchGeometry,
+        query: usize,
+        request: &GeometryRequest,
+        is_point: bool,
+    ) -> Option<DegeneracyReason> {
+        if !geometry.is_known[query] {
+            return Some(DegeneracyReason::VanishingGradient);
+        }
+        if !is_point {
+            let nearest = self.sampling.neighbours().nearest(&self.cloud, x, 1);
+            let is_far = |found: usize, squared: f64| is_far(squared, self.sampling.spacing(found));
+            if nearest.first().is_none_or(|found| is_far(found.point, found.squared_distance)) {
+                return Some(DegeneracyReason::FarFromCloud);
+            }
+        }
+        let is_resolved = match request.checks_curvatures {
+            true => self.is_resolved(geometry, query),
+            false => geometry.normal_deviations[query] <= UNCERTAIN_NORMAL,
+        };
+        (!is_resolved).then_some(DegeneracyReason::UnderResolved)
+    }
+
+    /// Whether the curvatures are known well enough to be used.
+    fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
+        let d = self.cloud.dimension();
+        let Some(deviations) = &geometry.curvatures else { return false };
+        let (normal, shape) =
+            (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
+        let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
+        let largest = curvatures.iter().fold(FLAT / self.radius, |a: f64, k| a.max(k.abs()));
+        let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
+        deviations.iter().all(|deviation| RESOLVED_DEVIATIONS * deviation <= RESOLVED_FRACTION * largest)
+    }
+
+    /// Turns normals to the side of those of the points nearby.
+    fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
+        let d = self.cloud.dimension();
+        let mut found = Vec::new();
+        geometry.turn(|query, normal| {
+            self.sampling.neighbours().nearest_into(
+                &self.cloud,
+                queries.point(query),
+                SPACING_NEIGHBOURS,
+                &mut found,
+            );
+            let along: f64 = found
+                .iter()
+                .map(|found| {
+                    // Near a thin sheet the point on this side of it decides.
+                    let spacing = self.sampling.spacing(found.point);
+                    let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
+                    weight * dot(&self.at_points.normals[found.point * d..][..d], normal)
+                })
+                .sum();
+            if along < 0.0 { -1.0 } else { 1.0 }
+        });
+    }
+}
+
+/// Signs of the normals of patches: those of a coarse signature function, by whole regions.
+fn orient(
+    cloud: &Cloud,
+    sampling: &Sampling,
+    patches: &Patches,
+    geometry: &PatchGeometry,
+    given: Option<&Cloud>,
+    observer: &dyn Observer,
+) -> Result<Oriented, NumericsError> {
+    let (n, d) = (cloud.n_points(), cloud.dimension());
+    let outward = match given {
+        Some(given) => given.coordinates().to_vec(),
+        None => outward_directions(cloud, patches.noise(), observer)?,
+    };
+    let mut normals = geometry.normals.clone();
+    let mut has_sign = vec![false; n];
+    for (point, normal) in normals.chunks_exact_mut(d).enumerate() {
+        let direction = &outward[point * d..][..d];
+        let along = dot(normal, direction);
+        has_sign[point] = along.abs() > SAYS_SIGN * norm(direction);
+        if along < 0.0 {
+            normal.iter_mut().for_each(|c| *c = -*c);
+        }
+    }
+    let count = super::orientation::n_around(cloud);
+    let around = Neighbourhoods::of(cloud, sampling.neighbours(), cloud, count, observer)?;
+    let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
+    Ok(Oriented::of_directions(cloud, (&around, sampling.spacings()), directions, given.is_some()))
+}
+
+/// Deviations in the order of the curvatures for normals of this sign.
+fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
+    let empty = CurvatureDeviations { principal: Vec::new(), mean: Vec::new(), gaussian: Vec::new() };
+    let curvatures = geometry.curvatures.as_ref().unwrap_or(&empty);
+    let mut principal = curvatures.principal.clone();
+    if sign < 0.0 {
+        principal.chunks_exact_mut(d - 1).for_each(<[f64]>::reverse);
+    }
+    Deviations {
+        is_known: geometry.is_known.clone(),
+        normal: geometry.normal_deviations.clone(),
+        principal,
+        mean: curvatures.mean.clone(),
+        gaussian: curvatures.gaussian.clone(),
+    }
+}
+
+impl PatchGeometry {
+    /// Multiplies normals and what changes sign with them.
+    fn turn(&mut self, mut sign: impl FnMut(usize, &[f64]) -> f64) {
+        let m = self.is_known.len();
+        let d = self.normals.len() / m.max(1);
+        for query in 0..m {
+            if !self.is_known[query] || sign(query, &self.normals[query * d..][..d]) > 0.0 {
+                continue;
+            }
+            self.normals[query * d..][..d].iter_mut().for_each(|c| *c = -*c);
+            self.shapes[query * d * d..][..d * d].iter_mut().for_each(|c| *c = -*c);
+            self.heights[query] = -self.heights[query];
+            if let Some(curvatures) = &mut self.curvatures {
+                curvatures.principal[query * (d - 1)..][..d - 1].reverse();
+            }
+        }
+    }
+
+    /// Bytes held on the heap.
+    fn n_bytes(&self) -> usize {
+        let lists = [&self.normals, &self.shapes, &self.heights, &self.normal_deviations];
+        let of_curvatures =
+            |c: &CurvatureDeviations| vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian);
+        lists.into_iter().map(vec_bytes).sum::<usize>()
+            + vec_bytes(&self.is_known)
+            + vec_bytes(&self.is_at_rim)
+            + self.curvatures.as_ref().map_or(0, of_curvatures)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::surface::Surface;
+    use crate::numerics::surface::geometry::Geometry;
+    use crate::numerics::testing::fibonacci_sphere;
+
+    fn geometry(cloud: Cloud) -> Geometry {
+        let cloud = Arc::new(cloud);
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        let surface = Surface::from(LocalSurface::of(cloud.clone(), sampling, None, &Unobserved).unwrap());
+        let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
+        Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap()
+    }
+
+    #[test]
+    fn surfaces_that_leave_nothing_to_regress_have_answers_everywhere() {
+        // On a fine sphere the closed form leaves less than rounding; on a plane nothing at all.
+        let sphere = geometry(fibonacci_sphere(20_000));
+        assert!(sphere.is_null().iter().all(|is_null| !is_null));
+        let curvatures = sphere.curvatures(&Unobserved).unwrap();
+        assert!(curvatures.principal.iter().all(|kappa| (kappa - 1.0).abs() < 1e-5));
+        let grid = (0..400).flat_map(|i| [f64::from(i % 20), f64::from(i / 20), 3.0]).collect();
+        let plane = geometry(Cloud::new(grid, 3).unwrap());
+        assert!(plane.is_null().iter().all(|is_null| !is_null));
+        assert!(plane.normals().chunks_exact(3).all(|normal| normal[2].abs() > 1.0 - 1e-12));
+        assert!(plane.curvatures(&Unobserved).unwrap().principal.iter().all(|kappa| kappa.abs() < 1e-9));
+    }
+}

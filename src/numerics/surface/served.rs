@@ -1,0 +1,78 @@
+//! What is known of a surface at queries, whichever model says it.
+
+use super::degeneracy::DegeneracyReason;
+
+/// The model that serves a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServedBy {
+    Signature,
+    Offset,
+    Local,
+}
+
+/// Standard deviations at m queries, in flat arrays, in the order of what they belong to; zero at null queries.
+#[derive(Debug, Clone)]
+pub struct Deviations {
+    /// Whether there are any, `[m]`.
+    pub is_known: Vec<bool>,
+    /// Of the angle of the normal, `[m]`, radians.
+    pub normal: Vec<f64>,
+    /// Of the principal curvatures, `[m, d−1]`, 1/L.
+    pub principal: Vec<f64>,
+    /// `[m]`, 1/L.
+    pub mean: Vec<f64>,
+    /// `[m]`, 1/L^{d−1}.
+    pub gaussian: Vec<f64>,
+}
+
+/// What is known of the surface at m queries, in flat arrays.
+pub(crate) struct Served {
+    pub(super) dimension: usize,
+    /// ∇ of the function that serves each query, `[m, d]`.
+    pub(super) gradients: Vec<f64>,
+    /// Its Hessian, `[m, d, d]`.
+    pub(super) hessians: Vec<f64>,
+    pub(super) verdicts: Vec<Verdict>,
+    /// u, `[m]`.
+    pub(super) levels: Vec<f64>,
+    pub(super) deviations: Option<Deviations>,
+}
+
+/// What is said of a query beside its numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Verdict {
+    /// ν against ∇u: +1 or −1.
+    pub sign: f64,
+    pub by: ServedBy,
+    pub reason: Option<DegeneracyReason>,
+}
+
+impl Verdict {
+    pub(crate) fn is_null(self) -> bool {
+        self.reason.is_some_and(DegeneracyReason::is_null)
+    }
+}
+
+impl Served {
+    pub(crate) fn gradient(&self, query: usize) -> &[f64] {
+        &self.gradients[query * self.dimension..][..self.dimension]
+    }
+
+    /// Symmetric `[d, d]`.
+    pub(crate) fn hessian(&self, query: usize) -> &[f64] {
+        let n_entries = self.dimension * self.dimension;
+        &self.hessians[query * n_entries..][..n_entries]
+    }
+
+    pub(crate) fn verdict(&self, query: usize) -> Verdict {
+        self.verdicts[query]
+    }
+
+    pub(crate) fn deviations(&self) -> Option<&Deviations> {
+        self.deviations.as_ref()
+    }
+
+    pub(crate) fn levels(&self) -> &[f64] {
+        &self.levels
+    }
+}

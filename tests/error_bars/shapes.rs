@@ -1,0 +1,122 @@
+//! Surfaces f = 0 of radius about 1, with exact normals and curvatures.
+
+use crate::jet::Jet;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    Sphere,
+    Torus,
+    Ellipsoid,
+    /// Dupin's ring cyclide, its tube three times as thick on one side as on the other.
+    Cyclide,
+    Superellipsoid,
+    /// A level of four bells of Gauss: a rounded tetrapod.
+    Blob,
+}
+
+pub const SHAPES: [Shape; 6] =
+    [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Superellipsoid, Shape::Blob];
+
+/// What is to be found at a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Truth {
+    /// Outward.
+    pub normal: [f64; 3],
+    /// Ascending for that normal; a unit sphere has 1.
+    pub curvatures: [f64; 2],
+}
+
+impl Shape {
+    /// f, which grows outward.
+    pub fn level(self, x: [f64; 3]) -> Jet {
+        let [x, y, z] = Jet::coordinates(x);
+        match self {
+            Self::Sphere => sum_of_squares(x, y, z) + -1.0,
+            Self::Torus => {
+                let across = (x.squared() + y.squared()).sqrt() + -0.8;
+                across.squared() + z.squared() + -0.04
+            }
+            Self::Ellipsoid => sum_of_squares(x, 1.0 / 0.7 * y, 2.5 * z) + -1.0,
+            Self::Cyclide => cyclide(1.6 * x, 1.6 * y, 1.6 * z),
+            Self::Superellipsoid => {
+                let fourth = |x: Jet| x.squared().squared();
+                fourth(x) + fourth(1.25 * y) + fourth(1.0 / 0.6 * z) + -0.5
+            }
+            Self::Blob => {
+                let bells =
+                    BELLS.map(|[a, b, c]| (-1.0 / 0.12 * sum_of_squares(x + -a, y + -b, z + -c)).exp());
+                Jet::constant(0.5) - bells.into_iter().fold(Jet::constant(0.0), |sum, bell| sum + bell)
+            }
+        }
+    }
+
+    /// Half the sides of a box about the origin that holds the surface.
+    pub fn half_sides(self) -> [f64; 3] {
+        match self {
+            Self::Sphere => [1.01; 3],
+            Self::Torus => [1.01, 1.01, 0.21],
+            Self::Ellipsoid => [1.01, 0.71, 0.41],
+            Self::Cyclide => [1.1, 1.0, 0.6],
+            Self::Superellipsoid => [1.0, 0.8, 0.6],
+            Self::Blob => [1.0; 3],
+        }
+    }
+
+    /// The point of the surface on the way down f from x, by Newton's method.
+    pub fn project(self, mut x: [f64; 3]) -> [f64; 3] {
+        for _ in 0..8 {
+            let f = self.level(x);
+            let step = f.value / dot(f.gradient, f.gradient);
+            (0..3).for_each(|c| x[c] -= step * f.gradient[c]);
+        }
+        x
+    }
+
+    pub fn truth(self, x: [f64; 3]) -> Truth {
+        let f = self.level(x);
+        let length = dot(f.gradient, f.gradient).sqrt();
+        let normal = f.gradient.map(|g| g / length);
+        Truth {
+            normal,
+            curvatures: principal_curvatures(&f.hessian.map(|row| row.map(|h| h / length)), normal),
+        }
+    }
+}
+
+const BELLS: [[f64; 3]; 4] = [[0.45, 0.0, 0.0], [-0.3, 0.35, 0.1], [-0.2, -0.4, -0.1], [0.1, 0.1, 0.45]];
+
+/// `(|x|² + a² − c² − r²)² = 4(ax − cr)² + 4(a² − c²)y²`.
+fn cyclide(x: Jet, y: Jet, z: Jet) -> Jet {
+    let (a, c, r): (f64, f64, f64) = (1.0, 0.3, 0.45);
+    let b2 = a * a - c * c;
+    let left = sum_of_squares(x, y, z) + (b2 - r * r);
+    left.squared() - 4.0 * ((a * x + -c * r).squared() + b2 * y.squared())
+}
+
+fn sum_of_squares(x: Jet, y: Jet, z: Jet) -> Jet {
+    x.squared() + y.squared() + z.squared()
+}
+
+/// Ascending eigenvalues of a symmetric form on the plane across a unit normal.
+pub fn principal_curvatures(form: &[[f64; 3]; 3], normal: [f64; 3]) -> [f64; 2] {
+    let smallest = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap();
+    let mut along = [0.0; 3];
+    along[smallest] = 1.0;
+    let part = dot(along, normal);
+    (0..3).for_each(|c| along[c] -= part * normal[c]);
+    let length = dot(along, along).sqrt();
+    let u = along.map(|a| a / length);
+    let v = cross(normal, u);
+    let of = |u: [f64; 3], v: [f64; 3]| (0..3).map(|i| u[i] * dot(form[i], v)).sum::<f64>();
+    let (mean, half, mixed) = (0.5 * (of(u, u) + of(v, v)), 0.5 * (of(u, u) - of(v, v)), of(u, v));
+    let apart = half.hypot(mixed);
+    [mean - apart, mean + apart]
+}
+
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

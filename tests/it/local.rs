@@ -1,0 +1,156 @@
+//! Local regressions over sockets: surfaces, deviations, sparse operators, and what they refuse.
+
+use std::f64::consts::PI;
+
+use serde_json::{Value, json};
+
+use crate::support::{Server, fibonacci_sphere, numbers};
+
+/// One curvature of 1 within so many of its deviations at every query.
+fn check_unit_curvatures(answer: &Value, tolerance: f64) {
+    let (found, deviations) =
+        (numbers(&answer["mean_curvatures"]), numbers(&answer["mean_curvature_deviations"]));
+    assert_eq!(found.len(), deviations.len());
+    for (curvature, deviation) in found.iter().zip(&deviations) {
+        assert!((curvature - 1.0).abs() <= tolerance, "{curvature}");
+        assert!(*deviation > 0.0 && *deviation < 0.1, "{deviation}");
+    }
+}
+
+#[tokio::test]
+async fn deviations_are_asked_for_by_name() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(500);
+    let body = json!({"cloud": {"points": points}, "include": ["deviations"]});
+    let answer = server.post("/v1/curvatures", &body).await.expect_ok();
+    // The spacing is 0.16; quadrics alone would be off by a per cent.
+    check_unit_curvatures(&answer, 1e-2);
+    assert_eq!(numbers(&answer["principal_curvature_deviations"]).len(), 1000);
+    assert_eq!(numbers(&answer["gaussian_curvature_deviations"]).len(), 500);
+    assert_eq!(answer["diagnostics"]["solver"], "local");
+    assert_eq!(answer["surfaces"][0], "local");
+    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("deviations"));
+    assert!(answer["diagnostics"].get("rank").is_none());
+    let without = server.post("/v1/curvatures", &json!({"cloud": {"points": points}})).await.expect_ok();
+    assert!(without.get("mean_curvature_deviations").is_none());
+    assert_eq!(without["diagnostics"]["solver"], "dense");
+}
+
+#[tokio::test]
+async fn a_signature_function_has_deviations_too() {
+    let server = Server::start().await;
+    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "include": ["deviations"],
+        "kernel": {"family": "laplace", "length_scale": 1.0, "epsilon": 1.0}, "alpha": 0.0});
+    for path in ["/v1/normals", "/v1/curvatures"] {
+        let answer = server.post(path, &body).await.expect_ok();
+        assert_eq!(answer["diagnostics"]["solver"], "dense");
+        assert!(numbers(&answer["normal_deviations"]).iter().all(|deviation| *deviation < 0.05));
+    }
+}
+
+#[tokio::test]
+async fn local_normals_point_outward_also_away_from_the_points() {
+    let server = Server::start().await;
+    let queries = [[0.0, 0.0, 1.01], [0.6, 0.8, 0.0], [0.0, -0.99, 0.0], [9.0, 0.0, 0.0]];
+    let body = json!({"cloud": {"points": fibonacci_sphere(400)}, "surface": "local", "queries": queries});
+    let answer = server.post("/v1/normals", &body).await.expect_ok();
+    for (query, normal) in queries.iter().zip(answer["normals"].as_array().unwrap()).take(3) {
+        let cosine: f64 = query.iter().zip(numbers(normal)).map(|(a, b)| a * b).sum();
+        assert!(cosine > 0.985, "{normal}");
+    }
+    assert_eq!(answer["degenerate"][0]["reason"], "far_from_cloud");
+    // 1 minus the height above the surface.
+    let levels = numbers(&answer["levels"]);
+    assert!((levels[0] - 0.99).abs() < 1e-3 && (levels[2] - 1.01).abs() < 1e-3, "{levels:?}");
+    let inward = json!({"orientation": "gradient"});
+    let body = json!({"cloud": body["cloud"], "surface": "local", "queries": queries, "orientation": inward["orientation"]});
+    let turned = server.post("/v1/normals", &body).await.expect_ok();
+    assert!((numbers(&turned["normals"])[2] + numbers(&answer["normals"])[2]).abs() < 1e-12);
+}
+
+#[tokio::test]
+async fn beyond_the_dense_limit_auto_regresses_locally() {
+    let server = Server::with_flags(&["--max-dense-points", "300"]).await;
+    let points = fibonacci_sphere(400);
+    let answer = server.post("/v1/curvatures", &json!({"cloud": {"points": points}})).await.expect_ok();
+    assert_eq!(answer["diagnostics"]["solver"], "local");
+    assert!(answer["diagnostics"]["solver_reason"].as_str().unwrap().contains("more points"));
+    let values: Vec<f64> = points.iter().map(|x| x[2]).collect();
+    let body = json!({"cloud": {"points": points}, "values": values});
+    // Δz = −2z on the sphere.
+    let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
+    for (found, z) in numbers(&answer["values"]).iter().zip(&values) {
+        assert!((found + 2.0 * z).abs() < 2e-2, "{found} at {z}");
+    }
+    let answer = server.post("/v1/surface-gradient", &body).await.expect_ok();
+    for (gradient, x) in answer["gradients"].as_array().unwrap().iter().zip(&points) {
+        let exact = [-x[2] * x[0], -x[2] * x[1], 1.0 - x[2] * x[2]];
+        assert!(
+            numbers(gradient).iter().zip(exact).all(|(a, b)| (a - b).abs() < 5e-3),
+            "{gradient} at {x:?}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn sparse_matrices_apply_as_the_operators_do() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(600);
+    let body = json!({"cloud": {"points": points}, "solver": "local"});
+    let matrix = server.post("/v1/laplace-beltrami/sparse-matrix", &body).await.expect_ok();
+    assert_eq!(numbers(&matrix["shape"]), [600.0, 600.0]);
+    let [indptr, indices, data] = ["indptr", "indices", "data"].map(|name| numbers(&matrix[name]));
+    assert_eq!((indptr.len(), indptr[600] as usize, data.len()), (601, indices.len(), indices.len()));
+    let values: Vec<f64> = points.iter().map(|x| (PI * x[2]).sin()).collect();
+    let applied = json!({"cloud": {"points": points}, "solver": "local", "values": values});
+    let applied = numbers(&server.post("/v1/laplace-beltrami", &applied).await.expect_ok()["values"]);
+    for (row, expected) in applied.iter().enumerate() {
+        let range = indptr[row] as usize..indptr[row + 1] as usize;
+        let columns = &indices[range.clone()];
+        assert!(columns.windows(2).all(|pair| pair[0] < pair[1]));
+        let found: f64 =
+            data[range].iter().zip(columns).map(|(w, &column)| w * values[column as usize]).sum();
+        assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
+    }
+    let gradient = server.post("/v1/surface-gradient/sparse-matrix", &body).await.expect_ok();
+    assert_eq!(numbers(&gradient["shape"]), [3.0, 600.0, 600.0]);
+    assert_eq!(gradient["data"].as_array().unwrap().len(), 3);
+}
+
+#[tokio::test]
+async fn what_local_regressions_lack_is_refused_by_name() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(60);
+    let values = vec![0.0; 60];
+    let cloud = json!({"points": points});
+    let kernel = json!({"family": "gauss", "length_scale": 1.0});
+    let cases = [
+        ("/v1/curvatures", json!({"cloud": cloud, "surface": "local", "alpha": 0.1}), "/alpha"),
+        ("/v1/normals", json!({"cloud": cloud, "solver": "local", "kernel": kernel}), "/kernel"),
+        ("/v1/laplace-beltrami/matrix", json!({"cloud": cloud, "solver": "local"}), "/solver"),
+        ("/v1/surface-gradient/matrix", json!({"cloud": cloud, "solver": "local"}), "/solver"),
+        (
+            "/v1/curvatures",
+            json!({"cloud": {"points": vec![[0.0; 5], [1.0; 5]]}, "surface": "local"}),
+            "/surface",
+        ),
+    ];
+    for (path, body, pointer) in cases {
+        let problem = server.post(path, &body).await.expect_problem(422, "unsupported-by-solver");
+        assert_eq!(problem["errors"][0]["pointer"], pointer, "{path}");
+    }
+    let body = json!({"cloud": cloud, "values": values, "solver": "local"});
+    assert_eq!(numbers(&server.post("/v1/laplace-beltrami", &body).await.expect_ok()["values"]).len(), 60);
+}
+
+#[tokio::test]
+async fn eight_equal_requests_make_one_surface() {
+    let server = Server::start().await;
+    let body =
+        json!({"cloud": {"points": fibonacci_sphere(2000)}, "surface": "local", "include": ["deviations"]});
+    let asked = (0..8).map(|_| server.post("/v1/curvatures", &body));
+    let answers: Vec<Value> =
+        futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
+    let first = numbers(&answers[0]["mean_curvatures"]);
+    assert!(answers.iter().all(|answer| numbers(&answer["mean_curvatures"]) == first));
+}

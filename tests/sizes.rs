@@ -1,0 +1,189 @@
+//! What a large cloud takes on its way in, and a large answer on its way out, as multiples of the bytes of their arrays.
+//!
+//! A process of its own, for the allocator that counts, and one test, since its count is everybody's. What is counted here for
+//! 100,000 points holds for a million: everything is in proportion.
+
+use std::io::Write;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::response::Response;
+use gramian::http::compute::Compute;
+use gramian::http::problem::Problem;
+use gramian::http::wire::negotiation::{Coding, Format, Wanted};
+use gramian::http::wire::read::body::RequestBody;
+use gramian::http::wire::read::limits::ParseContext;
+use gramian::http::wire::read::members::present_unless_empty;
+use gramian::http::wire::read::points::Points;
+use gramian::http::wire::write::answer::{Answer, Member, Parts};
+use gramian::http::wire::write::array::Array;
+use gramian::http::wire::write::encode::Encoded;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::store::Owner;
+use gramian::store::budget::Budget;
+use gramian::store::clouds::CloudStore;
+use http_body_util::BodyExt;
+use peak_alloc::PeakAlloc;
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use serde::Deserialize;
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+const N: usize = 100_000;
+const OWNER: Owner = Owner(0);
+
+/// What any request takes, however small.
+const BASE_BYTES: usize = 1 << 20;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Request {
+    points: Points,
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    normals: Option<Points>,
+}
+
+/// Bytes at the peak beyond those at the beginning.
+fn peak_of<T>(job: impl FnOnce() -> T) -> (T, usize) {
+    let before = ALLOCATOR.current_usage();
+    ALLOCATOR.reset_peak_usage();
+    let result = job();
+    (result, ALLOCATOR.peak_usage().saturating_sub(before))
+}
+
+/// Numbers with all their digits.
+fn numbers(n: usize) -> Vec<f64> {
+    (0..n).map(|i| (i as f64 * 0.618_033_988_749_894_9).fract() - 0.5).collect()
+}
+
+fn bytes(numbers: &[f64]) -> Vec<u8> {
+    numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+fn json(points: &[f64], normals: bool) -> Vec<u8> {
+    let rows: Vec<&[f64]> = points.chunks(3).collect();
+    let rows = serde_json::to_string(&rows).unwrap();
+    let normals = if normals { format!(",\"normals\":{rows}") } else { String::new() };
+    format!("{{\"points\":{rows}{normals}}}").into_bytes()
+}
+
+fn npy(points: &[f64]) -> Vec<u8> {
+    let header =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3), }}\n", points.len() / 3);
+    let length = (header.len() as u16).to_le_bytes();
+    [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes(points)].concat()
+}
+
+fn safetensors(points: &[f64]) -> Vec<u8> {
+    let data = bytes(points);
+    let view = || TensorView::new(Dtype::F64, vec![points.len() / 3, 3], &data).unwrap();
+    safetensors::serialize([("points", view()), ("normals", view())], None).unwrap()
+}
+
+fn ply(format: &str, kind: &str, n: usize, data: &[u8]) -> Vec<u8> {
+    let names = ["x", "y", "z", "nx", "ny", "nz"];
+    let properties: String = names.iter().map(|name| format!("property {kind} {name}\n")).collect();
+    let head = format!("ply\nformat {format} 1.0\nelement vertex {n}\n{properties}end_header\n");
+    [head.as_bytes(), data].concat()
+}
+
+fn ply_in_text(points: &[f64]) -> Vec<u8> {
+    let mut text = Vec::new();
+    for x in points.chunks(3) {
+        writeln!(text, "{} {} {} {} {} {}", x[0], x[1], x[2], x[0], x[1], x[2]).unwrap();
+    }
+    ply("ascii", "float", points.len() / 3, &text)
+}
+
+fn ply_in_binary(points: &[f64], is_double: bool) -> Vec<u8> {
+    let of = |x: &[f64]| -> Vec<u8> {
+        let single = || x.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
+        if is_double { bytes(x) } else { single() }
+    };
+    let data: Vec<u8> = points.chunks(3).flat_map(|x| [of(x), of(x)].concat()).collect();
+    ply("binary_little_endian", if is_double { "double" } else { "float" }, points.len() / 3, &data)
+}
+
+/// From the body to the cloud in the store, and what of it is kept.
+fn register(format: Format, body: Vec<u8>) -> usize {
+    let limit = body.len();
+    let request: Request = RequestBody::new(format, Coding::Identity, body, limit)
+        .parse(&ParseContext::UNLIMITED, |_| Ok(()))
+        .unwrap_or_else(|problem| panic!("{format:?}: {problem:?}"));
+    let cloud = |points: Points| Cloud::new(points.coordinates, points.dimension).unwrap();
+    let store = CloudStore::<Problem>::new(usize::MAX);
+    let (stored, _) = store.register(OWNER, cloud(request.points), request.normals.map(cloud));
+    assert_eq!(stored.cloud.n_points(), N);
+    stored.n_bytes()
+}
+
+struct Numbers(Array);
+
+impl Answer for Numbers {
+    fn into_parts(self) -> Result<Parts, Problem> {
+        let mut parts = Parts::default();
+        self.0.add_to("principal_directions", &mut parts)?;
+        Ok(parts)
+    }
+}
+
+/// Bytes of an answer, read piece by piece.
+async fn read(response: Response) -> usize {
+    let (mut body, mut n_bytes) = (response.into_body(), 0);
+    while let Some(frame) = body.frame().await {
+        n_bytes += frame.unwrap().into_data().map_or(0, |data| data.len());
+    }
+    n_bytes
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clouds_come_in_and_answers_go_out_within_three_times_their_arrays() {
+    let points = numbers(3 * N);
+    let one = 8 * points.len();
+    for (name, format, body, n_arrays, is_binary) in [
+        ("JSON", Format::Json, json(&points, false), one, false),
+        ("JSON with normals", Format::Json, json(&points, true), 2 * one, false),
+        ("npy", Format::Npy, npy(&points), one, true),
+        ("safetensors with normals", Format::Safetensors, safetensors(&points), 2 * one, true),
+        ("PLY in text with normals", Format::Ply, ply_in_text(&points), 2 * one, false),
+        ("PLY with normals", Format::Ply, ply_in_binary(&points, true), 2 * one, true),
+        ("PLY of 32 bits with normals", Format::Ply, ply_in_binary(&points, false), 2 * one, true),
+    ] {
+        let n_body = body.len();
+        let (n_kept, beside) = peak_of(|| register(format, body));
+        let ratio = |n: usize| n as f64 / n_arrays as f64;
+        let (beside, with) = (ratio(beside), ratio(beside + n_body));
+        println!(
+            "{name}: body {:.2}, beside it {beside:.2}, with it {with:.2}, kept {:.2}",
+            ratio(n_body),
+            ratio(n_kept)
+        );
+        let counted = if is_binary { with } else { beside };
+        assert!(counted <= 3.0 + ratio(BASE_BYTES) && beside < 1.5 + ratio(BASE_BYTES), "{name}: {counted}");
+    }
+    let compute = Arc::new(Compute::new(2, 8, 1, Duration::from_secs(600)).unwrap());
+    let budget = Budget::new(usize::MAX / 4, 1);
+    let one = 8 * 20 * N;
+    for (format, coding) in [
+        (Format::Json, Coding::Identity),
+        (Format::Json, Coding::Zstd),
+        (Format::Safetensors, Coding::Identity),
+        (Format::Safetensors, Coding::Zstd),
+    ] {
+        let before = ALLOCATOR.current_usage();
+        ALLOCATOR.reset_peak_usage();
+        let answer = Numbers(Array::new(numbers(20 * N), &[N, 20]));
+        let encoded = Encoded::of(answer, Wanted { format, coding }).ok().unwrap();
+        let memory = budget.try_reserve(OWNER, encoded.n_bytes()).unwrap();
+        let n_sent = read(encoded.into_response(&compute, memory)).await;
+        let ratio = |n: usize| n as f64 / one as f64;
+        let peak = ratio(ALLOCATOR.peak_usage().saturating_sub(before));
+        println!(
+            "{format:?} {coding:?}: sent {:.2}, with the arrays themselves {peak:.2} at the peak",
+            ratio(n_sent)
+        );
+        assert!(n_sent > one / 3 && peak <= 3.0, "{format:?} {coding:?}: {peak}");
+    }
+}
