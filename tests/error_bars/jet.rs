@@ -75,6 +75,7 @@ impl Sub for Jet {
 impl Mul for Jet {
     type Output = Self;
 
+    #[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule has sums")]
     fn mul(self, other: Self) -> Self {
         let (g, h) = (self.gradient, other.gradient);
         Self {

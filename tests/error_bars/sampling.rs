@@ -44,7 +44,8 @@ fn drawn(shape: Shape, n: usize, share: &dyn Fn(&[f64; 3]) -> f64, random: &mut 
         let f = shape.level(x);
         let slope = f.gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
         // Not a number where f has no gradient.
-        if !(f.value.abs() < SHELL * slope) {
+        let is_near = f.value.abs() < SHELL * slope;
+        if !is_near {
             continue;
         }
         let y = shape.project(x);

@@ -136,6 +136,7 @@ fn answers_do_not_depend_on_threads_or_company() {
     let cloud = Arc::new(noisy(&random_torus(700, &mut Random(12)), 0.003, &mut Random(13)));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        #[expect(clippy::disallowed_methods, reason = "a test waits for its own pool")]
         pool.install(|| {
             let patches: Patches = patches(&cloud);
             let all = patches.at(&cloud, true, true, &Unobserved).unwrap();

@@ -243,22 +243,16 @@ impl<const D: usize, const P: usize> Grown<D, P> {
     /// Second derivatives as a matrix, in the upper left part.
     fn hessian(&self) -> [[f64; D]; D] {
         let mut matrix = [[0.0; D]; D];
-        let mut next = D;
-        for a in 0..D - 1 {
-            for b in a..D - 1 {
-                (matrix[a][b], matrix[b][a]) = (self.quadric[next], self.quadric[next]);
-                next += 1;
-            }
+        for (next, (a, b)) in second_derivatives(D - 1).enumerate() {
+            (matrix[a][b], matrix[b][a]) = (self.quadric[D + next], self.quadric[D + next]);
         }
         matrix
     }
 
     fn turn(&mut self) {
         let mut normal = self.frame[D - 1];
-        for a in 0..D - 1 {
-            for c in 0..D {
-                normal[c] -= self.quadric[1 + a] * self.frame[a][c];
-            }
+        for (slope, tangent) in self.quadric[1..D].iter().zip(&self.frame) {
+            normal.iter_mut().zip(tangent).for_each(|(n, t)| *n -= slope * t);
         }
         let length = norm(&normal);
         normal.iter_mut().for_each(|n| *n /= length);
@@ -342,8 +336,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
             }
             batch.set_coordinate(D - 1, j, lane, scratch.heights[j]);
             batch.set_entailed(j, lane, scratch.raw[j] - scratch.heights[j]);
-            for term in D..P {
-                batch.set_product(term - D, j, lane, terms[term]);
+            for (term, product) in terms[D..].iter().enumerate() {
+                batch.set_product(term, j, lane, *product);
             }
             batch.set_weight(j, lane, 1.0 / support.count(nearest[j].point));
         }
@@ -389,6 +383,11 @@ fn beyond_second_order<const D: usize, const P: usize>(shape: &[[f64; D]; D], te
     0.5 * (form + in_form) * share + 2.0 * slope * mixed + 0.0 * bend * form * in_twice
 }
 
+/// Pairs of tangential axes of the second derivatives, in order.
+fn second_derivatives(k: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..k).flat_map(move |a| (a..k).map(move |b| (a, b)))
+}
+
 /// Adds `weight · terms termsᵀ` to an upper triangle.
 fn add_products<const P: usize>(matrix: &mut [[f64; P]; P], terms: &[f64; P], weight: f64) {
     for i in 0..P {
@@ -404,14 +403,14 @@ fn add_products<const P: usize>(matrix: &mut [[f64; P]; P], terms: &[f64; P], we
 fn factorize<const P: usize>(a: &mut [[f64; P]; P]) -> Option<()> {
     for i in 0..P {
         let diagonal = a[i][i];
-        for m in 0..i {
-            let factor = a[m][i];
-            for l in i..P {
-                a[i][l] -= factor * a[m][l];
-            }
+        let (above, rest) = a.split_at_mut(i);
+        for row in above {
+            let factor = row[i];
+            rest[0][i..].iter_mut().zip(&row[i..]).for_each(|(x, r)| *x -= factor * r);
         }
         // Not finite is not greater either.
-        if !(a[i][i] > SINGULAR * diagonal) {
+        let is_determined = a[i][i] > SINGULAR * diagonal;
+        if !is_determined {
             return None;
         }
         let inverse = 1.0 / a[i][i].sqrt();

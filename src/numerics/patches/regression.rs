@@ -447,8 +447,8 @@ impl<S: Simd> Factored<'_, S> {
     fn tile<const R: usize>(&mut self, i: usize, column: usize) {
         let zero = Pack::<S, 1>::splat(self.simd, 0.0);
         let mut rows = [0; R];
-        for r in 0..R {
-            rows[r] = self.row(i + r);
+        for (r, row) in rows.iter_mut().enumerate() {
+            *row = self.row(i + r);
         }
         let columns = [self.row(column), self.row(column + 1)];
         let mut sums = [[zero; COLUMNS]; R];
@@ -499,8 +499,8 @@ impl<S: Simd> Factored<'_, S> {
         let mut sums = [Pack::<S, 1>::splat(self.simd, 0.0); 4];
         let mut l = 0;
         while l + 4 <= self.n {
-            for s in 0..4 {
-                sums[s] = self.at(a + l + s).mul_add(self.at(b + l + s), sums[s]);
+            for (s, sum) in sums.iter_mut().enumerate() {
+                *sum = self.at(a + l + s).mul_add(self.at(b + l + s), *sum);
             }
             l += 4;
         }
@@ -652,7 +652,9 @@ impl Doubt {
         let scale = heights / freedom;
         let prior = DOUBT * DOUBT;
         let share = scale + prior * entailed;
-        if !(share > 0.0) {
+        // Not a number is not positive either.
+        let is_informed = share > 0.0;
+        if !is_informed {
             return Self { mean: 0.0, variance: prior, quadratic: heights, log_penalty: 0.0 };
         }
         let mean = prior * mixed / share;

@@ -323,8 +323,8 @@ impl<S: Simd> Factored<'_, S> {
         for c in 0..COLUMNS {
             let above = triangle(column + c) + column;
             let mut entry = self.at(first + c) - sums[c];
-            for b in 0..c {
-                entry = entry - entries[b] * self.at(above + b);
+            for (b, known) in entries.iter().enumerate().take(c) {
+                entry = entry - *known * self.at(above + b);
             }
             if c == pivot {
                 self.inverse_root(entry).write(self.matrix, first + c);
@@ -369,8 +369,8 @@ impl<S: Simd> Factored<'_, S> {
         let mut sums = [self.splat(0.0); 4];
         // n is a multiple of 4.
         for l in (0..self.n).step_by(4) {
-            for s in 0..4 {
-                sums[s] = self.at(a + l + s).mul_add(self.at(b + l + s), sums[s]);
+            for (s, sum) in sums.iter_mut().enumerate() {
+                *sum = self.at(a + l + s).mul_add(self.at(b + l + s), *sum);
             }
         }
         (sums[0] + sums[1]) + (sums[2] + sums[3])

@@ -42,7 +42,7 @@ pub struct SignatureSurface {
     is_too_rough: bool,
     radius: f64,
     left_out_misses: OnceLock<Option<Vec<f64>>>,
-    patches: OnceLock<Patches>,
+    patches: OnceLock<Arc<Patches>>,
 }
 
 impl SignatureSurface {
@@ -150,14 +150,15 @@ impl SignatureSurface {
     ///
     /// # Errors
     /// Those of [`Patches::of`].
-    fn patches(&self, observer: &dyn Observer) -> Result<&Patches, NumericsError> {
+    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>, NumericsError> {
         if let Some(patches) = self.patches.get() {
-            return Ok(patches);
+            return Ok(patches.clone());
         }
         // Outside the cell, as above.
         let cloud = self.signature.function().solver.cloud().clone();
-        let made = Patches::of(cloud, self.sampling.clone(), observer)?;
-        Ok(self.patches.get_or_init(|| made))
+        let made = Arc::new(Patches::of(cloud, self.sampling.clone(), observer)?);
+        let _ = self.patches.set(made.clone());
+        Ok(self.patches.get().unwrap_or(&made).clone())
     }
 
     fn compute_left_out_misses(&self) -> Option<Vec<f64>> {
