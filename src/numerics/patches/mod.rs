@@ -1,9 +1,9 @@
 //! Local regression: a surface as heights over a tangent plane at every query, kriged from the nearest points.
 //!
 //! The surface around a query is a height over its tangent plane: a quadric, what its curvature entails beyond second order, a Gaussian
-//! process and noise ([`regression`]). Hyperparameters come from the likelihood pooled over a sample of neighbourhoods
-//! ([`pooled`]), and so does the size of the neighbourhoods, which grows with the noise ([`means`]). The posterior gives normal and
-//! curvatures with their deviations ([`estimate`]). Everything is local: work and memory are linear in points and queries.
+//! process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample of neighbourhoods
+//! (`pooled`), and so does the size of the neighbourhoods, which grows with the noise (`means`). The posterior gives normal and
+//! curvatures with their deviations (`estimate`). Everything is local: work and memory are linear in points and queries.
 
 mod estimate;
 mod means;
