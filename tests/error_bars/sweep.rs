@@ -96,7 +96,7 @@ impl Row {
         let error = larger(off) / larger(truth.curvatures);
         self.angles.push(angle);
         self.errors.push(error);
-        if 3.0 * bars[2].max(bars[3]) > 0.5 * larger(curvatures) {
+        if 4.0 * bars[2].max(bars[3]) > 0.5 * larger(curvatures) {
             self.n_flagged += 1;
         } else if error > 0.5 {
             self.n_off += 1;

@@ -8,11 +8,12 @@ use crate::numerics::kernel::{Family, Kernel};
 /// Gauss's kernel farther (docs/error-bars.md).
 const ORDER: u8 = 4;
 
-/// Length scales, in units of the radius of a neighbourhood.
-const LENGTH_SCALES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// ℓ in units of the radius of a neighbourhood. Its size follows the curvature, so that this is one for all scales; shorter ones take noise
+/// that neighbours share for shape, longer ones promise more than they keep (docs/error-bars.md).
+const LENGTH_SCALE: f64 = 2.0;
 
 /// Variances of the noise over that of the process.
-const NOISES: [f64; 9] = [0.0, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
+const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 
 /// Share of the neighbourhoods below which a model is left out, and models that are kept at most.
 const LEAST_SHARE: f64 = 0.01;
@@ -34,8 +35,8 @@ pub(crate) struct Weighted {
 /// None: the parameters are legal.
 pub(crate) fn candidates(n_trend: usize) -> Result<Vec<Model>, NumericsError> {
     let kernel = Kernel::new(Family::Matern { order: ORDER }, 1.0, 1.0)?;
-    let of = |length_scale: f64| NOISES.map(|noise| Model { kernel, length_scale, noise, n_trend });
-    Ok(LENGTH_SCALES.into_iter().flat_map(of).collect())
+    let of = |noise: f64| Model { kernel, length_scale: LENGTH_SCALE, noise, n_trend };
+    Ok(NOISES.map(of).to_vec())
 }
 
 /// Shares of the models among neighbourhoods with these log likelihoods, `[neighbourhoods][models]`: the mixture that makes the sample
