@@ -1,7 +1,11 @@
 //! Prints how many wrong curvatures are flagged, and how many right ones: the tables of docs/degeneracy.md.
 
+#[path = "../tests/degeneracy/closed.rs"]
+mod closed;
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "../tests/degeneracy/normals.rs"]
+mod normals;
 #[path = "../tests/degeneracy/shapes.rs"]
 mod shapes;
 #[path = "../tests/degeneracy/sweep.rs"]
@@ -16,7 +20,27 @@ const HEADER: &str = "\
 | | queries | null | flagged | of them off by > 50 % | right to 10 % | offset | unflagged | missed > 10 % | > 50 % | worst |
 |---|---|---|---|---|---|---|---|---|---|---|";
 
+/// Of lines: more than 30° off.
+const NORMALS_HEADER: &str = "\
+| kernel | length scale | n | noise | points | flagged | of them off | unflagged off | | flipped |
+|---|---|---|---|---|---|---|---|---|---|";
+
 fn main() {
+    println!("normals of closed surfaces\n\n{NORMALS_HEADER}");
+    for (at, (name, ..)) in sweep::KERNELS.into_iter().enumerate() {
+        for (scale, n, noise) in [(0.4, 500, 0.0), (1.0, 500, 0.0), (0.4, 1500, 0.0), (0.4, 500, 0.0015)] {
+            let tally = normals::tally_all(at, scale, n, noise);
+            println!(
+                "| {name} | {scale} | {n} | {noise} | {} | {} | {} | {} | {:.2} % | {} |",
+                tally.n_points,
+                tally.n_flagged,
+                tally.n_off_flagged,
+                tally.n_off,
+                100.0 * tally.n_off as f64 / tally.n_unflagged().max(1) as f64,
+                tally.n_flipped
+            );
+        }
+    }
     for (name, model) in [("signature", SurfaceModel::Signature), ("auto", SurfaceModel::Auto)] {
         for scale in [0.4, 1.0] {
             println!("\n{name}, length scale {scale}\n");

@@ -46,7 +46,14 @@ fn main() {
     println!();
     for noise in NOISES {
         let (n_held, n) = holds(&|case| case.noise == noise);
-        println!("Noise {} %: {n_held} of {n} rows hold.", 100.0 * noise);
+        let of_noise = || cases.iter().zip(&rows).filter(|(case, _)| case.noise == noise).map(|(_, row)| row);
+        let n_unflagged: usize = of_noise().map(Row::n_unflagged).sum();
+        let n_off: usize = of_noise().map(|row| row.n_off).sum();
+        let share = 100.0 * n_off as f64 / n_unflagged as f64;
+        let percent = 100.0 * noise;
+        println!(
+            "Noise {percent} %: {n_held} of {n} rows hold; of {n_unflagged} without a flag {share:.2} % are off by half."
+        );
     }
     for size in SIZES {
         let (n_held, n) = holds(&|case| case.n_points == size);

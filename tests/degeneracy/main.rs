@@ -3,8 +3,10 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod closed;
 mod clouds;
 mod flat;
+mod normals;
 mod orientation;
 mod shapes;
 mod support;

@@ -114,9 +114,13 @@ impl Row {
         100.0 * self.n_flagged as f64 / self.errors.len().max(1) as f64
     }
 
+    pub fn n_unflagged(&self) -> usize {
+        self.errors.len() - self.n_flagged
+    }
+
     /// Share of those without a flag that are off by half, per cent.
     pub fn off(&self) -> f64 {
-        100.0 * self.n_off as f64 / (self.errors.len() - self.n_flagged).max(1) as f64
+        100.0 * self.n_off as f64 / self.n_unflagged().max(1) as f64
     }
 
     /// What the bars are to keep: 90 to 99.5 % of the true values with noise, 85 % without.

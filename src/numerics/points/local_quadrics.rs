@@ -22,10 +22,6 @@ const RELIABLE_BEND: f64 = 1.5;
 /// Residual against the radius below which there is no noise to speak of.
 const SMOOTH_RESIDUAL: f64 = 0.01;
 
-/// Standard error of a second derivative, times √k, from k heights of unit noise over the unit disc: the variance of ½t₁² that
-/// 1, t and t₂² leave is 1/72.
-const DISC_ERROR: f64 = 8.5;
-
 /// A surface near a position x, from a quadric over its own tangent plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LocalQuadric<'a> {
@@ -151,15 +147,24 @@ fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Opti
     let d = patch.dimension();
     // For the frame's normal the shape operator is minus the Hessian of the height.
     let shape: Small = quadric.hessian.iter().map(|h| -h / patch.radius).collect();
-    let (curvatures, _) = symmetric_eigen(&shape, d - 1);
+    let (curvatures, directions) = symmetric_eigen(&shape, d - 1);
     let height = quadric.height * patch.radius;
     row[..d].copy_from_slice(patch.normal());
     // Through x, at a distance −height, runs a parallel surface.
     let parallel = curvatures.iter().map(|kappa| kappa / (1.0 - height * kappa).max(0.1));
     row[d..2 * d - 1].iter_mut().zip(parallel).for_each(|(slot, kappa)| *slot = kappa);
-    let uncertainty = DISC_ERROR * quadric.residual / (patch.radius * (patch.n_points() as f64).sqrt());
+    let errors = directions.chunks_exact(d - 1).map(|direction| quadric.standard_error(direction));
+    let uncertainty = errors.fold(0.0, f64::max) / patch.radius;
     row[2 * d - 1..].copy_from_slice(&[height, quadric.residual * patch.radius, uncertainty, patch.radius]);
     Some(if patch.is_at_rim() { Found::AtRim } else { Found::Inside })
+}
+
+/// The normal at x of the quadric through these points, of either sign; `None` if they do not determine one.
+pub(crate) fn quadric_normal(cloud: &Cloud, x: &[f64], nearest: &[Neighbour]) -> Option<Small> {
+    let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
+    let quadric = Quadric::of(&patch)?;
+    patch.turn_over(&quadric.slope);
+    Some(Small::from_slice(patch.normal()))
 }
 
 #[cfg(test)]

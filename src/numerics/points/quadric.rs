@@ -36,6 +36,8 @@ pub(crate) struct Quadric {
     pub hessian: Small,
     /// Root mean square of what it leaves, corrected for the degrees of freedom.
     pub residual: f64,
+    /// R of AᵀA = RᵀR, A the terms at the points: upper triangle, `[p, p]`.
+    factor: Columns,
 }
 
 impl Quadric {
@@ -63,7 +65,7 @@ impl Quadric {
             }
         }
         let mut heights: Columns = coordinate(k).copied().collect();
-        let (coefficients, squared_residual) = least_squares(&mut columns, &mut heights, p)?;
+        let (coefficients, squared_residual, factor) = least_squares(&mut columns, &mut heights, p)?;
         let mut hessian = zeros(k * k);
         let mut at = d;
         for a in 0..k {
@@ -78,13 +80,32 @@ impl Quadric {
             slope: Small::from_slice(&coefficients[1..d]),
             hessian,
             residual: (squared_residual / freedom).sqrt(),
+            factor,
         })
+    }
+
+    /// Standard error of the second derivative along a unit vector v, `[d−1]`, if the residual is noise: that of `vᵀHv` by `(AᵀA)⁻¹`.
+    pub(crate) fn standard_error(&self, v: &[f64]) -> f64 {
+        let (k, p) = (v.len(), n_coefficients(v.len() + 1));
+        let mut form = zeros(p);
+        let mut at = k + 1;
+        for a in 0..k {
+            for b in a..k {
+                form[at] = v[a] * v[b] * if a == b { 1.0 } else { 2.0 };
+                at += 1;
+            }
+        }
+        for j in 0..p {
+            let known: f64 = (0..j).map(|i| self.factor[i * p + j] * form[i]).sum();
+            form[j] = (form[j] - known) / self.factor[j * p + j];
+        }
+        self.residual * form.iter().map(|w| w * w).sum::<f64>().sqrt()
     }
 }
 
 /// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2), A `[n, p]` column by column.
-/// Answers c and the squared residual; `None` if A has not full rank.
-fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64)> {
+/// Answers c, the squared residual and R; `None` if A has not full rank.
+fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64, Columns)> {
     let n = b.len();
     let mut diagonal = zeros(p);
     for j in 0..p {
@@ -113,7 +134,12 @@ fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64)>
         let known: f64 = (j + 1..p).map(|column| a[column * n + j] * c[column]).sum();
         c[j] = (c[j] - known) / diagonal[j];
     }
-    Some((c, b[p..].iter().map(|r| r * r).sum()))
+    let mut factor = Columns::from_elem(0.0, p * p);
+    for j in 0..p {
+        (0..j).for_each(|i| factor[i * p + j] = a[j * n + i]);
+        factor[j * p + j] = diagonal[j];
+    }
+    Some((c, b[p..].iter().map(|r| r * r).sum(), factor))
 }
 
 /// A scalar product in four sums, none of which waits for the others.

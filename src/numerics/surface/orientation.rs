@@ -38,6 +38,10 @@ const CONTRADICTION: f64 = 0.1;
 /// Share of the gradients that must agree for their sign to be believed without the volume.
 const UNANIMITY: f64 = 0.95;
 
+/// Volume over that of a ball of as much surface as far from its centre, above which it is known better than any gradient: those of a wide
+/// kernel on an octahedron agree, and point inward. A torus with a tube of a seventh of its radius has twice as much.
+const BULKY: f64 = 0.1;
+
 /// What is known of normals before their signs are made consistent.
 pub(crate) struct Directions {
     /// Unit vectors at the points, `[n, d]`: outward where that is known, of unknown sign elsewhere, or zero.
@@ -164,11 +168,16 @@ fn consistent_signs(
         members.entry(root).or_default().push(point);
     }
     let raw = contradictions(&mut pieces, &edges, &directions.has_sign);
+    // A hundred at most.
+    let large = members.iter().filter(|(_, piece)| 100 * piece.len() >= n);
+    let boxes: Vec<(usize, Bounds)> = large.map(|(root, piece)| (*root, Bounds::of(cloud, piece))).collect();
     let (mut signs, mut is_open) = (relative.clone(), false);
     for (root, piece) in &members {
         let piece = Piece { cloud, directions, spacings, points: piece, relative: &relative };
         let has_rim = piece.has_rim();
-        let sign = piece.sign(has_rim);
+        let own = Bounds::of(cloud, piece.points);
+        let is_nested = boxes.iter().any(|(other, bounds)| other != root && bounds.contain(&own));
+        let sign = piece.sign(has_rim, is_nested);
         is_open |= has_rim;
         piece.points.iter().for_each(|&point| signs[point] *= sign);
         let gradients_agree = raw.get(root).is_none_or(|share| *share < LOCAL_CONTRADICTION);
@@ -278,13 +287,16 @@ impl Piece<'_> {
         }
     }
 
-    /// The sign of most gradients by area, or that of the volume where they disagree.
-    fn sign(&self, has_rim: bool) -> f64 {
+    /// The sign of the volume, if there is much and no other piece around it; else that of most gradients by area, or that of the
+    /// volume where they disagree.
+    fn sign(&self, has_rim: bool, is_nested: bool) -> f64 {
         let signed = || self.points.iter().filter(|&&point| self.directions.has_sign[point]);
         let total: f64 = signed().map(|&point| self.area(point)).sum();
         let vote: f64 = signed().map(|&point| self.relative[point] * self.area(point)).sum();
         let volume = self.volume(|point| self.relative[point]);
-        let decides_itself = has_rim || vote.abs() >= (2.0 * UNANIMITY - 1.0) * total;
+        let is_bulky = !is_nested && volume.abs() > BULKY * self.volume_of_ball();
+        let is_unanimous = vote.abs() >= (2.0 * UNANIMITY - 1.0) * total;
+        let decides_itself = has_rim || is_unanimous && !is_bulky;
         let decisive = if total > 0.0 && decides_itself || volume == 0.0 { vote } else { volume };
         if decisive < 0.0 { -1.0 } else { 1.0 }
     }
@@ -301,12 +313,7 @@ impl Piece<'_> {
     /// `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem.
     fn volume(&self, sign: impl Fn(usize) -> f64) -> f64 {
         let d = self.cloud.dimension();
-        let mut centre = vec![0.0; d];
-        let total: f64 = self.points.iter().map(|&point| self.area(point)).sum();
-        for &point in self.points {
-            let share = self.area(point) / total;
-            centre.iter_mut().zip(self.cloud.point(point)).for_each(|(c, x)| *c += share * x);
-        }
+        let centre = self.centre();
         let of_point = |&point: &usize| {
             let normal = &self.directions.normals[point * d..][..d];
             let arm = self.cloud.point(point).iter().zip(&centre).map(|(x, c)| x - c);
@@ -315,8 +322,49 @@ impl Piece<'_> {
         self.points.iter().map(of_point).sum()
     }
 
+    /// `Σ a |x − c|`.
+    fn volume_of_ball(&self) -> f64 {
+        let centre = self.centre();
+        let distance = |x: &[f64]| x.iter().zip(&centre).map(|(x, c)| (x - c).powi(2)).sum::<f64>().sqrt();
+        self.points.iter().map(|&point| self.area(point) * distance(self.cloud.point(point))).sum()
+    }
+
+    fn centre(&self) -> Vec<f64> {
+        let mut centre = vec![0.0; self.cloud.dimension()];
+        let total: f64 = self.points.iter().map(|&point| self.area(point)).sum();
+        for &point in self.points {
+            let share = self.area(point) / total;
+            centre.iter_mut().zip(self.cloud.point(point)).for_each(|(c, x)| *c += share * x);
+        }
+        centre
+    }
+
     fn area(&self, point: usize) -> f64 {
         self.spacings[point].powi(self.cloud.dimension() as i32 - 1)
+    }
+}
+
+/// The sides of a box around some points.
+struct Bounds {
+    least: Vec<f64>,
+    greatest: Vec<f64>,
+}
+
+impl Bounds {
+    fn of(cloud: &Cloud, points: &[usize]) -> Self {
+        let first = points.first().map_or(&[][..], |&point| cloud.point(point));
+        let (mut least, mut greatest) = (first.to_vec(), first.to_vec());
+        for &point in points {
+            for ((x, l), g) in cloud.point(point).iter().zip(&mut least).zip(&mut greatest) {
+                (*l, *g) = (l.min(*x), g.max(*x));
+            }
+        }
+        Self { least, greatest }
+    }
+
+    fn contain(&self, other: &Self) -> bool {
+        self.least.iter().zip(&other.least).all(|(own, other)| own < other)
+            && self.greatest.iter().zip(&other.greatest).all(|(own, other)| own > other)
     }
 }
 

@@ -7,7 +7,7 @@ use super::{Scratch, Support};
 use crate::numerics::points::neighbours::Neighbour;
 
 /// Curvature times radius up to which a neighbourhood may grow: about the angle by which the normal turns.
-const MAX_BEND: f64 = 0.6;
+const MAX_BEND: f64 = 0.7;
 
 /// Standard error of a second derivative times √k, from k heights of unit noise over the unit disc.
 const DISC_ERROR: f64 = 8.5;

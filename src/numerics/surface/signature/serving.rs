@@ -10,10 +10,10 @@ use super::deviations::deviations;
 use super::offset::{OffsetJet, offset_jet_at};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::small::Small;
-use crate::numerics::machine::vector::norm;
+use crate::numerics::machine::vector::{dot, norm};
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics, quadric_normal};
 use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::quadric::n_quadric_neighbours;
@@ -26,6 +26,12 @@ use crate::numerics::surface::served::{Served, ServedBy, Verdict};
 /// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
 /// normal to it.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
+
+/// Cosine of the angle to the normals of quadrics, 25°, beyond which a normal is flagged.
+const AGREES: f64 = 0.906;
+
+/// Curvature times radius below which a quadric sees less than half of a circle.
+const ONE_SIDE: f64 = 1.5;
 
 /// Finds everything that is known at each query.
 ///
@@ -283,12 +289,30 @@ impl Service<'_> {
             return Some(DegeneracyReason::FarFromCloud);
         }
         if !self.request.checks_curvatures {
-            return None;
+            return self.disagrees(slot, site).then_some(DegeneracyReason::UnderResolved);
         }
         if verdict.by == ServedBy::Signature && self.surface.is_too_rough() {
             return Some(DegeneracyReason::KernelTooRough);
         }
         (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
+    }
+
+    /// Whether the normal is far from those of most quadrics through the nearest 18, 12 and 8 points (of surfaces in space), where those
+    /// see one side of the surface only.
+    fn disagrees(&self, slot: &Slot<'_>, site: &Site<'_>) -> bool {
+        let (cloud, count) = (self.surface.cloud(), n_quadric_neighbours(site.x.len()));
+        let is_off = |normal: &[f64]| dot(slot.gradient, normal).abs() < AGREES * norm(slot.gradient);
+        let sees_one_side = cloud.n_points() >= 4 * count
+            && site.quadric.is_some_and(|quadric| quadric.bend() < ONE_SIDE && is_off(quadric.normal));
+        if !sees_one_side {
+            return false;
+        }
+        let neighbours = self.surface.sampling().neighbours();
+        let nearest = neighbours.nearest_positions(cloud, site.x, count * 2 / 3);
+        [count * 2 / 3, count * 4 / 9].into_iter().any(|count| {
+            let nearest = &nearest[..count.min(nearest.len())];
+            quadric_normal(cloud, site.x, nearest).is_some_and(|normal| is_off(&normal))
+        })
     }
 
     fn is_resolved(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> bool {
