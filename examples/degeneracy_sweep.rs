@@ -12,6 +12,7 @@ mod shapes;
 mod sweep;
 
 use gramian::numerics::surface::geometry::SurfaceModel;
+use normals::NormalTally;
 use rayon::prelude::*;
 use sweep::{Tally, cases};
 
@@ -29,7 +30,9 @@ fn main() {
     println!("normals of closed surfaces\n\n{NORMALS_HEADER}");
     for (at, (name, ..)) in sweep::KERNELS.into_iter().enumerate() {
         for (scale, n, noise) in [(0.4, 500, 0.0), (1.0, 500, 0.0), (0.4, 1500, 0.0), (0.4, 500, 0.0015)] {
-            let tally = normals::tally_all(at, scale, n, noise);
+            let each = closed::CLOSED_SURFACES.par_iter();
+            let each = each.map(|&surface| normals::tally(surface, at, scale, n, noise));
+            let tally = each.reduce(NormalTally::default, NormalTally::add);
             println!(
                 "| {name} | {scale} | {n} | {noise} | {} | {} | {} | {} | {:.2} % | {} |",
                 tally.n_points,

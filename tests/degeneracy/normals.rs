@@ -4,9 +4,8 @@ use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
-use rayon::prelude::*;
 
-use super::closed::{CLOSED_SURFACES, ClosedSurface, outward_normal, sample};
+use super::closed::{ClosedSurface, outward_normal, sample};
 use super::common::clouds::cloud;
 use super::common::fits::{factorize, kernel};
 use super::common::random::Random;
@@ -68,10 +67,4 @@ pub fn tally(surface: ClosedSurface, at: usize, scale: f64, n: usize, noise: f64
         tally.n_flipped += usize::from(!is_flagged[i] && !is_off && along < 0.0);
     }
     tally
-}
-
-/// All surfaces with one kernel.
-pub fn tally_all(at: usize, scale: f64, n: usize, noise: f64) -> NormalTally {
-    let each = CLOSED_SURFACES.par_iter().map(|&surface| tally(surface, at, scale, n, noise));
-    each.reduce(NormalTally::default, NormalTally::add)
 }

@@ -4,7 +4,7 @@ use gramian::numerics::surface::geometry::SurfaceModel;
 use rayon::prelude::*;
 
 use super::closed::CLOSED_SURFACES;
-use super::normals::{self, NormalTally};
+use super::normals::{NormalTally, tally};
 use super::sweep::{KERNELS, Tally, cases};
 
 /// 24,000 queries at each length scale and model: the bounds are those of docs/degeneracy.md.
@@ -25,28 +25,24 @@ fn no_curvature_is_off_by_half_without_a_flag() {
     }
 }
 
-#[test]
-fn normals_of_closed_surfaces_are_right_or_flagged() {
-    for (at, (name, ..)) in KERNELS.into_iter().enumerate() {
-        let runs = [(0.4, 500, 0.0), (1.0, 500, 0.0), (0.4, 500, 0.0015)];
-        let tallies = runs.map(|(scale, n, noise)| normals::tally_all(at, scale, n, noise));
-        let all = tallies.into_iter().fold(NormalTally::default(), NormalTally::add);
-        assert!(1000 * all.n_off <= 3 * all.n_unflagged(), "{name}: {all:?}");
-        // Half of them may be flagged were the flag worth nothing.
-        assert!(20 * all.n_flagged <= all.n_points, "{name}: {all:?}");
-    }
-}
+/// The walls of the bowl and of the plate with two holes are as thin as the points are apart.
+const UNRESOLVED: [&str; 2] = ["bowl", "two holes"];
 
 #[test]
-fn closed_surfaces_are_not_turned_inside_out() {
-    // The walls of the bowl and of the plate with two holes are as thin as the points are apart.
-    let resolved = || CLOSED_SURFACES.into_iter().filter(|(name, ..)| !["bowl", "two holes"].contains(name));
+fn normals_of_closed_surfaces_are_right_or_flagged_and_outward() {
     for (at, (kernel, ..)) in KERNELS.into_iter().enumerate() {
-        for surface in resolved() {
-            for (scale, noise) in [(0.4, 0.0), (1.0, 0.0), (0.4, 0.0015)] {
-                let found = normals::tally(surface, at, scale, 500, noise);
-                assert_eq!(found.n_flipped, 0, "{kernel}, {scale}, {noise}, {}: {found:?}", surface.0);
+        let mut all = NormalTally::default();
+        for (scale, noise) in [(0.4, 0.0), (1.0, 0.0), (0.4, 0.0015)] {
+            let found: Vec<NormalTally> =
+                CLOSED_SURFACES.par_iter().map(|&surface| tally(surface, at, scale, 500, noise)).collect();
+            for ((name, ..), found) in CLOSED_SURFACES.iter().zip(found) {
+                let is_outward = found.n_flipped == 0 || UNRESOLVED.contains(name);
+                assert!(is_outward, "{kernel}, {scale}, {noise}, {name}: {found:?}");
+                all = all.add(found);
             }
         }
+        assert!(1000 * all.n_off <= 3 * all.n_unflagged(), "{kernel}: {all:?}");
+        // Flagging everything would pass the above.
+        assert!(20 * all.n_flagged <= all.n_points, "{kernel}: {all:?}");
     }
 }

@@ -312,6 +312,8 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
     }
     assert_eq!(server.post("/v1/normals", &body).await.expect_ok()["degenerate"], json!([]));
 
+    // What quadrics leave of a sphere of 40 points is too much to confirm anything by.
+    body["cloud"]["points"] = json!(fibonacci_sphere(100));
     body["kernel"]["length_scale"] = json!(4.0);
     let wide = server.post("/v1/curvatures", &body).await.expect_ok();
     assert_eq!((&wide["degenerate"], codes(&wide["diagnostics"]).len()), (&json!([]), 0));

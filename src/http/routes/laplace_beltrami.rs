@@ -65,9 +65,9 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// How the matrix is written; `dense` if absent.
+        /// Retired: a matrix of this path is dense. Sparse ones are answered by `/v1/laplace-beltrami/sparse-matrix`.
         #[serde(default, deserialize_with = "present_word")]
-        #[schema(nullable = false)]
+        #[schema(nullable = false, deprecated)]
         pub format: Option<MatrixFormat>,
     }
 }

@@ -4,7 +4,7 @@
 //! small ℓ its sign follows the mean curvature and flips where that changes sign (errata.md, 13). Across such a flip the
 //! normals of neighbours are opposite although the surface goes on. So: points whose signs agree are joined to regions,
 //! regions are joined by what their common border says, and each connected piece gets the sign of most of its gradients or,
-//! if they disagree and the piece is closed, the sign that gives it a positive volume. Propagation over a neighbour graph is
+//! if they disagree and the piece is closed, or it is bulky, the sign that gives it a positive volume. Propagation over a neighbour graph is
 //! that of Hoppe et al. (1992); joining whole regions keeps a single bad edge from deciding.
 
 use std::collections::HashMap;
