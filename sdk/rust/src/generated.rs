@@ -900,7 +900,7 @@ the noise of the points, 1e-3 at least.*/
         ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///How the matrix is written; `dense` if absent.
+        ///Retired: a matrix of this path is dense. Sparse ones are answered by `/v1/laplace-beltrami/sparse-matrix`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub format: ::std::option::Option<MatrixFormat>,
         ///The surface, where its fit differs from that of the values.
