@@ -9,3 +9,4 @@ mod random;
 
 pub(crate) use clouds::{circle, fibonacci_sphere};
 pub(crate) use kernels::all_families;
+pub(crate) use random::Random;

@@ -18,6 +18,9 @@ pub const NOISES: [f64; 5] = [0.0, 0.002, 0.005, 0.01, 0.02];
 /// Deviations within which 95 % of the errors lie, were they normal.
 const BAND: f64 = 1.96;
 
+/// What the service flags beyond: deviation of a principal curvature over the larger one.
+const FLAGGED: f64 = 0.13;
+
 /// What a row asks: a surface, how it is sampled, and the deviation of the noise of its points over its radius.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
@@ -96,7 +99,7 @@ impl Row {
         let error = larger(off) / larger(truth.curvatures);
         self.angles.push(angle);
         self.errors.push(error);
-        if 4.0 * bars[2].max(bars[3]) > 0.5 * larger(curvatures) {
+        if bars[2].max(bars[3]) > FLAGGED * larger(curvatures) {
             self.n_flagged += 1;
         } else if error > 0.5 {
             self.n_off += 1;

@@ -9,8 +9,8 @@ use crate::numerics::kernel::{Family, Kernel};
 const ORDER: u8 = 4;
 
 /// ℓ in units of the radius of a neighbourhood. Its size follows the curvature, so that this is one for all scales; shorter ones take noise
-/// that neighbours share for shape, longer ones promise more than they keep (docs/error-bars.md).
-const LENGTH_SCALE: f64 = 2.0;
+/// that neighbours share for shape, longer ones promise more of a scan than they keep (docs/error-bars.md).
+const LENGTH_SCALE: f64 = 1.4;
 
 /// Variances of the noise over that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];

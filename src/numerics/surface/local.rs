@@ -22,10 +22,9 @@ use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 /// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
 const SAYS_SIGN: f64 = 0.2;
 
-/// Deviations of a curvature that must stay below this fraction of the largest one. Three would do were that the true one: an estimate that
-/// is too large has smaller deviations beside it, and with four at most 1 % of those that pass are off by half, at any noise.
-const RESOLVED_DEVIATIONS: f64 = 4.0;
-const RESOLVED_FRACTION: f64 = 0.5;
+/// Deviation of a principal curvature over the largest one beyond which it is flagged: of those that pass 1 % are off by half, at any
+/// noise. Were the largest one known, 1/6 would do; an estimate that is too large has smaller deviations beside it.
+const RESOLVED: f64 = 0.13;
 
 /// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
 /// that are off by 30°.
@@ -170,7 +169,7 @@ impl LocalSurface {
         let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
         let largest = curvatures.iter().fold(FLAT / self.radius, |a: f64, k| a.max(k.abs()));
         let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
-        deviations.iter().all(|deviation| RESOLVED_DEVIATIONS * deviation <= RESOLVED_FRACTION * largest)
+        deviations.iter().all(|deviation| *deviation <= RESOLVED * largest)
     }
 
     /// Turns normals to the side of those of the points nearby.

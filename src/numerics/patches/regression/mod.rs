@@ -11,6 +11,8 @@ mod covariances;
 mod doubt;
 mod factor;
 mod model;
+#[cfg(test)]
+mod tests;
 mod trend;
 
 use pulp::{Simd, WithSimd};
