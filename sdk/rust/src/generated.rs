@@ -397,8 +397,9 @@ where that has no answer.*/
         pub geometry: ::std::option::Option<::std::boxed::Box<Diagnostics>>,
         ///The kernel used, in full.
         pub kernel: KernelUsed,
-        ///|u(X) − Y|, unit of the values.
-        pub misfit: f64,
+        ///|u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub misfit: ::std::option::Option<f64>,
         ///Points that were merged into an earlier one.
         pub n_merged_duplicates: u64,
         ///Points of the cloud, n.
@@ -488,7 +489,7 @@ where that has no answer.*/
             value.parse()
         }
     }
-    /**How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`, `conjugate_gradients` and `local` are reserved: no
+    /**How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 answer has them yet.*/
     #[derive(
         ::serde::Deserialize,
@@ -1482,7 +1483,7 @@ the noise of the points, 1e-3 at least.*/
             value.parse()
         }
     }
-    ///The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has them yet.
+    ///The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -3027,7 +3028,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::string::String,
             >,
             kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
-            misfit: ::std::result::Result<f64, ::std::string::String>,
+            misfit: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
             n_merged_duplicates: ::std::result::Result<u64, ::std::string::String>,
             n_points: ::std::result::Result<u64, ::std::string::String>,
             n_queries: ::std::result::Result<u64, ::std::string::String>,
@@ -3072,7 +3076,7 @@ the noise of the points, 1e-3 at least.*/
                     ),
                     geometry: Ok(Default::default()),
                     kernel: Err("no value supplied for kernel".to_string()),
-                    misfit: Err("no value supplied for misfit".to_string()),
+                    misfit: Ok(Default::default()),
                     n_merged_duplicates: Err(
                         "no value supplied for n_merged_duplicates".to_string(),
                     ),
@@ -3166,7 +3170,7 @@ the noise of the points, 1e-3 at least.*/
             }
             pub fn misfit<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<f64>,
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.misfit = value
@@ -7548,7 +7552,8 @@ let response = client.list_kernels()
     /**Interpolate values
 
 Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at the queries. At
-alpha = 0 it takes the values at the points exactly.
+alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points that are factorized, each query is
+answered from the points nearest to it.
 
 Sends a `POST` request to `/v1/interpolation`
 
@@ -7564,7 +7569,8 @@ let response = client.compute_interpolation()
     /**Compute the Gaussian process posterior
 
 With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
-queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With `"solver": "local"`, and beyond the points
+that are factorized, each query is answered from the points nearest to it, without covariance and likelihood.
 
 Sends a `POST` request to `/v1/posterior`
 

@@ -29,12 +29,10 @@ class Diagnostics:
         dimension (int): Coordinates of each point, d.
         kernel (KernelUsed): The kernel that was used, every number of it: sent back as `kernel` it gives the same
             answer.
-        solver (SolverUsed): The solver that was used. `landmark`, `iterative` and `local` are reserved: no answer has
-            them yet.
-        factorization (FactorizationUsed): How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`,
-            `conjugate_gradients` and `local` are reserved: no
+        solver (SolverUsed): The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
+        factorization (FactorizationUsed): How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`
+            and `conjugate_gradients` are reserved: no
             answer has them yet.
-        misfit (float): |u(X) − Y|, unit of the values.
         n_merged_duplicates (int): Points that were merged into an earlier one.
         warnings (list[Warning_]): What was changed or limits the accuracy.
         alpha (float | Unset): What was added to the diagonal; absent with `noise_variances`.
@@ -44,6 +42,8 @@ class Diagnostics:
             a fraction of all.
         relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
         native_norm_squared (float | Unset): ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+        misfit (float | Unset): |u(X) − Y|, unit of the values; absent for values from the local solver, which is not
+            asked at the points.
         noise_deviation (float | Unset): Standard deviation of the noise of the points across the surface, as estimated,
             length.
         geometry (Diagnostics | Unset): What an answer says of itself: the numbers used, how the system was solved, and
@@ -57,7 +57,6 @@ class Diagnostics:
     kernel: KernelUsed
     solver: SolverUsed
     factorization: FactorizationUsed
-    misfit: float
     n_merged_duplicates: int
     warnings: list[Warning_]
     alpha: float | Unset = UNSET
@@ -66,6 +65,7 @@ class Diagnostics:
     reciprocal_condition: float | Unset = UNSET
     relative_residual: float | Unset = UNSET
     native_norm_squared: float | Unset = UNSET
+    misfit: float | Unset = UNSET
     noise_deviation: float | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
@@ -87,8 +87,6 @@ class Diagnostics:
 
         factorization = self.factorization.value
 
-        misfit = self.misfit
-
         n_merged_duplicates = self.n_merged_duplicates
 
         warnings = []
@@ -108,6 +106,8 @@ class Diagnostics:
 
         native_norm_squared = self.native_norm_squared
 
+        misfit = self.misfit
+
         noise_deviation = self.noise_deviation
 
         geometry: dict[str, Any] | Unset = UNSET
@@ -125,7 +125,6 @@ class Diagnostics:
                 "kernel": kernel,
                 "solver": solver,
                 "factorization": factorization,
-                "misfit": misfit,
                 "n_merged_duplicates": n_merged_duplicates,
                 "warnings": warnings,
             }
@@ -142,6 +141,8 @@ class Diagnostics:
             field_dict["relative_residual"] = relative_residual
         if native_norm_squared is not UNSET:
             field_dict["native_norm_squared"] = native_norm_squared
+        if misfit is not UNSET:
+            field_dict["misfit"] = misfit
         if noise_deviation is not UNSET:
             field_dict["noise_deviation"] = noise_deviation
         if geometry is not UNSET:
@@ -169,8 +170,6 @@ class Diagnostics:
 
         factorization = FactorizationUsed(d.pop("factorization"))
 
-        misfit = d.pop("misfit")
-
         n_merged_duplicates = d.pop("n_merged_duplicates")
 
         warnings = []
@@ -192,6 +191,8 @@ class Diagnostics:
 
         native_norm_squared = d.pop("native_norm_squared", UNSET)
 
+        misfit = d.pop("misfit", UNSET)
+
         noise_deviation = d.pop("noise_deviation", UNSET)
 
         _geometry = d.pop("geometry", UNSET)
@@ -209,7 +210,6 @@ class Diagnostics:
             kernel=kernel,
             solver=solver,
             factorization=factorization,
-            misfit=misfit,
             n_merged_duplicates=n_merged_duplicates,
             warnings=warnings,
             alpha=alpha,
@@ -218,6 +218,7 @@ class Diagnostics:
             reciprocal_condition=reciprocal_condition,
             relative_residual=relative_residual,
             native_norm_squared=native_norm_squared,
+            misfit=misfit,
             noise_deviation=noise_deviation,
             geometry=geometry,
         )

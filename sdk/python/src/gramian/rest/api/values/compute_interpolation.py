@@ -123,7 +123,9 @@ def sync_detailed(
 
      Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
     the queries. At
-    alpha = 0 it takes the values at the points exactly.
+    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
+    that are factorized, each query is
+    answered from the points nearest to it.
 
     Args:
         body (InterpolationRequest): Values at the points of a cloud, and where the function
@@ -160,7 +162,9 @@ def sync(
 
      Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
     the queries. At
-    alpha = 0 it takes the values at the points exactly.
+    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
+    that are factorized, each query is
+    answered from the points nearest to it.
 
     Args:
         body (InterpolationRequest): Values at the points of a cloud, and where the function
@@ -192,7 +196,9 @@ async def asyncio_detailed(
 
      Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
     the queries. At
-    alpha = 0 it takes the values at the points exactly.
+    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
+    that are factorized, each query is
+    answered from the points nearest to it.
 
     Args:
         body (InterpolationRequest): Values at the points of a cloud, and where the function
@@ -227,7 +233,9 @@ async def asyncio(
 
      Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
     the queries. At
-    alpha = 0 it takes the values at the points exactly.
+    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
+    that are factorized, each query is
+    answered from the points nearest to it.
 
     Args:
         body (InterpolationRequest): Values at the points of a cloud, and where the function

@@ -123,7 +123,10 @@ def sync_detailed(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
+    `"solver": "local"`, and beyond the points
+    that are factorized, each query is answered from the points nearest to it, without covariance and
+    likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -160,7 +163,10 @@ def sync(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
+    `"solver": "local"`, and beyond the points
+    that are factorized, each query is answered from the points nearest to it, without covariance and
+    likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -192,7 +198,10 @@ async def asyncio_detailed(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
+    `"solver": "local"`, and beyond the points
+    that are factorized, each query is answered from the points nearest to it, without covariance and
+    likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -227,7 +236,10 @@ async def asyncio(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood.
+    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
+    `"solver": "local"`, and beyond the points
+    that are factorized, each query is answered from the points nearest to it, without covariance and
+    likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
