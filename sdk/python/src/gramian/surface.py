@@ -155,8 +155,8 @@ class SurfaceOfCloud(RegisteredCloud):
         >>> noise = 0.01 * np.random.default_rng(0).normal(size=(64, 1))
         >>> noisy = gramian.Client().cloud((5 + noise) * np.column_stack([np.cos(angles), np.sin(angles)]))
         >>> answer = noisy.curvatures([[5, 0]], deviations=True)
-        >>> answer.mean_curvatures.round(2), answer.mean_curvature_deviations.round(2)
-        (array([0.2]), array([0.01]))
+        >>> answer.mean_curvatures.round(3), answer.mean_curvature_deviations.round(3)
+        (array([0.202]), array([0.004]))
         """
         return self._compute(
             Curvatures.read,
