@@ -9,6 +9,7 @@ mod flat;
 mod normals;
 mod orientation;
 mod shapes;
+mod sizes;
 mod support;
 mod sweep;
 mod sweeps;

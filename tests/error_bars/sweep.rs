@@ -18,8 +18,8 @@ pub const NOISES: [f64; 5] = [0.0, 0.002, 0.005, 0.01, 0.02];
 /// Deviations within which 95 % of the errors lie, were they normal.
 const BAND: f64 = 1.96;
 
-/// What the service flags beyond: deviation of a principal curvature over the larger one.
-const FLAGGED: f64 = 0.13;
+/// What the service flags beyond, beside what is bent: deviation of a principal curvature over the larger one.
+const FLAGGED: f64 = 1.0 / 6.0;
 
 /// What a row asks: a surface, how it is sampled, and the deviation of the noise of its points over its radius.
 #[derive(Debug, Clone, Copy)]
@@ -81,11 +81,18 @@ impl Row {
                 bars.reverse();
             }
             let bars = [found.normal_deviations[i], deviations.mean[i], bars[0], bars[1]];
-            self.take_point(normal, curvatures, bars, truth);
+            self.take_point(normal, curvatures, bars, deviations.is_bent[i], truth);
         }
     }
 
-    fn take_point(&mut self, normal: [f64; 3], curvatures: [f64; 2], bars: [f64; 4], truth: &Truth) {
+    fn take_point(
+        &mut self,
+        normal: [f64; 3],
+        curvatures: [f64; 2],
+        bars: [f64; 4],
+        is_bent: bool,
+        truth: &Truth,
+    ) {
         let across = cross(normal, truth.normal);
         let angle = dot(across, across).sqrt().min(1.0).asin();
         let off = [0, 1].map(|i| (curvatures[i] - truth.curvatures[i]).abs());
@@ -99,7 +106,7 @@ impl Row {
         let error = larger(off) / larger(truth.curvatures);
         self.angles.push(angle);
         self.errors.push(error);
-        if bars[2].max(bars[3]) > FLAGGED * larger(curvatures) {
+        if is_bent || bars[2].max(bars[3]) > FLAGGED * larger(curvatures) {
             self.n_flagged += 1;
         } else if error > 0.5 {
             self.n_off += 1;

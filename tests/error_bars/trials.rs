@@ -94,6 +94,11 @@ fn place_and_size_change_nothing() {
             let error = (expected.abs() - found.abs()).abs();
             assert!(error < 1e-5 * (1.0 + expected.abs()), "{scale} {offset} {i}: {expected} {found}");
         }
+        let bars = |found: &PatchGeometry| found.curvatures.as_ref().unwrap().gaussian.clone();
+        for (i, (expected, moved)) in bars(&found).into_iter().zip(bars(&moved)).enumerate() {
+            let moved = moved * scale * scale;
+            assert!((expected - moved).abs() < 1e-4 * expected, "{scale} {offset} {i}: {expected} {moved}");
+        }
     }
 }
 

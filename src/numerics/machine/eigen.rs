@@ -35,7 +35,7 @@ pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Small, Small) {
 /// Annihilates `a[p][q]`; answers whether it was worth it.
 fn rotate(a: &mut [f64], v: &mut [f64], k: usize, p: usize, q: usize) -> bool {
     let (app, aqq, apq) = (a[p * k + p], a[q * k + q], a[p * k + q]);
-    if apq.abs() <= 0.25 * f64::EPSILON * (app.abs() * aqq.abs()).sqrt() || apq == 0.0 {
+    if apq.abs() <= 0.25 * f64::EPSILON * app.abs().sqrt() * aqq.abs().sqrt() || apq == 0.0 {
         return false;
     }
     let theta = (aqq - app) / (2.0 * apq);
@@ -90,6 +90,16 @@ mod tests {
                     prop_assert!((dot - f64::from(u8::from(a == b))).abs() < 1e-14);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn sizes_whose_squares_are_out_of_range_change_nothing() {
+        // √3 and −√3 times the size.
+        for size in [1e-200, 1e200] {
+            let (values, _) = symmetric_eigen(&[size, std::f64::consts::SQRT_2 * size, 0.0, -size], 2);
+            assert!((values[0] / size + 3f64.sqrt()).abs() < 1e-15, "{values:?}");
+            assert!((values[1] / size - 3f64.sqrt()).abs() < 1e-15, "{values:?}");
         }
     }
 

@@ -6,8 +6,17 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// `√Σv²`; where the squares leave the range of float64 the components are scaled first.
 pub(crate) fn norm(v: &[f64]) -> f64 {
-    dot(v, v).sqrt()
+    let squared = dot(v, v);
+    if (f64::MIN_POSITIVE / f64::EPSILON..f64::INFINITY).contains(&squared) {
+        return squared.sqrt();
+    }
+    let largest = v.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
+    if largest == 0.0 || largest.is_infinite() {
+        return squared.sqrt();
+    }
+    largest * v.iter().map(|c| (c / largest).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The vector of length 1 in the same direction; zero for zero. Components are scaled first, so that none is lost to the range
@@ -47,6 +56,16 @@ mod tests {
         }
         // Normals of merged points may cancel.
         assert_eq!(unit(&[0.0, 0.0])[..], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn lengths_are_right_where_their_squares_are_out_of_range() {
+        for size in [1e-300, 1e-160, 1e-3, 1e160, 1e300] {
+            assert!((norm(&[3.0 * size, 0.0, -4.0 * size]) / (5.0 * size) - 1.0).abs() < 1e-15, "{size}");
+        }
+        assert_eq!(norm(&[0.0, 0.0]), 0.0);
+        assert_eq!(norm(&[1.0, f64::INFINITY]), f64::INFINITY);
+        assert!(norm(&[1e200, f64::NAN]).is_nan() && norm(&[0.0, f64::NAN]).is_nan());
     }
 
     #[test]

@@ -35,6 +35,7 @@ pub struct PatchGeometry {
 
 /// Standard deviations of curvatures, 1/L (1/L^{d−1} for Gauss), in flat arrays; principal ones ascending by the curvatures for the
 /// normals they come with.
+#[derive(Default)]
 pub struct CurvatureDeviations {
     /// `[m, d−1]`
     pub principal: Vec<f64>,
@@ -42,7 +43,14 @@ pub struct CurvatureDeviations {
     pub mean: Vec<f64>,
     /// `[m]`
     pub gaussian: Vec<f64>,
+    /// Whether the surface turns by a radian or more within the radius of the neighbourhood, `[m]`: too much for a quadric, and for
+    /// what deviations can say.
+    pub is_bent: Vec<bool>,
 }
+
+/// Largest curvature in units of the radius of the neighbourhood from which a surface is bent: half of what is off by half in spite of small
+/// deviations is beyond, and 2 % of what is right (docs/error-bars.md).
+const BENT: f64 = 1.0;
 
 impl PatchGeometry {
     fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
@@ -50,6 +58,7 @@ impl PatchGeometry {
             principal: vec![0.0; m * (d - 1)],
             mean: vec![0.0; m],
             gaussian: vec![0.0; m],
+            is_bent: vec![false; m],
         });
         Self {
             is_known: vec![false; m],
@@ -68,8 +77,11 @@ impl PatchGeometry {
         let mut curvatures: Vec<Option<CurvatureSlots<'_>>> = Vec::new();
         if let Some(deviations) = &mut self.curvatures {
             let rest = deviations.mean.chunks_mut(lanes).zip(deviations.gaussian.chunks_mut(lanes));
+            let rest = rest.zip(deviations.is_bent.chunks_mut(lanes));
             let all = deviations.principal.chunks_mut(lanes * (d - 1)).zip(rest);
-            let slots = |(principal, (mean, gaussian))| Some(CurvatureSlots { principal, mean, gaussian });
+            let slots = |(principal, ((mean, gaussian), is_bent))| {
+                Some(CurvatureSlots { principal, mean, gaussian, is_bent })
+            };
             curvatures.extend(all.map(slots));
         }
         curvatures.resize_with(n_slots, || None);
@@ -99,6 +111,7 @@ struct CurvatureSlots<'a> {
     principal: &'a mut [f64],
     mean: &'a mut [f64],
     gaussian: &'a mut [f64],
+    is_bent: &'a mut [bool],
 }
 
 impl Slots<'_> {
@@ -109,12 +122,15 @@ impl Slots<'_> {
         let (normal, shape) = in_space(estimate, place, d);
         self.normals[lane * d..][..d].copy_from_slice(&normal);
         self.shapes[lane * d * d..][..d * d].copy_from_slice(&shape);
-        self.heights[lane] = -estimate.means[0];
+        self.heights[lane] = -estimate.means[0] * place.radius;
         self.normal_deviations[lane] = estimate.normal_deviation(d, are_points);
         if let Some(curvatures) = &mut self.curvatures {
             let found = estimate.curvatures(d, are_points);
-            curvatures.principal[lane * k..][..k].copy_from_slice(&found.principal);
-            (curvatures.mean[lane], curvatures.gaussian[lane]) = (found.mean, found.gaussian);
+            let principal = curvatures.principal[lane * k..][..k].iter_mut();
+            principal.zip(&found.principal).for_each(|(slot, deviation)| *slot = deviation / place.radius);
+            curvatures.mean[lane] = found.mean / place.radius;
+            curvatures.gaussian[lane] = found.gaussian / place.radius.powi(k as i32);
+            curvatures.is_bent[lane] = found.bend >= BENT;
         }
     }
 }
@@ -148,7 +164,7 @@ impl Patches {
                 room.krige(&models, Purpose::Prediction);
                 for (lane, place) in places.iter().enumerate() {
                     let Some(place) = place else { continue };
-                    if let Some(estimate) = Estimate::of(place, &self.models, &room.kriged[lane], d) {
+                    if let Some(estimate) = Estimate::of(&self.models, &room.kriged[lane], d) {
                         slots.put(lane, place, &estimate, d, are_points);
                     }
                 }
@@ -173,7 +189,7 @@ fn in_space(estimate: &Estimate, place: &Neighbourhood, d: usize) -> (Small, Sma
     let mut shape = zeros(d * d);
     for a in 0..k {
         for b in 0..k {
-            let entry = -hessian[a * k + b] / length;
+            let entry = -hessian[a * k + b] / (length * place.radius);
             for (i, u) in axis(a).iter().enumerate() {
                 for (j, v) in axis(b).iter().enumerate() {
                     shape[i * d + j] += entry * u * v;

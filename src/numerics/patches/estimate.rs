@@ -1,6 +1,5 @@
 //! What the models say together of the surface at one query.
 
-use super::neighbourhood::Neighbourhood;
 use super::pooled::{Weighted, responsibilities};
 use super::regression::{Kriged, Squares, Terms, n_terms};
 use crate::numerics::machine::eigen::symmetric_eigen;
@@ -15,26 +14,22 @@ const MEAN_MAGNITUDE: f64 = 0.8;
 /// 95 % bound of the length of an error in the plane with equal deviations, against 1.96, squared, minus 1.
 const SECOND_DIRECTION: f64 = 0.56;
 
-/// Heights over a tangent plane with derivatives up to second order, in units of L, with their uncertainty.
+/// Heights over a tangent plane with derivatives up to second order and their uncertainty, all in units of the radius of the
+/// neighbourhood: the fourth powers of lengths that variances of curvatures are would leave the range of float64.
 pub(crate) struct Estimate {
     /// Value, slopes, second derivatives, `[p]`.
     pub means: Terms,
     pub covariance: Squares,
-    /// σ²: variance of a point across the surface, L².
+    /// σ²: variance of a point across the surface.
     pub noise: f64,
-    /// Variance of a third derivative along three axes, by the prior, L⁻⁴.
+    /// Variance of a third derivative along three axes, by the prior.
     pub third: f64,
 }
 
 impl Estimate {
     /// The mixture of what each model says; `None` where none says anything.
-    pub(crate) fn of(
-        neighbourhood: &Neighbourhood,
-        models: &[Weighted],
-        kriged: &[Kriged],
-        dimension: usize,
-    ) -> Option<Self> {
-        let (p, radius) = (n_terms(dimension), neighbourhood.radius);
+    pub(crate) fn of(models: &[Weighted], kriged: &[Kriged], dimension: usize) -> Option<Self> {
+        let p = n_terms(dimension);
         let shares = responsibilities(models, kriged);
         let used = || shares.iter().zip(kriged).filter(|(share, _)| **share > 0.0);
         let mut means = Terms::from_elem(0.0, p);
@@ -64,15 +59,7 @@ impl Estimate {
         {
             return None;
         }
-        // From units of the radius to those of the client.
-        let unit = |term: usize| match term {
-            0 => radius,
-            term if term < dimension => 1.0,
-            _ => 1.0 / radius,
-        };
-        (0..p).for_each(|i| means[i] *= unit(i));
-        (0..p * p).for_each(|at| covariance[at] *= unit(at / p) * unit(at % p));
-        Some(Self { means, covariance, noise: noise * radius * radius, third: third / radius.powi(4) })
+        Some(Self { means, covariance, noise, third })
     }
 
     /// Second derivatives as a matrix `[k, k]`.
@@ -150,7 +137,8 @@ impl Estimate {
         let beside: f64 = (0..k).map(|i| others(i).powi(2) * THIRD_OF_CURVATURE * moved).sum::<f64>();
         let products: f64 = principal.iter().map(|deviation| deviation * deviation).product();
         let gaussian = (variance(&sum_with(&others)) + beside + products).sqrt();
-        CurvatureEstimate { principal, mean, gaussian }
+        let bend = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        CurvatureEstimate { principal, mean, gaussian, bend }
     }
 }
 
@@ -159,10 +147,13 @@ impl Estimate {
 const THIRD_OF_CURVATURE: f64 = 18.0;
 const THIRD_OF_MEAN: f64 = 12.0;
 
+/// In units of the radius of the neighbourhood.
 pub(crate) struct CurvatureEstimate {
     pub principal: Small,
     pub mean: f64,
     pub gaussian: f64,
+    /// The largest curvature.
+    pub bend: f64,
 }
 
 /// Coefficients of `uᵀHv` in the second derivatives of the upper triangle.

@@ -137,7 +137,7 @@ impl Patches {
 
     /// Largest deviation of a principal curvature, variance of the noise, ℓ and s² of one neighbourhood.
     fn summary(&self, at: &Neighbourhood, kriged: &[Kriged], d: usize) -> Option<(f64, f64, f64, f64)> {
-        let estimate = Estimate::of(at, &self.models, kriged, d)?;
+        let estimate = Estimate::of(&self.models, kriged, d)?;
         let deviations = estimate.curvatures(d, true).principal;
         let shares = responsibilities(&self.models, kriged);
         let (mut length_scale, mut variance, mut noise) = (0.0, 0.0, 0.0);
@@ -151,7 +151,7 @@ impl Patches {
                 share * if weighted.model.noise > 1e-7 { kriged.scale * weighted.model.noise } else { 0.0 };
         }
         Some((
-            deviations.iter().copied().fold(0.0, f64::max),
+            deviations.iter().copied().fold(0.0, f64::max) / at.radius,
             noise * at.radius.powi(2),
             length_scale,
             variance,

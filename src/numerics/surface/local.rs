@@ -22,9 +22,9 @@ use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 /// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
 const SAYS_SIGN: f64 = 0.2;
 
-/// Deviation of a principal curvature over the largest one beyond which it is flagged: of those that pass 1 % are off by half, at any
-/// noise. Were the largest one known, 1/6 would do; an estimate that is too large has smaller deviations beside it.
-const RESOLVED: f64 = 0.13;
+/// Deviation of a principal curvature over the largest one beyond which it is flagged: three deviations are half of it. Of those that pass,
+/// and are not bent, less than 1 % are off by half, at any noise (docs/error-bars.md).
+const RESOLVED: f64 = 1.0 / 6.0;
 
 /// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
 /// that are off by 30°.
@@ -163,7 +163,9 @@ impl LocalSurface {
     /// Whether the curvatures are known well enough to be used.
     fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
         let d = self.cloud.dimension();
-        let Some(deviations) = &geometry.curvatures else { return false };
+        let Some(deviations) = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query]) else {
+            return false;
+        };
         let (normal, shape) =
             (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
         let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
@@ -229,7 +231,7 @@ fn orient(
 
 /// Deviations in the order of the curvatures for normals of this sign.
 fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
-    let empty = CurvatureDeviations { principal: Vec::new(), mean: Vec::new(), gaussian: Vec::new() };
+    let empty = CurvatureDeviations::default();
     let curvatures = geometry.curvatures.as_ref().unwrap_or(&empty);
     let mut principal = curvatures.principal.clone();
     if sign < 0.0 {
@@ -265,8 +267,9 @@ impl PatchGeometry {
     /// Bytes held on the heap.
     fn n_bytes(&self) -> usize {
         let lists = [&self.normals, &self.shapes, &self.heights, &self.normal_deviations];
-        let of_curvatures =
-            |c: &CurvatureDeviations| vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian);
+        let of_curvatures = |c: &CurvatureDeviations| {
+            vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian) + vec_bytes(&c.is_bent)
+        };
         lists.into_iter().map(vec_bytes).sum::<usize>()
             + vec_bytes(&self.is_known)
             + vec_bytes(&self.is_at_rim)
