@@ -155,16 +155,16 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let geometry = &surface.geometry;
+        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
         if let Some(nodes) = &work.nodes {
-            let values = work.by_stencils(fits, &surface, nodes, laplace_beltrami_stencils, observer)?;
+            let values = work.by_stencils(fits, &mut surface, nodes, laplace_beltrami_stencils, observer)?;
             return Ok(LaplaceBeltramiResponse {
-                values: surface.per_query(values, &[geometry.n_queries()]),
+                values: surface.per_query(values, &[surface.geometry.n_queries()]),
                 degenerate: surface.degenerate(),
                 diagnostics: surface.diagnostics(fits)?,
             });
         }
+        let geometry = &surface.geometry;
         let interpolant = fits.interpolant(&work.values, observer)?;
         let values = laplace_beltrami(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
@@ -282,9 +282,9 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiSparseMatrixResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
         let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
-        let matrix = work.matrix(fits, &surface, laplace_beltrami_stencils, observer)?;
+        let matrix = work.matrix(fits, &mut surface, laplace_beltrami_stencils, observer)?;
         let n_entries = matrix.indices.len();
         let shape = vec![m as i64, n as i64];
         let data = Array::new(matrix.data, &[n_entries]);

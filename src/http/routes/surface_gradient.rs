@@ -139,11 +139,11 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let geometry = &surface.geometry;
+        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
         if let Some(nodes) = &work.nodes {
-            let (m, d) = (geometry.n_queries(), geometry.dimension());
-            let components = work.by_stencils(fits, &surface, nodes, surface_gradient_stencils, observer)?;
+            let (m, d) = (surface.geometry.n_queries(), surface.geometry.dimension());
+            let components =
+                work.by_stencils(fits, &mut surface, nodes, surface_gradient_stencils, observer)?;
             let gradients = (0..m * d).map(|at| components[at % d * m + at / d]).collect();
             return Ok(SurfaceGradientResponse {
                 gradients: surface.per_query(gradients, &[m, d]),
@@ -151,6 +151,7 @@ impl Operation for SurfaceGradientRequest {
                 diagnostics: surface.diagnostics(fits)?,
             });
         }
+        let geometry = &surface.geometry;
         let interpolant = fits.interpolant(&work.values, observer)?;
         let gradients = surface_gradient(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
@@ -267,9 +268,9 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientSparseMatrixResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
+        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
         let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
-        let matrix = work.matrix(fits, &surface, surface_gradient_stencils, observer)?;
+        let matrix = work.matrix(fits, &mut surface, surface_gradient_stencils, observer)?;
         let (n_entries, d) = (matrix.indices.len(), surface.geometry.dimension());
         let shape = vec![d as i64, m as i64, n as i64];
         let data = Array::new(matrix.data, &[d, n_entries]);

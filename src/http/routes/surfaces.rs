@@ -22,7 +22,7 @@ use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use crate::numerics::surface::operators::SparseMatrix;
+use crate::numerics::surface::operators::{SparseMatrix, Stencils as SparseStencils};
 use crate::store::clouds::RegisteredCloud;
 
 /// A checked request for normals or curvatures.
@@ -184,36 +184,39 @@ type Stencils = fn(
     &Neighbours,
     &Cloud,
     &dyn Observer,
-) -> Result<SparseMatrix, NumericsError>;
+) -> Result<SparseStencils, NumericsError>;
 
 impl StencilWork {
-    /// The matrix.
+    /// The matrix; queries that its nodes do not resolve are flagged.
     ///
     /// # Errors
     /// Those of the numerics as a [`Problem`].
     pub fn matrix(
         &self,
         fits: &Fits,
-        surface: &SurfaceGeometry,
+        surface: &mut SurfaceGeometry,
         stencils: Stencils,
         observer: &JobObserver,
     ) -> Result<SparseMatrix, Problem> {
         let nodes = &self.nodes.cloud;
         let of =
             |neighbours: &Neighbours| stencils(&surface.geometry, nodes, neighbours, &self.queries, observer);
-        with_neighbours(&surface.surface, nodes, of).map_err(|error| fits.surface().refused(error))
+        let found = with_neighbours(&surface.surface, nodes, of);
+        let found = found.map_err(|error| fits.surface().refused(error))?;
+        surface.geometry.take_resolutions(&found.resolutions);
+        Ok(found.matrix)
     }
 }
 
 impl AppliedWork {
-    /// An operator applied to the values by stencils, `[components, m]`.
+    /// An operator applied to the values by stencils, `[components, m]`; queries that their nodes do not resolve are flagged.
     ///
     /// # Errors
     /// Those of the numerics as a [`Problem`].
     pub fn by_stencils(
         &self,
         fits: &Fits,
-        surface: &SurfaceGeometry,
+        surface: &mut SurfaceGeometry,
         nodes: &RegisteredCloud,
         stencils: Stencils,
         observer: &JobObserver,
@@ -221,8 +224,10 @@ impl AppliedWork {
         let of = |neighbours: &Neighbours| {
             stencils(&surface.geometry, &nodes.cloud, neighbours, &self.queries, observer)
         };
-        let matrix = with_neighbours(&surface.surface, &nodes.cloud, of);
-        Ok(matrix.map_err(|error| fits.surface().refused(error))?.apply(&self.values))
+        let found = with_neighbours(&surface.surface, &nodes.cloud, of);
+        let found = found.map_err(|error| fits.surface().refused(error))?;
+        surface.geometry.take_resolutions(&found.resolutions);
+        Ok(found.matrix.apply(&self.values))
     }
 }
 

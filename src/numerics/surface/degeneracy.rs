@@ -45,6 +45,17 @@ pub struct Degeneracy {
     pub gradient_norm: f64,
 }
 
+/// What the nodes around a query are good for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Resolution {
+    Resolved,
+    /// They see the curvature of the surface wrong.
+    Unresolved,
+    /// There are too few of them, or no query: the row is empty.
+    #[default]
+    Empty,
+}
+
 /// T1: multiple of the rounding bound under which a gradient is rounding.
 const ROUNDING_FACTOR: f64 = 64.0;
 

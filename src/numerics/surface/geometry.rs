@@ -1,10 +1,12 @@
 //! Normals, shape operator and curvatures of a surface at queries.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
-use super::degeneracy::Degeneracy;
+use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use super::served::{Deviations, Served, ServedBy};
 use crate::numerics::error::NumericsError;
@@ -84,6 +86,33 @@ impl Geometry {
     /// The queries without answer or with a flag, ascending.
     pub fn degenerate(&self) -> &[Degeneracy] {
         &self.degenerate
+    }
+
+    /// Flags queries around which nodes do not resolve the surface, and has no answer where there are too few of them.
+    pub fn take_resolutions(&mut self, resolutions: &[Resolution]) {
+        let is_flagged: HashSet<usize> = self.degenerate.iter().map(|entry| entry.query).collect();
+        for (query, resolution) in resolutions.iter().enumerate() {
+            if *resolution == Resolution::Resolved {
+                continue;
+            }
+            if !is_flagged.contains(&query) {
+                let gradient_norm = self.gradient_norms[query];
+                self.degenerate.push(Degeneracy {
+                    query,
+                    reason: DegeneracyReason::UnderResolved,
+                    gradient_norm,
+                });
+            }
+            self.is_null[query] |= *resolution == Resolution::Empty;
+        }
+        self.degenerate.sort_by_key(|entry| entry.query);
+    }
+
+    /// Magnitude of the largest principal curvature at a query with an answer, 1/L.
+    pub(crate) fn largest_curvature(&self, query: usize) -> f64 {
+        let (gradient, hessian) = (self.served.gradient(query), self.served.hessian(query));
+        let (values, _) = principal_curvatures(gradient, hessian, self.served.verdict(query).sign);
+        values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
     }
 
     /// The model that serves a query.

@@ -4,6 +4,7 @@
 //! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
 //! to each kernel translate, by a solve with m right-hand sides.
 
+mod resolution;
 mod stencils;
 
 use std::sync::Arc;
@@ -24,7 +25,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::Solver;
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
-pub use stencils::{SparseMatrix, laplace_beltrami_stencils, surface_gradient_stencils};
+pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
 ///
@@ -107,14 +108,6 @@ enum Operator {
 }
 
 impl Operator {
-    /// Of the highest derivative.
-    fn order(self) -> usize {
-        match self {
-            Self::SurfaceGradient => 1,
-            Self::LaplaceBeltrami => 2,
-        }
-    }
-
     /// Rows per query.
     fn n_components(self, dimension: usize) -> usize {
         match self {

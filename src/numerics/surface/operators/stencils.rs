@@ -9,8 +9,10 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 use rayon::prelude::*;
 
+use super::super::degeneracy::Resolution;
 use super::super::geometry::Geometry;
 use super::Operator;
+use super::resolution::resolution;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::small::Small;
 use crate::numerics::machine::vector::{dot, norm, tangent_basis};
@@ -20,6 +22,9 @@ use crate::numerics::points::monomials::{
     MAX_STENCIL_DEGREE, NODES_PER_MONOMIAL, exponents, n_monomials, n_stencil_nodes,
 };
 use crate::numerics::points::neighbours::{Neighbour, Neighbours};
+
+/// Degree of the polynomials that r⁵ asks for: it is conditionally positive definite of order 3 (Wendland 2005, sec. 8.3).
+const LEAST_DEGREE: usize = 2;
 
 /// Slope beyond which a node is on another sheet.
 const STEEP: f64 = 1.0;
@@ -36,8 +41,16 @@ pub struct SparseMatrix {
     pub data: Vec<f64>,
 }
 
-/// The Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit 1/L²; rows of null queries are
-/// empty.
+/// The weights at all queries, and which of them are to be trusted.
+#[derive(Debug)]
+pub struct Stencils {
+    pub matrix: SparseMatrix,
+    /// `[m]`
+    pub resolutions: Vec<Resolution>,
+}
+
+/// The Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit 1/L²; rows of null queries, and of
+/// queries with too few nodes, are empty.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -47,7 +60,7 @@ pub fn laplace_beltrami_stencils(
     neighbours: &Neighbours,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<SparseMatrix, NumericsError> {
+) -> Result<Stencils, NumericsError> {
     stencils(geometry, (nodes, neighbours), queries, Operator::LaplaceBeltrami, observer)
 }
 
@@ -61,7 +74,7 @@ pub fn surface_gradient_stencils(
     neighbours: &Neighbours,
     queries: &Cloud,
     observer: &dyn Observer,
-) -> Result<SparseMatrix, NumericsError> {
+) -> Result<Stencils, NumericsError> {
     stencils(geometry, (nodes, neighbours), queries, Operator::SurfaceGradient, observer)
 }
 
@@ -71,7 +84,7 @@ fn stencils(
     queries: &Cloud,
     operator: Operator,
     observer: &dyn Observer,
-) -> Result<SparseMatrix, NumericsError> {
+) -> Result<Stencils, NumericsError> {
     nodes.check_same_dimension(queries)?;
     observer.enter(Stage::Evaluate);
     let d = nodes.dimension();
@@ -82,7 +95,8 @@ fn stencils(
         }
         let x = queries.point(query);
         neighbours.nearest_positions_into(nodes, x, n_stencil_nodes(d), nearest);
-        let row = Row::at(nodes, x, geometry.normal(query), nearest, operator).unwrap_or_default();
+        let site = Site { x, normal: geometry.normal(query), curvature: geometry.largest_curvature(query) };
+        let row = Row::at(nodes, &site, nearest, operator).unwrap_or_default();
         match row.weights.iter().all(|weight| weight.is_finite()) {
             true => Ok(row),
             false => Err(NumericsError::Overflow { query }),
@@ -90,7 +104,16 @@ fn stencils(
     };
     let rows = (0..queries.n_points()).into_par_iter().map_init(Vec::new, row);
     let rows: Vec<Row> = rows.collect::<Result<_, NumericsError>>()?;
-    Ok(SparseMatrix::of(&rows, operator.n_components(d)))
+    let resolutions = rows.iter().map(|row| row.resolution).collect();
+    Ok(Stencils { matrix: SparseMatrix::of(&rows, operator.n_components(d)), resolutions })
+}
+
+/// A query on the surface.
+struct Site<'a> {
+    x: &'a [f64],
+    normal: &'a [f64],
+    /// Magnitude of the largest principal curvature, 1/L.
+    curvature: f64,
 }
 
 impl SparseMatrix {
@@ -132,17 +155,13 @@ struct Row {
     columns: Vec<u32>,
     /// `[components, columns]`
     weights: Vec<f64>,
+    resolution: Resolution,
 }
 
 impl Row {
     /// `None` if too few nodes lie around x.
-    fn at(
-        nodes: &Cloud,
-        x: &[f64],
-        normal: &[f64],
-        nearest: &[Neighbour],
-        operator: Operator,
-    ) -> Option<Self> {
+    fn at(nodes: &Cloud, site: &Site<'_>, nearest: &[Neighbour], operator: Operator) -> Option<Self> {
+        let Site { x, normal, curvature } = *site;
         let (d, k) = (x.len(), x.len() - 1);
         let axes = tangent_basis(normal);
         let (mut columns, mut coordinates) = (Vec::new(), Vec::new());
@@ -155,19 +174,20 @@ impl Row {
             }
         }
         let radius = coordinates.chunks_exact(k).map(norm).fold(0.0, f64::max);
-        let degree = (1..=MAX_STENCIL_DEGREE).rev().find(|&degree| {
+        let degree = (LEAST_DEGREE..=MAX_STENCIL_DEGREE).rev().find(|&degree| {
             columns.len() as f64 >= (NODES_PER_MONOMIAL - 0.5) * n_monomials(k, degree) as f64
         })?;
-        if radius <= 0.0 || degree < operator.order() {
+        if radius <= 0.0 {
             return None;
         }
         coordinates.iter_mut().for_each(|t| *t /= radius);
         let forms = solve(&coordinates, k, degree, operator)?;
+        let resolution = resolution(&forms, &coordinates, k, curvature * radius, operator);
         let weights = match operator {
             Operator::LaplaceBeltrami => forms.iter().map(|w| w / (radius * radius)).collect(),
             Operator::SurfaceGradient => in_space(&forms, &axes, radius, d),
         };
-        Some(Self { columns, weights }.sorted(operator.n_components(d)))
+        Some(Self { columns, weights, resolution }.sorted(operator.n_components(d)))
     }
 
     fn sorted(self, n_components: usize) -> Self {
@@ -177,7 +197,7 @@ impl Row {
         let columns = order.iter().map(|&at| self.columns[at]).collect();
         let weight = |component: usize| order.iter().map(move |&at| component * n + at);
         let weights = (0..n_components).flat_map(weight).map(|at| self.weights[at]).collect();
-        Self { columns, weights }
+        Self { columns, weights, resolution: self.resolution }
     }
 }
 
@@ -254,6 +274,11 @@ mod tests {
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     fn matrices(cloud: &Cloud) -> (SparseMatrix, SparseMatrix) {
+        let (laplacian, gradient) = stencils_of(cloud);
+        (laplacian.matrix, gradient.matrix)
+    }
+
+    fn stencils_of(cloud: &Cloud) -> (Stencils, Stencils) {
         let cloud = Arc::new(cloud.clone());
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
         let surface = LocalSurface::of(cloud.clone(), sampling.clone(), None, &Unobserved).unwrap();
@@ -264,6 +289,37 @@ mod tests {
             laplace_beltrami_stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
             surface_gradient_stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
         )
+    }
+
+    #[test]
+    fn coarse_circles_and_spheres_are_right_or_said_to_be_unresolved() {
+        let clouds =
+            (8..100).step_by(4).flat_map(|n| [circle(n), fibonacci_sphere(n), fibonacci_sphere(4 * n)]);
+        let (mut n_resolved, mut n_unresolved) = (0, 0);
+        for cloud in clouds {
+            let d = cloud.dimension();
+            let (laplacian, gradient) = stencils_of(&cloud);
+            // Coordinates are eigenfunctions: Δx = −(d − 1)x, ∇x_c = e_c − x_c x.
+            for c in 0..d {
+                let values: Vec<f64> = cloud.points().map(|x| x[c]).collect();
+                let (found, slopes) = (laplacian.matrix.apply(&values), gradient.matrix.apply(&values));
+                for (i, x) in cloud.points().enumerate() {
+                    let error = (found[i] / (d as f64 - 1.0) + x[c]).abs();
+                    let is_resolved = laplacian.resolutions[i] == Resolution::Resolved;
+                    *(if is_resolved { &mut n_resolved } else { &mut n_unresolved }) += 1;
+                    // The test function is the one coordinate that is curved, along the normal.
+                    assert!(!is_resolved || error < 0.15, "{d} {} {i}: {error}", cloud.n_points());
+                    if gradient.resolutions[i] == Resolution::Resolved {
+                        for a in 0..d {
+                            let exact = f64::from(u8::from(a == c)) - x[a] * x[c];
+                            let error = (slopes[a * cloud.n_points() + i] - exact).abs();
+                            assert!(error < 0.15, "{d} {} {i}: {error}", cloud.n_points());
+                        }
+                    }
+                }
+            }
+        }
+        assert!(n_resolved > 1000 && n_unresolved > 1000, "{n_resolved} {n_unresolved}");
     }
 
     #[test]
