@@ -118,6 +118,26 @@ async fn sparse_matrices_apply_as_the_operators_do() {
 }
 
 #[tokio::test]
+async fn too_few_points_for_an_operator_are_said_to_be() {
+    let server = Server::start().await;
+    for (n, is_empty) in [(10, true), (20, false)] {
+        let angle = |i: usize| 2.0 * PI * i as f64 / n as f64;
+        let points: Vec<[f64; 2]> = (0..n).map(|i| [angle(i).cos(), angle(i).sin()]).collect();
+        let body = json!({"cloud": {"points": points}, "solver": "local"});
+        let matrix = server.post("/v1/laplace-beltrami/sparse-matrix", &body).await.expect_ok();
+        assert_eq!(numbers(&matrix["indptr"])[n] == 0.0, is_empty);
+        let values: Vec<f64> = points.iter().map(|x| x[0]).collect();
+        let applied = json!({"cloud": {"points": points}, "solver": "local", "values": values});
+        let applied = server.post("/v1/laplace-beltrami", &applied).await.expect_ok();
+        assert!(applied["values"].as_array().unwrap().iter().all(|value| value.is_null() == is_empty));
+        for answer in [matrix, applied] {
+            let flags = answer["degenerate"].as_array().unwrap();
+            assert!(flags.len() == n && flags.iter().all(|flag| flag["reason"] == "under_resolved"));
+        }
+    }
+}
+
+#[tokio::test]
 async fn what_local_regressions_lack_is_refused_by_name() {
     let server = Server::start().await;
     let points = fibonacci_sphere(60);
