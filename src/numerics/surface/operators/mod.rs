@@ -108,6 +108,14 @@ enum Operator {
 }
 
 impl Operator {
+    /// Of the highest derivative.
+    fn order(self) -> usize {
+        match self {
+            Self::SurfaceGradient => 1,
+            Self::LaplaceBeltrami => 2,
+        }
+    }
+
     /// Rows per query.
     fn n_components(self, dimension: usize) -> usize {
         match self {

@@ -7,6 +7,10 @@ use crate::numerics::machine::vector::{dot, norm};
 /// Relative error of the test function from which nodes do not resolve the surface.
 const UNRESOLVED: f64 = 0.1;
 
+/// Curvature of the test function at least, in units of the radius of the nodes: on flat surfaces too weights are to bear a function that
+/// bends.
+const LEAST_CURVATURE: f64 = 0.3;
+
 /// Tries weights of scaled forms (one for the Laplacian, k for the gradient, `[forms, n]`) on a function whose derivatives are known: the
 /// height of a sphere over its tangent plane, with the largest curvature κ of the surface in units of the radius of the nodes,
 /// `g(t) = (1 − √(1 − κ²|t|²))/κ`, of which the Laplacian at 0 is kκ and the gradient 0. Coordinates along the surface, `[n, k]`,
@@ -18,6 +22,7 @@ pub(super) fn resolution(
     curvature: f64,
     operator: Operator,
 ) -> Resolution {
+    let curvature = curvature.max(LEAST_CURVATURE);
     let height = |t: &[f64]| curvature * dot(t, t) / (1.0 + (1.0 - curvature.powi(2) * dot(t, t)).sqrt());
     let heights: Vec<f64> = coordinates.chunks_exact(k).map(height).collect();
     let found: Vec<f64> = forms.chunks_exact(heights.len()).map(|form| dot(form, &heights)).collect();
