@@ -127,9 +127,14 @@ async fn too_few_points_for_an_operator_are_said_to_be() {
         let matrix = server.post("/v1/laplace-beltrami/sparse-matrix", &body).await.expect_ok();
         assert_eq!(numbers(&matrix["indptr"])[n] == 0.0, is_empty);
         let values: Vec<f64> = points.iter().map(|x| x[0]).collect();
-        let applied = json!({"cloud": {"points": points}, "solver": "local", "values": values});
-        let applied = server.post("/v1/laplace-beltrami", &applied).await.expect_ok();
+        let request = json!({"cloud": {"points": points}, "solver": "local", "values": values});
+        let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
         assert!(applied["values"].as_array().unwrap().iter().all(|value| value.is_null() == is_empty));
+        let slopes = server.post("/v1/surface-gradient", &request).await.expect_ok();
+        let rows = slopes["gradients"].as_array().unwrap();
+        assert!(rows.len() == n && rows.iter().all(|row| row.is_null() == is_empty));
+        let gradient = server.post("/v1/surface-gradient/sparse-matrix", &body).await.expect_ok();
+        assert_eq!(gradient["data"].as_array().unwrap().len(), 2);
         for answer in [matrix, applied] {
             let flags = answer["degenerate"].as_array().unwrap();
             assert!(flags.len() == n && flags.iter().all(|flag| flag["reason"] == "under_resolved"));

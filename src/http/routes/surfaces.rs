@@ -22,7 +22,7 @@ use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use crate::numerics::surface::operators::{SparseMatrix, Stencils as SparseStencils};
+use crate::numerics::surface::operators::{SparseMatrix, Stencils};
 use crate::store::clouds::RegisteredCloud;
 
 /// A checked request for normals or curvatures.
@@ -169,7 +169,6 @@ pub fn plan_matrix(
     Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, cost })
 }
 
-/// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
 /// Checked work of an operator as a sparse matrix.
 pub struct StencilWork {
     pub nodes: Arc<RegisteredCloud>,
@@ -178,13 +177,13 @@ pub struct StencilWork {
 }
 
 /// One of the operators as a sparse matrix.
-type Stencils = fn(
+type Assemble = fn(
     &SurfaceGeometryAtQueries,
     &Cloud,
     &Neighbours,
     &Cloud,
     &dyn Observer,
-) -> Result<SparseStencils, NumericsError>;
+) -> Result<Stencils, NumericsError>;
 
 impl StencilWork {
     /// The matrix; queries that its nodes do not resolve are flagged.
@@ -195,16 +194,10 @@ impl StencilWork {
         &self,
         fits: &Fits,
         surface: &mut SurfaceGeometry,
-        stencils: Stencils,
+        assemble: Assemble,
         observer: &JobObserver,
     ) -> Result<SparseMatrix, Problem> {
-        let nodes = &self.nodes.cloud;
-        let of =
-            |neighbours: &Neighbours| stencils(&surface.geometry, nodes, neighbours, &self.queries, observer);
-        let found = with_neighbours(&surface.surface, nodes, of);
-        let found = found.map_err(|error| fits.surface().refused(error))?;
-        surface.geometry.take_resolutions(&found.resolutions);
-        Ok(found.matrix)
+        matrix_of(fits, surface, (&self.nodes.cloud, &self.queries), assemble, observer)
     }
 }
 
@@ -218,17 +211,27 @@ impl AppliedWork {
         fits: &Fits,
         surface: &mut SurfaceGeometry,
         nodes: &RegisteredCloud,
-        stencils: Stencils,
+        assemble: Assemble,
         observer: &JobObserver,
     ) -> Result<Vec<f64>, Problem> {
-        let of = |neighbours: &Neighbours| {
-            stencils(&surface.geometry, &nodes.cloud, neighbours, &self.queries, observer)
-        };
-        let found = with_neighbours(&surface.surface, &nodes.cloud, of);
-        let found = found.map_err(|error| fits.surface().refused(error))?;
-        surface.geometry.take_resolutions(&found.resolutions);
-        Ok(found.matrix.apply(&self.values))
+        let matrix = matrix_of(fits, surface, (&nodes.cloud, &self.queries), assemble, observer)?;
+        Ok(matrix.apply(&self.values))
     }
+}
+
+/// An operator at queries over nodes; queries that the nodes do not resolve are flagged.
+fn matrix_of(
+    fits: &Fits,
+    surface: &mut SurfaceGeometry,
+    (nodes, queries): (&Cloud, &Cloud),
+    assemble: Assemble,
+    observer: &JobObserver,
+) -> Result<SparseMatrix, Problem> {
+    let of = |neighbours: &Neighbours| assemble(&surface.geometry, nodes, neighbours, queries, observer);
+    let found = with_neighbours(&surface.surface, nodes, of);
+    let found = found.map_err(|error| fits.surface().refused(error))?;
+    surface.geometry.take_resolutions(&found.resolutions);
+    Ok(found.matrix)
 }
 
 /// Plans an operator as a sparse matrix.
@@ -264,6 +267,7 @@ fn with_neighbours<T>(surface: &Surface, nodes: &Cloud, of: impl FnOnce(&Neighbo
     }
 }
 
+/// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
 fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
     let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
     geometry_request(surface, Some(OrientationChoice::Gradient), true, None)

@@ -1,7 +1,5 @@
 //! Normals, shape operator and curvatures of a surface at queries.
 
-use std::collections::HashSet;
-
 use rayon::prelude::*;
 
 use super::Surface;
@@ -90,12 +88,13 @@ impl Geometry {
 
     /// Flags queries around which nodes do not resolve the surface, and has no answer where there are too few of them.
     pub fn take_resolutions(&mut self, resolutions: &[Resolution]) {
-        let is_flagged: HashSet<usize> = self.degenerate.iter().map(|entry| entry.query).collect();
+        let n_flagged = self.degenerate.len();
         for (query, resolution) in resolutions.iter().enumerate() {
             if *resolution == Resolution::Resolved {
                 continue;
             }
-            if !is_flagged.contains(&query) {
+            let flagged = &self.degenerate[..n_flagged];
+            if flagged.binary_search_by_key(&query, |entry| entry.query).is_err() {
                 let gradient_norm = self.gradient_norms[query];
                 self.degenerate.push(Degeneracy {
                     query,

@@ -33,6 +33,8 @@ const STEEP: f64 = 1.0;
 /// `indices[at]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseMatrix {
+    /// Numbers per entry: 1, or d for a gradient. Not to be told from `data` where all rows are empty.
+    pub n_components: usize,
     /// `[m + 1]`
     pub indptr: Vec<i64>,
     /// Ascending within a row.
@@ -143,19 +145,18 @@ impl SparseMatrix {
                 data.extend_from_slice(&row.weights[component * n..][..n]);
             }
         }
-        Self { indptr, indices, data }
+        Self { n_components, indptr, indices, data }
     }
 
     /// The products with values at the nodes, `[components, m]`.
     pub fn apply(&self, values: &[f64]) -> Vec<f64> {
         let (m, n_entries) = (self.indptr.len() - 1, self.indices.len());
-        let n_components = self.data.len().checked_div(n_entries).unwrap_or(1);
         let of_row = |component: usize, row: usize| {
             let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
             let weights = &self.data[component * n_entries..][range.clone()];
             weights.iter().zip(&self.indices[range]).map(|(w, &column)| w * values[column as usize]).sum()
         };
-        (0..n_components * m).into_par_iter().map(|at| of_row(at / m, at % m)).collect()
+        (0..self.n_components * m).into_par_iter().map(|at| of_row(at / m, at % m)).collect()
     }
 }
 
