@@ -1,11 +1,13 @@
 //! Normals, curvatures and deviations at many queries.
 
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::Patches;
 use super::estimate::Estimate;
 use super::neighbourhood::Neighbourhood;
-use super::regression::{Model, n_terms};
+use super::pooled::Weighted;
+use super::regression::{MAX_LANES, Model, n_terms};
 use super::room::{Purpose, Room};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::instruction_set::InstructionSet;
@@ -51,6 +53,9 @@ pub struct CurvatureDeviations {
 /// Largest curvature in units of the radius of the neighbourhood from which a surface is bent: half of what is off by half in spite of small
 /// deviations is beyond, and 2 % of what is right (docs/error-bars.md).
 const BENT: f64 = 1.0;
+
+/// Deviation of a normal below which its neighbourhood is flat enough for a stiffer process to give the slopes, radians.
+const FLAT: f64 = 0.03;
 
 impl PatchGeometry {
     fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
@@ -152,7 +157,8 @@ impl Patches {
         if self.count < n_terms(d) + 2 {
             return Ok(geometry);
         }
-        let models: Vec<Model> = self.models.iter().map(|weighted| weighted.model).collect();
+        let of = |mixture: &[Weighted]| mixture.iter().map(|weighted| weighted.model).collect::<Vec<Model>>();
+        let (models, stiff) = (of(&self.models), of(&self.stiff));
         let lanes = InstructionSet::best().n_lanes();
         let slots = geometry.slots(d, lanes).into_par_iter().enumerate();
         slots.try_for_each_init(
@@ -161,17 +167,42 @@ impl Patches {
                 observer.checkpoint()?;
                 let first = batch * lanes;
                 let places = room.put(self, queries, first..(first + lanes).min(m));
-                room.krige(&models, Purpose::Prediction);
-                for (lane, place) in places.iter().enumerate() {
-                    let Some(place) = place else { continue };
-                    if let Some(estimate) = Estimate::of(&self.models, &room.kriged[lane], d) {
-                        slots.put(lane, place, &estimate, d, are_points);
+                let estimates = self.estimates(room, &places, [&models, &stiff], (d, are_points));
+                for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
+                    if let (Some(place), Some(estimate)) = (place, estimate) {
+                        slots.put(lane, place, estimate, d, are_points);
                     }
                 }
                 Ok(())
             },
         )?;
         Ok(geometry)
+    }
+
+    /// What is known in each lane: by the models, but for the slopes of what is flat, which are those of the stiff ones.
+    fn estimates(
+        &self,
+        room: &mut Room,
+        places: &[Option<Neighbourhood>],
+        [models, stiff]: [&[Model]; 2],
+        (d, are_points): (usize, bool),
+    ) -> SmallVec<[Option<Estimate>; MAX_LANES]> {
+        room.krige(models, Purpose::Prediction);
+        let mut estimates = SmallVec::new();
+        for (place, kriged) in places.iter().zip(&room.kriged) {
+            estimates.push(place.as_ref().and_then(|_| Estimate::of(&self.models, kriged, d)));
+        }
+        let is_flat = |estimate: &Estimate| estimate.normal_deviation(d, are_points) < FLAT;
+        if stiff.is_empty() || !estimates.iter().flatten().any(is_flat) {
+            return estimates;
+        }
+        room.krige(stiff, Purpose::Prediction);
+        for (estimate, kriged) in estimates.iter_mut().zip(&room.kriged) {
+            if let Some(estimate) = estimate.as_mut().filter(|estimate| is_flat(estimate)) {
+                estimate.take_slopes(Estimate::of(&self.stiff, kriged, d), d);
+            }
+        }
+        estimates
     }
 }
 

@@ -5,8 +5,14 @@ use super::regression::{Kriged, Squares, Terms, n_terms};
 use crate::numerics::machine::eigen::symmetric_eigen;
 use crate::numerics::machine::small::{Small, zeros};
 
-/// Deviations of curvatures over those of the posterior: on analytic surfaces these are a twentieth too large.
-const CALIBRATION: f64 = 0.9;
+/// Deviations of normals over those of the posterior: noise that neighbours share is more than it says.
+const NORMAL_CALIBRATION: f64 = 1.07;
+
+/// Deviations of curvatures over those of the posterior, by the largest curvature in units of the radius of the neighbourhood. Up to
+/// 0.6 what the curvature entails leaves less of the surface to the process than this expects; beyond, more (docs/error-bars.md).
+fn curvature_calibration(bend: f64) -> f64 {
+    0.78 + 0.95 * (bend.min(1.2) - 0.6).max(0.0)
+}
 
 /// Expectation of |x| over its deviation, for a normal x of mean 0.
 const MEAN_MAGNITUDE: f64 = 0.8;
@@ -62,6 +68,19 @@ impl Estimate {
         Some(Self { means, covariance, noise, third })
     }
 
+    /// Slopes as another mixture has them, as uncertain as there and as two opinions that differ as much as these.
+    pub(crate) fn take_slopes(&mut self, other: Option<Self>, dimension: usize) {
+        let Some(other) = other else { return };
+        let p = n_terms(dimension);
+        let apart: Terms = other.means.iter().zip(&self.means).map(|(theirs, ours)| theirs - ours).collect();
+        for a in 1..dimension {
+            self.means[a] = other.means[a];
+            for b in 1..dimension {
+                self.covariance[a * p + b] = other.covariance[a * p + b] + apart[a] * apart[b] / 4.0;
+            }
+        }
+    }
+
     /// Second derivatives as a matrix `[k, k]`.
     pub(crate) fn hessian(&self, dimension: usize) -> Small {
         let k = dimension - 1;
@@ -91,7 +110,7 @@ impl Estimate {
         let (variances, _) = symmetric_eigen(&slopes, k);
         let largest = variances[k - 1].max(0.0);
         let others: f64 = variances[..k - 1].iter().map(|v| v.max(0.0)).sum();
-        (largest + SECOND_DIRECTION * others).sqrt()
+        NORMAL_CALIBRATION * (largest + SECOND_DIRECTION * others).sqrt()
     }
 
     /// Principal curvatures for the normal of the frame, ascending, and the deviations of these, of their mean and of their product.
@@ -102,6 +121,8 @@ impl Estimate {
         let (k, p) = (dimension - 1, n_terms(dimension));
         let shape: Small = self.hessian(dimension).iter().map(|h| -h).collect();
         let (values, vectors) = symmetric_eigen(&shape, k);
+        let bend = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        let calibration = curvature_calibration(bend);
         let moved = if moves { self.noise * self.third } else { 0.0 };
         let variance = |form: &[f64]| -> f64 {
             let mut sum = 0.0;
@@ -110,7 +131,7 @@ impl Estimate {
                     sum += a * b * self.covariance[(dimension + i) * p + dimension + j];
                 }
             }
-            CALIBRATION * CALIBRATION * sum.max(0.0)
+            calibration * calibration * sum.max(0.0)
         };
         let vector = |i: usize| &vectors[i * k..][..k];
         let forms: Vec<Terms> = (0..k).map(|i| form(vector(i), vector(i))).collect();
@@ -137,7 +158,6 @@ impl Estimate {
         let beside: f64 = (0..k).map(|i| others(i).powi(2) * THIRD_OF_CURVATURE * moved).sum::<f64>();
         let products: f64 = principal.iter().map(|deviation| deviation * deviation).product();
         let gaussian = (variance(&sum_with(&others)) + beside + products).sqrt();
-        let bend = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
         CurvatureEstimate { principal, mean, gaussian, bend }
     }
 }

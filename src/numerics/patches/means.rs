@@ -82,6 +82,11 @@ impl Support {
         sum
     }
 
+    /// Whether its points stand for several of the cloud.
+    pub(crate) fn has_moments(&self) -> bool {
+        matches!(self, Self::Means(_))
+    }
+
     /// Bytes held on the heap beside the cloud and its sampling.
     pub(crate) fn n_bytes(&self) -> usize {
         match self {

@@ -23,9 +23,9 @@ use super::points::sampling::{Sampling, median};
 use estimate::Estimate;
 use means::Support;
 use neighbourhood::{Neighbourhood, n_neighbours};
-use pooled::{Weighted, candidates, pool, responsibilities};
+use pooled::{LENGTH_SCALE, STIFF, Weighted, candidates, pool, responsibilities};
 use regression::{Kriged, Model, n_terms};
-use room::Purpose;
+use room::{Found, Purpose};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
@@ -45,6 +45,8 @@ const WORTH: f64 = 0.95;
 pub struct Patches {
     support: Support,
     models: Vec<Weighted>,
+    /// For slopes where the surface is flat; none where there is no noise.
+    stiff: Vec<Weighted>,
     count: usize,
     noise: f64,
     kernel: PatchKernel,
@@ -104,23 +106,22 @@ impl Patches {
     ) -> Result<(f64, Self), NumericsError> {
         let d = cloud.dimension();
         let count = n_neighbours(d, support.cloud().n_points());
-        let candidates = candidates(n_terms(d))?;
         let stride = (cloud.n_points() / N_SAMPLES).max(1);
         let sites: Vec<usize> = (0..cloud.n_points()).step_by(stride).collect();
-        let blank =
-            Self { support, models: Vec::new(), count, noise: 0.0, kernel: PatchKernel::default(), group };
+        let mut patches = Self {
+            support,
+            models: Vec::new(),
+            stiff: Vec::new(),
+            count,
+            noise: 0.0,
+            kernel: PatchKernel::default(),
+            group,
+        };
         if count < n_terms(d) + 2 {
-            return Ok((f64::INFINITY, blank));
+            return Ok((f64::INFINITY, patches));
         }
         let queries = cloud.select(&sites);
-        let found = blank.krige_each(&queries, &candidates, Purpose::Likelihood, observer)?;
-        let logs: Vec<Vec<f64>> = found
-            .iter()
-            .flatten()
-            .map(|(_, kriged)| kriged.iter().map(|k| k.log_likelihood).collect())
-            .collect();
-        let models = pool(&candidates, &logs);
-        let mut patches = Self { models, ..blank };
+        patches.models = patches.pooled(LENGTH_SCALE, &queries, observer)?;
         let chosen: Vec<Model> = patches.models.iter().map(|weighted| weighted.model).collect();
         let whole = patches.krige_each(&queries, &chosen, Purpose::Prediction, observer)?;
         let estimates: Vec<(f64, f64, f64, f64)> =
@@ -132,7 +133,23 @@ impl Patches {
             length_scale: middle(|e| e.2).unwrap_or(1.0),
             variance: middle(|e| e.3).unwrap_or(1.0),
         };
+        if patches.noise > 0.0 {
+            patches.stiff = patches.pooled(STIFF, &queries, observer)?;
+        }
         Ok((deviation, patches))
+    }
+
+    /// The mixture of models of one length scale that makes neighbourhoods of these queries most likely.
+    fn pooled(
+        &self,
+        length_scale: f64,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Weighted>, NumericsError> {
+        let candidates = candidates(n_terms(queries.dimension()), length_scale)?;
+        let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
+        let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
+        Ok(pool(&candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
     }
 
     /// Largest deviation of a principal curvature, variance of the noise, ℓ and s² of one neighbourhood.
@@ -175,6 +192,6 @@ impl Patches {
 
     /// Bytes held on the heap beside the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
-        self.support.n_bytes() + vec_bytes(&self.models)
+        self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
     }
 }

@@ -10,7 +10,12 @@ const ORDER: u8 = 4;
 
 /// ℓ in units of the radius of a neighbourhood. Its size follows the curvature, so that this is one for all scales; shorter ones take noise
 /// that neighbours share for shape, longer ones promise more of a scan than they keep (docs/error-bars.md).
-const LENGTH_SCALE: f64 = 1.4;
+pub(crate) const LENGTH_SCALE: f64 = 1.4;
+
+/// The same for slopes where the surface is flat and the cloud has noise. Neighbours of a scan have some of their noise in common, which
+/// the likelihood takes for shape and the short scale for slopes; the stiffer process averages it, and where there is nothing but noise,
+/// its bias is none (docs/error-bars.md).
+pub(crate) const STIFF: f64 = 4.0;
 
 /// Variances of the noise over that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
@@ -29,13 +34,13 @@ pub(crate) struct Weighted {
     pub log_share: f64,
 }
 
-/// The models among which the likelihood decides.
+/// The models of one length scale among which the likelihood decides.
 ///
 /// # Errors
 /// None: the parameters are legal.
-pub(crate) fn candidates(n_trend: usize) -> Result<Vec<Model>, NumericsError> {
+pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Result<Vec<Model>, NumericsError> {
     let kernel = Kernel::new(Family::Matern { order: ORDER }, 1.0, 1.0)?;
-    let of = |noise: f64| Model { kernel, length_scale: LENGTH_SCALE, noise, n_trend };
+    let of = |noise: f64| Model { kernel, length_scale, noise, n_trend };
     Ok(NOISES.map(of).to_vec())
 }
 

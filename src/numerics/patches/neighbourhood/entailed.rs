@@ -29,7 +29,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         factorize(&mut matrix)?;
         self.refit(&matrix, scratch);
         for round in 0..=ROUNDS {
-            self.take_off(scratch);
+            self.take_off(scratch, support.has_moments());
             if round < ROUNDS {
                 self.refit(&matrix, scratch);
             }
@@ -37,13 +37,15 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         Some(())
     }
 
-    fn take_off(&self, scratch: &mut Scratch) {
+    fn take_off(&self, scratch: &mut Scratch, has_moments: bool) {
         let bend = self.bend().max(1.0);
         let mut shape = self.hessian();
         shape.as_flattened_mut().iter_mut().for_each(|h| *h /= bend);
         let terms = scratch.terms.as_chunks::<P>().0;
         for ((height, raw), terms) in scratch.heights.iter_mut().zip(&scratch.raw).zip(terms) {
-            *height = raw - beyond_second_order(&shape, terms);
+            let beyond =
+                if has_moments { averaged(&shape, terms) } else { beyond_second_order(&shape, terms) };
+            *height = raw - beyond;
         }
     }
 
@@ -60,20 +62,20 @@ impl<const D: usize, const P: usize> Grown<D, P> {
     }
 }
 
-/// `f/(1 + √(1 − u)) − f/2` for f = tᵀSt and u = |St|², averaged over the points of a mean: f exactly, the rest to first order in their
-/// moments.
+/// `f/(1 + √(1 − u)) − f/2` for f = tᵀSt and u = |St|².
+#[inline(always)]
 fn beyond_second_order<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64; P]) -> f64 {
-    let times = |x: &[f64; D]| {
-        let mut product = [0.0; D];
-        for (slot, row) in product.iter_mut().zip(&shape[..D - 1]) {
-            *slot = row[..D - 1].iter().zip(x).map(|(s, x)| s * x).sum();
-        }
-        product
-    };
-    let mut t = [0.0; D];
-    t[..D - 1].copy_from_slice(&terms[1..D]);
-    let turned = times(&t);
-    let twice = times(&turned);
+    let (t, turned) = (&terms[1..D], turn(shape, &terms[1..D]));
+    let form: f64 = t.iter().zip(&turned).map(|(t, s)| t * s).sum();
+    let root = (1.0 - turned.iter().map(|s| s * s).sum::<f64>().min(MAX_TURN)).sqrt();
+    0.5 * form * (1.0 - root) / (1.0 + root)
+}
+
+/// The same averaged over the points of a mean: f exactly, the rest to first order in their moments.
+fn averaged<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64; P]) -> f64 {
+    let t = &terms[1..D];
+    let turned = turn(shape, t);
+    let twice = turn(shape, &turned[..D - 1]);
     let mut form: f64 = t.iter().zip(&turned).map(|(t, s)| t * s).sum();
     let mut turn: f64 = turned.iter().map(|s| s * s).sum();
     let mut mixed = 0.0;
@@ -89,4 +91,14 @@ fn beyond_second_order<const D: usize, const P: usize>(shape: &[[f64; D]; D], te
     let share = (1.0 - root) / (1.0 + root);
     let slope = 1.0 / (root * (1.0 + root).powi(2));
     0.5 * form * share + 2.0 * slope * mixed
+}
+
+/// St.
+#[inline(always)]
+fn turn<const D: usize>(shape: &[[f64; D]; D], t: &[f64]) -> [f64; D] {
+    let mut product = [0.0; D];
+    for (slot, row) in product.iter_mut().zip(&shape[..D - 1]) {
+        *slot = row[..D - 1].iter().zip(t).map(|(s, x)| s * x).sum();
+    }
+    product
 }
