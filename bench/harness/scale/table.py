@@ -220,9 +220,10 @@ class Table:
 
         def others() -> Iterable[Entry]:
             for degree, n_neighbours in ((2, 12), (2, 18), (4, 30)):
-                for what, signs in (("oriented", ""), ("normals", ", without signs")):
+                # Bounds are on those that answer the same: without signs half of the normals point inward.
+                for what, who in (("oriented", "CGAL"), ("normals", "without signs: CGAL")):
                     work = self.peers.cgal(what, cloud.points, n_neighbours, degree, rounds=N_ROUNDS)
-                    yield entry(f"CGAL jets, degree {degree}, {n_neighbours} neighbours{signs}", work, angles(work, cloud))
+                    yield entry(f"{who} jets, degree {degree}, {n_neighbours} neighbours", work, angles(work, cloud))
             work = self.peers.python("open3d", {"points": cloud.points}, n_neighbours=12, is_oriented=1)
             yield entry("Open3D, 12 neighbours", work, angles(work, cloud))
             work = self.peers.python("quadrics", {"points": cloud.points}, n_neighbours=18, is_oriented=1)

@@ -11,7 +11,7 @@ const NORMAL_CALIBRATION: f64 = 1.07;
 /// Deviations of curvatures over those of the posterior, by the largest curvature in units of the radius of the neighbourhood. Up to
 /// 0.6 what the curvature entails leaves less of the surface to the process than this expects; beyond, more (docs/error-bars.md).
 fn curvature_calibration(bend: f64) -> f64 {
-    0.78 + 0.95 * (bend.min(1.2) - 0.6).max(0.0)
+    0.80 + 0.95 * (bend.min(1.2) - 0.6).max(0.0)
 }
 
 /// Expectation of |x| over its deviation, for a normal x of mean 0.

@@ -7,7 +7,7 @@ use super::cloud::Cloud;
 const MAX_COARSE: usize = 6000;
 
 /// Points of the cloud per point of the coarse one, where that leaves more than [`LEAST_COARSE`].
-const POINTS_PER_COARSE: usize = 4;
+const POINTS_PER_COARSE: usize = 6;
 const LEAST_COARSE: usize = 600;
 
 /// Points of the coarse cloud for one of n.
