@@ -41,8 +41,8 @@ fn normals_of_closed_surfaces_are_right_or_flagged_and_outward() {
                 all = all.add(found);
             }
         }
-        assert!(1000 * all.n_off <= 3 * all.n_unflagged(), "{kernel}: {all:?}");
-        // Flagging everything would pass the above.
-        assert!(20 * all.n_flagged <= all.n_points, "{kernel}: {all:?}");
+        assert!(2000 * all.n_off <= all.n_unflagged(), "{kernel}: {all:?}");
+        // Flagging everything would pass the above. 500 random points know a twentieth of the normals of these shapes, edges and all, not to 0.4 rad.
+        assert!(15 * all.n_flagged <= all.n_points, "{kernel}: {all:?}");
     }
 }

@@ -159,14 +159,6 @@ fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Opti
     Some(if patch.is_at_rim() { Found::AtRim } else { Found::Inside })
 }
 
-/// The normal at x of the quadric through these points, of either sign; `None` if they do not determine one.
-pub(crate) fn quadric_normal(cloud: &Cloud, x: &[f64], nearest: &[Neighbour]) -> Option<Small> {
-    let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
-    let quadric = Quadric::of(&patch)?;
-    patch.turn_over(&quadric.slope);
-    Some(Small::from_slice(patch.normal()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,6 +3,7 @@
 mod confirmation;
 mod deviations;
 mod directions;
+mod doubt;
 mod function;
 mod offset;
 mod serving;
@@ -146,7 +147,7 @@ impl SignatureSurface {
         self.left_out_misses.get()?.as_deref()
     }
 
-    /// Local regressions of the same points, made when deviations are asked for.
+    /// Local regressions of the same points, made when deviations are asked for, or a normal is in doubt.
     ///
     /// # Errors
     /// Those of [`Patches::of`].

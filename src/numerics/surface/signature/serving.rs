@@ -7,13 +7,14 @@ use rayon::prelude::*;
 use super::SignatureSurface;
 use super::confirmation::Unconfirmed;
 use super::deviations::deviations;
+use super::doubt::{is_doubtful, uncertain};
 use super::offset::{OffsetJet, offset_jet_at};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::small::Small;
-use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics, quadric_normal};
+use crate::numerics::points::local_quadrics::{LocalQuadric, LocalQuadrics};
 use crate::numerics::points::neighbourhoods::Neighbourhoods;
 use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::quadric::n_quadric_neighbours;
@@ -26,12 +27,6 @@ use crate::numerics::surface::served::{Served, ServedBy, Verdict};
 /// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
 /// normal to it.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
-
-/// Cosine of the angle to the normals of quadrics, 25°, beyond which a normal is flagged.
-const AGREES: f64 = 0.906;
-
-/// Curvature times radius below which a quadric sees less than half of a circle.
-const ONE_SIDE: f64 = 1.5;
 
 /// Finds everything that is known at each query.
 ///
@@ -164,14 +159,25 @@ impl Service<'_> {
                 Ok(())
             },
         )?;
-        Ok(Served {
-            dimension: d,
-            gradients,
-            hessians,
-            verdicts,
-            levels: self.jets.values(),
-            deviations: None,
-        })
+        let levels = self.jets.values();
+        let mut served = Served { dimension: d, gradients, hessians, verdicts, levels, deviations: None };
+        if !self.request.checks_curvatures {
+            self.flag_normals(&mut served, observer)?;
+        }
+        Ok(served)
+    }
+
+    /// Flags the normals of which too little is known.
+    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<(), NumericsError> {
+        let quadric = |query: usize| self.site(query).quadric;
+        let is_doubtful = |&query: &usize| {
+            served.verdict(query).reason.is_none() && is_doubtful(served.gradient(query), quadric(query))
+        };
+        let doubtful: Vec<usize> = (0..self.queries.n_points()).filter(is_doubtful).collect();
+        for query in uncertain(self.surface, self.queries, &doubtful, served, quadric, observer)? {
+            served.verdicts[query].reason = Some(DegeneracyReason::UnderResolved);
+        }
+        Ok(())
     }
 
     fn site(&self, query: usize) -> Site<'_> {
@@ -289,30 +295,12 @@ impl Service<'_> {
             return Some(DegeneracyReason::FarFromCloud);
         }
         if !self.request.checks_curvatures {
-            return self.disagrees(slot, site).then_some(DegeneracyReason::UnderResolved);
+            return None;
         }
         if verdict.by == ServedBy::Signature && self.surface.is_too_rough() {
             return Some(DegeneracyReason::KernelTooRough);
         }
         (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
-    }
-
-    /// Whether the normal is far from those of most quadrics through the nearest 18, 12 and 8 points (of surfaces in space), where those
-    /// see one side of the surface only.
-    fn disagrees(&self, slot: &Slot<'_>, site: &Site<'_>) -> bool {
-        let (cloud, count) = (self.surface.cloud(), n_quadric_neighbours(site.x.len()));
-        let is_off = |normal: &[f64]| dot(slot.gradient, normal).abs() < AGREES * norm(slot.gradient);
-        let sees_one_side = cloud.n_points() >= 4 * count
-            && site.quadric.is_some_and(|quadric| quadric.bend() < ONE_SIDE && is_off(quadric.normal));
-        if !sees_one_side {
-            return false;
-        }
-        let neighbours = self.surface.sampling().neighbours();
-        let nearest = neighbours.nearest_positions(cloud, site.x, count * 2 / 3);
-        [count * 2 / 3, count * 4 / 9].into_iter().any(|count| {
-            let nearest = &nearest[..count.min(nearest.len())];
-            quadric_normal(cloud, site.x, nearest).is_some_and(|normal| is_off(&normal))
-        })
     }
 
     fn is_resolved(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> bool {
