@@ -340,8 +340,8 @@ async fn a_scan_has_normals_without_any_parameter() {
     assert!(quantile(0.5) <= 2.5, "median {}", quantile(0.5));
     assert!(quantile(0.95) <= 10.0, "95 % {}", quantile(0.95));
     assert!(quantile(1.0) < 90.0, "flipped {}", quantile(1.0));
-    // Ears and feet, where quadrics are off themselves: a fiftieth.
-    assert!(50 * flagged(&exact, "under_resolved").len() <= 3 * points.len() / 2);
+    // Ears, feet and folds, which regressions of 30 points do not know to 0.4 rad: a tenth.
+    assert!(8 * flagged(&exact, "under_resolved").len() <= points.len());
     assert_eq!(codes(&exact["diagnostics"]), ["disagrees_with_neighbours"]);
     assert_eq!(exact["diagnostics"]["kernel"]["family"], "laplace");
 
