@@ -15,7 +15,7 @@ mod sweep;
 
 use rayon::prelude::*;
 use sampling::SAMPLINGS;
-use shapes::SHAPES;
+use shapes::{HELD_OUT, SHAPES, Shape};
 use sweep::{Case, NOISES, Row, quantile};
 
 const SIZES: [usize; 4] = [300, 1000, 4000, 10_000];
@@ -27,40 +27,44 @@ const HEADER: &str = "\
 
 fn main() {
     let n_wanted: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(10_000);
+    let run = |shapes: &[Shape]| -> Vec<(Case, Row)> {
+        cases(shapes).into_par_iter().map(|case| (case, case.run(n_wanted.div_ceil(case.n_points)))).collect()
+    };
+    let (rows, held_out) = (run(&SHAPES), run(&HELD_OUT));
+    println!("{HEADER}");
+    rows.iter().chain(&held_out).for_each(|(case, row)| print_row(case, row));
+    println!();
+    for noise in NOISES {
+        let percent = 100.0 * noise;
+        println!("Noise {percent} %: {}", summary(&rows, |case| case.noise == noise));
+    }
+    for size in SIZES {
+        println!("{size} points: {}", summary(&rows, |case| case.n_points == size));
+    }
+    println!("All: {}", summary(&rows, |_| true));
+    println!("Shapes held out: {}", summary(&held_out, |_| true));
+}
+
+fn cases(shapes: &[Shape]) -> Vec<Case> {
     let mut cases = Vec::new();
     for n_points in SIZES {
-        for shape in SHAPES {
+        for &shape in shapes {
             for sampling in SAMPLINGS {
                 cases.extend(NOISES.map(|noise| Case { shape, sampling, n_points, noise }));
             }
         }
     }
-    let run = |case: &Case| case.run(n_wanted.div_ceil(case.n_points));
-    let rows: Vec<Row> = cases.par_iter().map(run).collect();
-    println!("{HEADER}");
-    cases.iter().zip(&rows).for_each(|(case, row)| print_row(case, row));
-    let holds = |keep: &dyn Fn(&Case) -> bool| {
-        let kept = || cases.iter().zip(&rows).filter(|(case, _)| keep(case));
-        (kept().filter(|(case, row)| row.holds(case.noise)).count(), kept().count())
-    };
-    println!();
-    for noise in NOISES {
-        let (n_held, n) = holds(&|case| case.noise == noise);
-        let of_noise = || cases.iter().zip(&rows).filter(|(case, _)| case.noise == noise).map(|(_, row)| row);
-        let n_unflagged: usize = of_noise().map(Row::n_unflagged).sum();
-        let n_off: usize = of_noise().map(|row| row.n_off).sum();
-        let share = 100.0 * n_off as f64 / n_unflagged as f64;
-        let percent = 100.0 * noise;
-        println!(
-            "Noise {percent} %: {n_held} of {n} rows hold; of {n_unflagged} without a flag {share:.2} % are off by half."
-        );
-    }
-    for size in SIZES {
-        let (n_held, n) = holds(&|case| case.n_points == size);
-        println!("{size} points: {n_held} of {n} rows hold.");
-    }
-    let (n_held, n) = holds(&|_| true);
-    println!("All: {n_held} of {n} rows hold.");
+    cases
+}
+
+fn summary(rows: &[(Case, Row)], keep: impl Fn(&Case) -> bool) -> String {
+    let kept: Vec<&(Case, Row)> = rows.iter().filter(|(case, _)| keep(case)).collect();
+    let n_held = kept.iter().filter(|(case, row)| row.holds(case.noise)).count();
+    let n_unflagged: usize = kept.iter().map(|(_, row)| row.n_unflagged()).sum();
+    let n_off: usize = kept.iter().map(|(_, row)| row.n_off).sum();
+    let share = 100.0 * n_off as f64 / n_unflagged as f64;
+    let n = kept.len();
+    format!("{n_held} of {n} rows hold; of {n_unflagged} without a flag {share:.2} % are off by half.")
 }
 
 fn print_row(case: &Case, row: &Row) {

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::sampling::SAMPLINGS;
-use crate::shapes::SHAPES;
+use crate::shapes::{HELD_OUT, SHAPES};
 use crate::sweep::{Case, NOISES, Row};
 
 /// Points of each row: a share of 95 % then has a standard error of 0.7 %, were points independent; a few neighbours are not.
@@ -15,7 +15,7 @@ const MARGIN: f64 = 2.0;
 /// A third of all: the sum of the indices decides, so that any two of shape, sampling and noise meet.
 fn selection() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (i, shape) in SHAPES.into_iter().enumerate() {
+    for (i, shape) in SHAPES.into_iter().chain(HELD_OUT).enumerate() {
         for (j, sampling) in SAMPLINGS.into_iter().enumerate() {
             for (_, noise) in NOISES.into_iter().enumerate().filter(|(l, _)| (i + j + l) % 3 == 0) {
                 cases.push(Case { shape, sampling, n_points: N_POINTS, noise });

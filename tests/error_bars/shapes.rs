@@ -12,10 +12,16 @@ pub enum Shape {
     Superellipsoid,
     /// A level of four bells of Gauss: a rounded tetrapod.
     Blob,
+    FatTorus,
+    RoundedCube,
+    Pebble,
 }
 
 pub const SHAPES: [Shape; 6] =
     [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Superellipsoid, Shape::Blob];
+
+/// Shapes that were not looked at when the model and the calibration of its deviations were chosen.
+pub const HELD_OUT: [Shape; 3] = [Shape::FatTorus, Shape::RoundedCube, Shape::Pebble];
 
 /// What is to be found at a point.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +43,15 @@ impl Shape {
                 across.squared() + z.squared() + -0.04
             }
             Self::Ellipsoid => sum_of_squares(x, 1.0 / 0.7 * y, 2.5 * z) + -1.0,
+            Self::FatTorus => {
+                let across = (x.squared() + y.squared()).sqrt() + -0.7;
+                across.squared() + z.squared() + -0.09
+            }
+            Self::RoundedCube => {
+                let fourth = |x: Jet| x.squared().squared();
+                0.6 * (fourth(x) + fourth(y) + fourth(z)) + 0.4 * sum_of_squares(x, y, z) + -1.0
+            }
+            Self::Pebble => sum_of_squares(x, 1.0 / 0.85 * y, 1.0 / 0.55 * z) + -1.0,
             Self::Cyclide => cyclide(1.6 * x, 1.6 * y, 1.6 * z),
             Self::Superellipsoid => {
                 let fourth = |x: Jet| x.squared().squared();
@@ -59,6 +74,9 @@ impl Shape {
             Self::Cyclide => [1.1, 1.0, 0.6],
             Self::Superellipsoid => [1.0, 0.8, 0.6],
             Self::Blob => [1.0; 3],
+            Self::FatTorus => [1.01, 1.01, 0.31],
+            Self::RoundedCube => [1.01; 3],
+            Self::Pebble => [1.01, 0.86, 0.56],
         }
     }
 
