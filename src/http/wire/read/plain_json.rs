@@ -8,6 +8,7 @@
 
 use std::fmt;
 
+use memchr::{memchr, memchr_iter};
 use serde::de::value::BorrowedStrDeserializer;
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::forward_to_deserialize_any;
@@ -206,14 +207,14 @@ impl<'de> SeqAccess<'de> for Entries<'_, 'de> {
 fn expected_entries(text: &[u8]) -> Option<usize> {
     let text = text.trim_ascii_start();
     // A number takes a digit and a comma.
-    let n_numbers = |list: &[u8]| 1 + list.iter().filter(|&&byte| byte == b',').count().min(list.len() / 2);
-    let end_of_row = text.iter().position(|&byte| byte == b']')?;
+    let n_numbers = |list: &[u8]| 1 + memchr_iter(b',', list).count().min(list.len() / 2);
+    let end_of_row = memchr(b']', text)?;
     if text.first() != Some(&b'[') {
         return Some(n_numbers(&text[..end_of_row]));
     }
     let mut end = end_of_row;
     while text[end + 1..].trim_ascii_start().first() != Some(&b']') {
-        end += 1 + text[end + 1..].iter().position(|&byte| byte == b']')?;
+        end += 1 + memchr(b']', &text[end + 1..])?;
     }
     Some(n_numbers(&text[..end]).div_ceil(n_numbers(&text[..end_of_row])))
 }

@@ -115,7 +115,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
 
 /// Entries that are left, of a list whose length is known for certain: that of a tensor. Plain JSON has but a guess.
 fn known_length<'de, A: SeqAccess<'de>>(entries: &A, guard: &Guard<'_>) -> Option<usize> {
-    entries.size_hint().filter(|_| guard.asks_for_any)
+    if guard.asks_for_any { entries.size_hint() } else { None }
 }
 
 /// A number, or a row of numbers, that is not kept.
