@@ -33,6 +33,8 @@ pub enum NumericsError {
         "the kernel has a kink at 0 and no gradient at query {query}, which is point {point} of the cloud"
     )]
     KernelNotSmooth { query: usize, point: usize },
+    #[error("derivatives of order {order} of functions as rough as the kernel says have no finite variance")]
+    DerivativesVary { order: usize },
     #[error("{} points coincide with another one and alpha is 0", points.len())]
     DuplicatePoints {
         /// Every point that has a twin, ascending.
@@ -40,6 +42,10 @@ pub enum NumericsError {
     },
     #[error("K + alpha I is not positive definite in float64: {reason}")]
     NotPositiveDefinite { reason: NotDefinite, minimum_alpha: f64 },
+    #[error(
+        "the points do not determine the mean that was asked for: they lie in one hyperplane, or are too few"
+    )]
+    MeanNotDetermined,
     #[error("the answer at query {query} is outside the range of float64")]
     Overflow { query: usize },
     #[error("the weights are outside the range of float64")]

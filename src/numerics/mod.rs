@@ -3,7 +3,7 @@
 //! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the calling
 //! thread; stages and cancellation pass through an [`observer::Observer`].
 //!
-//! The rooms, each of which knows those before it: `machine`, `points`, `kernel`, `patches`, `sums`, `solver`, `function`, `surface`.
+//! The rooms, each of which knows those before it: `machine`, `points`, `kernel`, `patches`, `sums`, `solver`, `selection`, `function`, `surface`.
 
 pub mod error;
 pub mod observer;
@@ -19,6 +19,8 @@ pub mod defaults;
 pub mod sums;
 
 pub mod solver;
+
+pub mod selection;
 
 pub mod function;
 

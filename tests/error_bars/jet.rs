@@ -45,6 +45,17 @@ impl Jet {
         self.through([root, 0.5 / root, -0.25 / (root * self.value)])
     }
 
+    pub fn sin(self) -> Self {
+        let (sine, cosine) = self.value.sin_cos();
+        self.through([sine, cosine, -sine])
+    }
+
+    pub fn tanh(self) -> Self {
+        let tanh = self.value.tanh();
+        let slope = 1.0 - tanh * tanh;
+        self.through([tanh, slope, -2.0 * tanh * slope])
+    }
+
     pub fn exp(self) -> Self {
         self.through([self.value.exp(); 3])
     }

@@ -1,5 +1,7 @@
 //! Points on a surface, taken evenly, at random, or more of them on one side.
 
+#![allow(dead_code, reason = "every sweep asks for some of it")]
+
 use std::collections::HashMap;
 
 use crate::common::random::Random;

@@ -1,5 +1,7 @@
 //! Surfaces f = 0 of radius about 1, with exact normals and curvatures.
 
+#![allow(dead_code, reason = "every sweep asks for some of it")]
+
 use crate::jet::Jet;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +17,8 @@ pub enum Shape {
     FatTorus,
     RoundedCube,
     Pebble,
+    /// A wave over a square, with a rim.
+    Wave,
 }
 
 pub const SHAPES: [Shape; 6] =
@@ -52,6 +56,7 @@ impl Shape {
                 0.6 * (fourth(x) + fourth(y) + fourth(z)) + 0.4 * sum_of_squares(x, y, z) + -1.0
             }
             Self::Pebble => sum_of_squares(x, 1.0 / 0.85 * y, 1.0 / 0.55 * z) + -1.0,
+            Self::Wave => z - 0.3 * ((2.0 * x).sin() * (2.0 * y + std::f64::consts::FRAC_PI_2).sin()),
             Self::Cyclide => cyclide(1.6 * x, 1.6 * y, 1.6 * z),
             Self::Superellipsoid => {
                 let fourth = |x: Jet| x.squared().squared();
@@ -77,6 +82,7 @@ impl Shape {
             Self::FatTorus => [1.01, 1.01, 0.31],
             Self::RoundedCube => [1.01; 3],
             Self::Pebble => [1.01, 0.86, 0.56],
+            Self::Wave => [1.0, 1.0, 0.31],
         }
     }
 

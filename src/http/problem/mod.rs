@@ -219,6 +219,10 @@ impl Problem {
                 );
                 Self::of_field(Slug::KernelNotSmooth, Pointers::entry(pointers.queries, query), remedy)
             }
+            E::DerivativesVary { .. } => {
+                let remedy = format!("{detail}; use matern with nu of 2.5 or more, or another smooth kernel");
+                Self::of_field(Slug::KernelNotSmooth, format!("{}/family", pointers.kernel), remedy)
+            }
             E::DuplicatePoints { points } => {
                 let remedy = format!(
                     "{detail}; set alpha (or their noise_variances) above 0, or alpha to 0 and \"duplicates\" to \"merge\" \
@@ -258,6 +262,7 @@ impl Problem {
                 problem.members.retry_after_seconds = Some(RETRY_AFTER_MEMORY_SECONDS);
                 problem
             }
+            E::MeanNotDetermined => at(Slug::InvalidRequest, "/mean"),
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
             // Whoever cancelled is gone and reads nothing; the deadline has its own answer.
             E::Cancelled => Self::new(Slug::DeadlineExceeded, detail),

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::trend::Mean;
 use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::{JetOrder, Jets, check_smooth_at};
 
-/// `u(x) = Σ_j λ_j k(x, z_j)` over the centres of its solver: interpolates the values at α = 0, regresses them at α > 0.
+/// `u(x) = m(x) + Σ_j λ_j k(x, z_j)` over the centres of its solver, m its mean if it has one: interpolates the values at α = 0, regresses them at α > 0.
 #[derive(Clone)]
 pub struct Interpolant {
     pub solver: Arc<Solver>,
@@ -22,6 +23,20 @@ impl Interpolant {
     /// Those of [`Solution::of`].
     pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
         let solution = Arc::new(Solution::of(&solver, values, observer)?);
+        Ok(Self { solver, solution })
+    }
+
+    /// Fits values `[n]`, unit V, by a function with a mean.
+    ///
+    /// # Errors
+    /// Those of [`Solution::with_mean`].
+    pub fn fit_with_mean(
+        solver: Arc<Solver>,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let solution = Arc::new(Solution::with_mean(&solver, values, mean, observer)?);
         Ok(Self { solver, solution })
     }
 
@@ -53,6 +68,10 @@ impl Interpolant {
             check_smooth_at(cloud, kernel, queries)?;
         }
         observer.enter(Stage::Evaluate);
-        self.solver.expansion(&self.solution.weights).at(queries, order, observer)
+        let jets = self.solver.expansion(&self.solution.weights).at(queries, order, observer)?;
+        Ok(match &self.solution.trend {
+            None => jets,
+            Some(trend) => jets.plus_linear(queries, &trend.gradient(), |x| trend.at(x)),
+        })
     }
 }

@@ -1,13 +1,16 @@
 //! The Gaussian process behind the interpolant: variances, covariance, likelihood (Rasmussen and Williams 2006, ch. 2).
+//!
+//! Where the function has a mean, its coefficients are as uncertain as the values leave them.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColRef, MatMut, MatRef};
 use rayon::prelude::*;
 
+use super::mean_variance::MeanVariance;
 use crate::numerics::error::{NotDefinite, NumericsError};
-use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::trend::Trend;
 use crate::numerics::solver::{Solution, Solver, parallelism};
 use crate::numerics::sums::gram::{fill_cross_gram, fill_lower_gram};
 use crate::numerics::sums::nodes::Nodes;
@@ -47,26 +50,46 @@ pub fn variances(
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Variances, NumericsError> {
+    variances_with_mean(solver, None, queries, observer)
+}
+
+/// [`variances`] of a function with a mean.
+///
+/// # Errors
+/// Those of [`variances`].
+pub fn variances_with_mean(
+    solver: &Solver,
+    trend: Option<&Trend>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Variances, NumericsError> {
     let n = solver.n_points();
     solver.cloud().check_same_dimension(queries)?;
     let k0 = solver.kernel().at_zero();
     let nodes = Nodes::of(solver.cloud());
+    let of_mean = trend.map(|trend| MeanVariance::of(solver, trend)).transpose()?;
     let mut buffer = vec![0.0; n * QUERIES_PER_BLOCK.min(queries.n_points())];
     let mut variances = Variances { latent: Vec::with_capacity(queries.n_points()), clamped: Vec::new() };
     for rows in queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension()) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
         let columns = &mut buffer[..n * block.n_points()];
         whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
-        let explained: Vec<f64> =
-            columns.par_chunks_exact(n).map(|column| ColRef::from_slice(column).squared_norm_l2()).collect();
-        for (k, explained) in explained.into_iter().enumerate() {
+        let parts = columns.par_chunks_exact(n).enumerate().map(|(query, column)| {
+            let explained = ColRef::from_slice(column).squared_norm_l2();
+            let of_mean = of_mean.as_ref().map(|mean| {
+                let h = mean.unexplained(block.point(query), column);
+                mean.product(&h, &h)
+            });
+            (explained, of_mean.unwrap_or(0.0))
+        });
+        for (k, (explained, of_mean)) in parts.collect::<Vec<_>>().into_iter().enumerate() {
             let query = variances.latent.len();
             let variance = k0 - explained;
             if variance.is_nan() || variance < 0.0 {
                 check_is_rounding(solver, &nodes, query, block.point(k), variance, observer)?;
                 variances.clamped.push(query);
             }
-            variances.latent.push(variance.max(0.0));
+            variances.latent.push(variance.max(0.0) + of_mean);
         }
     }
     Ok(variances)
@@ -79,6 +102,19 @@ pub fn variances(
 /// Those of [`variances`].
 pub fn covariance(
     solver: &Solver,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Covariance, NumericsError> {
+    covariance_with_mean(solver, None, queries, observer)
+}
+
+/// [`covariance`] of a function with a mean.
+///
+/// # Errors
+/// Those of [`variances`].
+pub fn covariance_with_mean(
+    solver: &Solver,
+    trend: Option<&Trend>,
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Covariance, NumericsError> {
@@ -104,11 +140,6 @@ pub fn covariance(
         let par = parallelism((2 * n * width * (m - first)) as f64);
         matmul(block, Accum::Add, rows.transpose(), columns, -1.0, par);
     }
-    for j in 0..m {
-        for i in 0..j {
-            covariance[j * m + i] = covariance[i * m + j];
-        }
-    }
     let mut clamped = Vec::new();
     for query in 0..m {
         let variance = &mut covariance[query * (m + 1)];
@@ -118,20 +149,42 @@ pub fn covariance(
             *variance = 0.0;
         }
     }
+    if let Some(trend) = trend {
+        add_mean(&mut covariance, &MeanVariance::of(solver, trend)?, queries, v);
+    }
+    for j in 0..m {
+        for i in 0..j {
+            covariance[j * m + i] = covariance[i * m + j];
+        }
+    }
     Ok(Covariance { latent: covariance, clamped })
 }
 
-/// `−½ YᵀΛ − ½ ln det(K + αI) − ½ n ln 2π` (Rasmussen and Williams 2006, eq. 2.30).
+/// Adds the mean's part to the lower triangle.
+fn add_mean(covariance: &mut [f64], mean: &MeanVariance<'_>, queries: &Cloud, v: MatRef<'_, f64>) {
+    let m = queries.n_points();
+    let at = |query: usize| {
+        mean.unexplained(queries.point(query), &v.col(query).iter().copied().collect::<Vec<_>>())
+    };
+    let unexplained: Vec<Vec<f64>> = (0..m).into_par_iter().map(at).collect();
+    covariance.par_chunks_exact_mut(m).enumerate().for_each(|(j, column)| {
+        let pairs = column.iter_mut().zip(&unexplained).skip(j);
+        pairs.for_each(|(entry, g)| *entry += mean.product(g, &unexplained[j]));
+    });
+}
+
+/// `−½ YᵀΛ/f − ½ ln det(f(K + αI)) − ½ n ln 2π`, with kernel and noise f times as large as the solver has them (Rasmussen and Williams 2006,
+/// eq. 2.30). Where the function has a mean, it is that of the values given this mean.
 ///
 /// # Errors
 /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
 pub fn log_marginal_likelihood(
     solver: &Solver,
     solution: &Solution,
-    values: &[f64],
+    factor: f64,
 ) -> Result<f64, NumericsError> {
-    let normalization = solver.n_points() as f64 * (2.0 * std::f64::consts::PI).ln();
-    Ok(-0.5 * (dot(values, &solution.weights) + solver.log_determinant()? + normalization))
+    let normalization = solver.n_points() as f64 * (2.0 * std::f64::consts::PI * factor).ln();
+    Ok(-0.5 * (solution.energy / factor + solver.log_determinant()? + normalization))
 }
 
 /// `columns ← L⁻¹ k(X, Q)`, one column per query.
@@ -201,7 +254,7 @@ mod tests {
         let covariance = covariance(&solver, &queries, &Unobserved).unwrap().latent;
         assert!((covariance[1] - (k - 2.0 * k / 2.5)).abs() < 1e-15);
         let solution = Solution::of(&solver, &[3.0], &Unobserved).unwrap();
-        let likelihood = log_marginal_likelihood(&solver, &solution, &[3.0]).unwrap();
+        let likelihood = log_marginal_likelihood(&solver, &solution, 1.0).unwrap();
         let expected = -0.5 * (9.0 / 2.5 + 2.5f64.ln() + (2.0 * std::f64::consts::PI).ln());
         assert!((likelihood - expected).abs() < 1e-15);
     }

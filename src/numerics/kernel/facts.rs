@@ -23,6 +23,11 @@ pub(super) trait Facts {
         false
     }
 
+    /// Whether φ″ is finite at 0.
+    fn has_second_derivatives(&self) -> bool {
+        !self.has_kink()
+    }
+
     /// Distance within which a cusp at 0 is rounded, for families that have one.
     fn cusp_width(&self) -> Option<f64> {
         None

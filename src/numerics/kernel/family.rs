@@ -68,6 +68,11 @@ impl Family {
         self.facts(|facts| facts.has_kink())
     }
 
+    /// Whether φ″ is finite at 0.
+    pub(super) fn has_second_derivatives(self) -> bool {
+        self.facts(|facts| facts.has_second_derivatives())
+    }
+
     /// Distance in units of ℓ within which a cusp at 0 is rounded, for families that have one.
     pub(crate) fn cusp_width(self) -> Option<f64> {
         self.facts(|facts| facts.cusp_width())

@@ -44,6 +44,10 @@ impl Facts for Matern {
         self.order == 0
     }
 
+    fn has_second_derivatives(&self) -> bool {
+        self.order >= 2
+    }
+
     fn cusp_width(&self) -> Option<f64> {
         self.has_kink().then_some(0.0)
     }

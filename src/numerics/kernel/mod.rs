@@ -79,6 +79,11 @@ impl Kernel {
         self.family.has_kink()
     }
 
+    /// Whether the process with this covariance has second derivatives: φ″ is finite at 0.
+    pub fn has_second_derivatives(&self) -> bool {
+        self.family.has_second_derivatives()
+    }
+
     /// # Errors
     /// [`NumericsError::KernelNotPositiveDefinite`] in a dimension where the family is not.
     pub fn check_dimension(&self, dimension: usize) -> Result<(), NumericsError> {

@@ -41,6 +41,10 @@ impl Facts for Wendland {
         Some(MAX_DIMENSION)
     }
 
+    fn has_second_derivatives(&self) -> bool {
+        self.smoothness != WendlandSmoothness::C2
+    }
+
     /// The support must reach well past the neighbours.
     fn default_length_scale(&self, scales: &Scales) -> f64 {
         (SMOOTH_SPACINGS * scales.spacing).min(4.0 * scales.radius)

@@ -18,15 +18,23 @@ pub(crate) fn n_coarse(n_points: usize) -> usize {
 /// At most `count` points of a cloud, one for each of as many parts with equally many points: parts by halving the cloud across its
 /// widest side, of each the point in the middle of its last halving.
 pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
+    if count >= cloud.n_points() {
+        return cloud.clone();
+    }
+    cloud.select(&thinned_points(cloud, count))
+}
+
+/// The points of [`thinned`], ascending.
+pub(crate) fn thinned_points(cloud: &Cloud, count: usize) -> Vec<usize> {
     let n = cloud.n_points();
     if count >= n {
-        return cloud.clone();
+        return (0..n).collect();
     }
     let mut order: Vec<u32> = (0..n as u32).collect();
     let mut chosen = Vec::with_capacity(count);
     choose(cloud, &mut order, count.max(1), &mut chosen);
     chosen.sort_unstable();
-    cloud.select(&chosen)
+    chosen
 }
 
 /// Chooses so many of these points.

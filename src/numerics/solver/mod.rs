@@ -3,6 +3,7 @@
 pub mod choose;
 pub mod kind;
 pub mod system;
+pub mod trend;
 
 mod condition;
 mod dense;

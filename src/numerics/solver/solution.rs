@@ -2,6 +2,7 @@
 
 use faer::MatMut;
 
+use super::trend::{Mean, Trend};
 use super::{Method, Solver};
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::machine::heap::vec_bytes;
@@ -22,7 +23,7 @@ const ROUNDING: f64 = f64::EPSILON;
 pub(super) const MAX_RELATIVE_RESIDUAL: f64 = 1e-5;
 const MAX_BACKWARD_ERROR: f64 = 1e-13;
 
-/// `Λ = (K + αI)⁻¹ Y` with its residual and norms.
+/// `Λ = (K + αI)⁻¹ Y` with its residual and norms. Where the function has a mean, Y is what the mean leaves of the values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// Λ, one for each centre of the solver's expansions: `[n]`, or `[r]` for the fallback.
@@ -35,8 +36,12 @@ pub struct Solution {
     pub native_norm_squared: f64,
     /// `|u(X) − Y|₂`, unit of the values; 0 up to rounding at α = 0.
     pub misfit: f64,
+    /// `YᵀΛ`, which is `|L⁻¹Y|²`.
+    pub energy: f64,
     /// Whether a step of iterative refinement was kept.
     pub refined: bool,
+    /// The mean, if there is one.
+    pub trend: Option<Trend>,
 }
 
 impl Solution {
@@ -48,6 +53,32 @@ impl Solution {
     /// residual exceeds 1e-5 or the backward error 1e-13, [`NumericsError::Cancelled`].
     pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
         Ok(Self::solve(solver, values, None, observer)?.0)
+    }
+
+    /// [`Solution::of`] for a function with a mean.
+    ///
+    /// # Errors
+    /// Those of [`Solution::of`], and [`NumericsError::MeanNotDetermined`].
+    pub fn with_mean(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        solver.cloud().check_one_per_point(values)?;
+        observer.enter(Stage::Solve);
+        let Some(trend) = Trend::fit(solver, values, mean)? else {
+            return Self::of(solver, values, observer);
+        };
+        let rest = trend.removed_from(values, solver.cloud());
+        Ok(Self { trend: Some(trend), ..Self::of(solver, &rest, observer)? })
+    }
+
+    /// The variance of the process that makes the values most likely, as a multiple of that of the kernel, noise included: `YᵀΛ/(n − p)`,
+    /// p functions of the mean (restricted likelihood; Rasmussen and Williams 2006, eq. 2.45). 0 for values that are their mean.
+    pub fn variance_factor(&self, n_points: usize) -> f64 {
+        let p = self.trend.as_ref().map_or(0, Trend::n_functions);
+        self.energy.max(0.0) / n_points.saturating_sub(p).max(1) as f64
     }
 
     /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
@@ -94,7 +125,7 @@ impl Solution {
 
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
-        vec_bytes(&self.weights)
+        vec_bytes(&self.weights) + self.trend.as_ref().map_or(0, Trend::n_bytes)
     }
 }
 
@@ -165,6 +196,7 @@ impl Candidate {
             return Err(solver.not_positive_definite(NotDefinite::BackwardError { backward_error }));
         }
         let native_norm_squared = self.weights.iter().zip(&self.at_points).map(|(w, u)| w * u).sum();
+        let energy = self.weights.iter().zip(values).map(|(w, y)| w * y).sum();
         let misfits: Vec<f64> = self.at_points.iter().zip(values).map(|(u, y)| u - y).collect();
         let misfit = norm2(&misfits);
         let solution = Solution {
@@ -173,7 +205,9 @@ impl Candidate {
             residual_max: norm_max(&self.residual),
             native_norm_squared,
             misfit,
+            energy,
             refined,
+            trend: None,
         };
         Ok((solution, self.jets))
     }

@@ -4,6 +4,7 @@
 //! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
 //! to each kernel translate, by a solve with m right-hand sides.
 
+mod deviations;
 mod resolution;
 mod stencils;
 
@@ -25,6 +26,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::Solver;
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
+pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
 pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.

@@ -1,0 +1,79 @@
+//! Standard deviations of a function and its derivatives.
+
+use super::functionals::{JetFunctional, deviations, has_variance};
+use super::interpolant::Interpolant;
+use crate::numerics::error::NumericsError;
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+
+/// Standard deviations of a jet at m queries given the values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JetDeviations {
+    /// `[m]`, unit V.
+    pub values: Vec<f64>,
+    /// `[m, d]`, unit V/L; empty unless asked for.
+    pub gradients: Vec<f64>,
+    /// `[m, d, d]`, unit V/L²; empty unless asked for.
+    pub hessians: Vec<f64>,
+}
+
+impl JetDeviations {
+    /// Up to the derivatives of an order, 0 to 2; kernel and noise are `factor` times those of the solver.
+    ///
+    /// # Errors
+    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, so that their variance is infinite;
+    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor; [`NumericsError::DimensionMismatch`],
+    /// [`NumericsError::KernelNotSmooth`], [`NumericsError::Cancelled`].
+    pub fn of(
+        interpolant: &Interpolant,
+        factor: f64,
+        queries: &Cloud,
+        order: usize,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
+        if !has_variance(solver.kernel(), order) {
+            return Err(NumericsError::DerivativesVary { order });
+        }
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let found = deviations((solver, solution, factor), queries, &functionals(m, d, order), observer)?;
+        let width = found.len() / m;
+        let mut of = Self { values: Vec::with_capacity(m), gradients: Vec::new(), hessians: Vec::new() };
+        for jet in found.chunks_exact(width) {
+            let (value, rest) = jet.split_at(1);
+            of.values.extend(value);
+            let (gradient, hessian) = rest.split_at(if order >= 1 { d } else { 0 });
+            of.gradients.extend(gradient);
+            if order >= 2 {
+                of.hessians.extend((0..d * d).map(|at| hessian[upper(at / d, at % d, d)]));
+            }
+        }
+        Ok(of)
+    }
+}
+
+/// Value, derivatives, and the upper triangle of the Hessian, query by query.
+fn functionals(m: usize, d: usize, order: usize) -> Vec<JetFunctional> {
+    let mut functionals = Vec::new();
+    for query in 0..m {
+        functionals.push(JetFunctional::value(query, d));
+        if order >= 1 {
+            functionals.extend((0..d).map(|axis| {
+                let mut along = vec![0.0; d];
+                along[axis] = 1.0;
+                JetFunctional::derivative(query, &along)
+            }));
+        }
+        if order >= 2 {
+            let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
+            functionals.extend(pairs.map(|pair| JetFunctional::second_derivative(query, d, pair)));
+        }
+    }
+    functionals
+}
+
+/// Where an entry of a symmetric matrix stands in its upper triangle, row by row.
+fn upper(a: usize, b: usize, d: usize) -> usize {
+    let (row, column) = (a.min(b), a.max(b));
+    row * d - row * (row + 1) / 2 + column
+}

@@ -1,0 +1,217 @@
+//! How sure linear functionals of a function's jet are: its value, derivatives, and operators at a query.
+//!
+//! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, `F` of k(·, x_j) is its covariance with the value at x_j,
+//! and its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value (Rasmussen and Williams 2006, sec. 9.4).
+
+use faer::{ColRef, MatMut};
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::mean_variance::MeanVariance;
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::{Kernel, Pairs};
+use crate::numerics::machine::registers::{BLOCK, Block, Pack};
+use crate::numerics::machine::small::{Small, zeros};
+use crate::numerics::machine::vector::dot;
+use crate::numerics::observer::{Observer, Stage};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::{Solution, Solver};
+use crate::numerics::sums::jets::check_smooth_at;
+use crate::numerics::sums::nodes::Nodes;
+
+/// Functionals whose columns are held at once.
+const FUNCTIONALS_PER_BLOCK: usize = 512;
+
+/// `c u + g·∇u + A : D²u` at a query.
+#[derive(Debug, Clone)]
+pub(crate) struct JetFunctional {
+    pub(crate) query: usize,
+    pub(crate) of_value: f64,
+    /// g, `[d]`.
+    pub(crate) of_gradient: Small,
+    /// A, symmetric `[d, d]`; empty for none.
+    pub(crate) of_hessian: Small,
+}
+
+impl JetFunctional {
+    /// The value.
+    pub(crate) fn value(query: usize, dimension: usize) -> Self {
+        Self { query, of_value: 1.0, of_gradient: zeros(dimension), of_hessian: Small::new() }
+    }
+
+    /// The derivative along a vector.
+    pub(crate) fn derivative(query: usize, along: &[f64]) -> Self {
+        Self { query, of_value: 0.0, of_gradient: Small::from_slice(along), of_hessian: Small::new() }
+    }
+
+    /// An entry of the Hessian.
+    pub(crate) fn second_derivative(query: usize, dimension: usize, (a, b): (usize, usize)) -> Self {
+        let mut of_hessian = zeros(dimension * dimension);
+        of_hessian[a * dimension + b] += 0.5;
+        of_hessian[b * dimension + a] += 0.5;
+        Self { query, of_value: 0.0, of_gradient: zeros(dimension), of_hessian }
+    }
+
+    fn has_hessian(&self) -> bool {
+        !self.of_hessian.is_empty()
+    }
+
+    fn trace(&self) -> f64 {
+        self.of_hessian.iter().step_by(self.of_gradient.len() + 1).sum()
+    }
+
+    /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
+    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
+    fn prior_variance(&self, kernel: &Kernel) -> f64 {
+        let [value, slope, bend] = kernel.profile_at_zero();
+        let (v, inverse_square) = (kernel.variance(), kernel.inverse_square_length());
+        let first = 2.0 * slope * inverse_square;
+        let of_slopes = -first * dot(&self.of_gradient, &self.of_gradient);
+        let mut total = self.of_value * self.of_value * value + of_slopes;
+        if self.has_hessian() {
+            let trace = self.trace();
+            let squares = dot(&self.of_hessian, &self.of_hessian);
+            total += 2.0 * self.of_value * trace * first;
+            total += 4.0 * bend * inverse_square * inverse_square * (trace * trace + 2.0 * squares);
+        }
+        v * total
+    }
+}
+
+/// Whether the process has the derivatives of some functionals at a point: their variance is finite.
+pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
+    match order {
+        0 => true,
+        1 => !kernel.has_kink(),
+        _ => !kernel.has_kink() && kernel.has_second_derivatives(),
+    }
+}
+
+/// Standard deviations of functionals given values at the points, `[functionals]`, for a kernel and noise that are `factor` times those of the
+/// solver. A variance that rounding makes negative is 0.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] at points of the cloud; [`NumericsError::NotPositiveDefinite`]
+/// without a Cholesky factor; [`NumericsError::Cancelled`].
+pub(crate) fn deviations(
+    (solver, solution, factor): (&Solver, &Solution, f64),
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let (n, kernel) = (solver.n_points(), solver.kernel());
+    solver.cloud().check_same_dimension(queries)?;
+    check_smooth_at(solver.cloud(), kernel, queries)?;
+    let nodes = Nodes::of(solver.cloud());
+    let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
+    let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];
+    let mut found = Vec::with_capacity(functionals.len());
+    for block in functionals.chunks(FUNCTIONALS_PER_BLOCK) {
+        observer.checkpoint()?;
+        observer.enter(Stage::Evaluate);
+        let columns = &mut buffer[..n * block.len()];
+        columns.par_chunks_exact_mut(n).zip(block).for_each(|(column, functional)| {
+            let x = queries.point(functional.query);
+            nodes.dispatch(Covariances { nodes: &nodes, kernel, functional, x, column });
+        });
+        observer.enter(Stage::Solve);
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()))?;
+        let variance = |(column, functional): (&[f64], &JetFunctional)| {
+            let explained = ColRef::from_slice(column).squared_norm_l2();
+            let unexplained = of_mean.as_ref().map(|mean| {
+                let h = mean.unexplained_of(functional, queries.point(functional.query), column);
+                mean.product(&h, &h)
+            });
+            (functional.prior_variance(kernel) - explained).max(0.0) + unexplained.unwrap_or(0.0)
+        };
+        let variances = columns.par_chunks_exact(n).zip(block).map(variance);
+        found.extend(variances.map(|variance| (factor * variance).sqrt()).collect::<Vec<f64>>());
+    }
+    Ok(found)
+}
+
+/// `F k(·, x_j)` for all j: with D = x − x_j, `v[cφ + 2φ′/ℓ² (g·D + tr A) + 4φ″/ℓ⁴ DᵀAD]`.
+struct Covariances<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    functional: &'a JetFunctional,
+    x: &'a [f64],
+    column: &'a mut [f64],
+}
+
+impl WithSimd for Covariances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut out = Block::ZERO;
+        let trace = if self.functional.has_hessian() { self.functional.trace() } else { 0.0 };
+        let mut differences = vec![Block::ZERO; self.x.len()];
+        for block in 0..self.column.len().div_ceil(BLOCK) {
+            let pairs = CovariancePairs {
+                simd,
+                of: &self,
+                block,
+                trace,
+                differences: &mut differences,
+                out: &mut out,
+            };
+            self.kernel.profiles(pairs);
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(self.column.len());
+            self.column[start..end].copy_from_slice(&out.0[..end - start]);
+        }
+    }
+}
+
+/// A block of a column.
+struct CovariancePairs<'a, 'b, S> {
+    simd: S,
+    of: &'a Covariances<'b>,
+    block: usize,
+    trace: f64,
+    differences: &'a mut [Block],
+    out: &'a mut Block,
+}
+
+impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
+    /// g·D and DᵀAD/ℓ².
+    type Others = (Pack<S>, Pack<S>);
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
+        let Covariances { nodes, kernel, functional, x, .. } = *self.of;
+        let d = x.len();
+        let zero = Pack::splat(self.simd, 0.0);
+        let mut along = zero;
+        let differences = &mut *self.differences;
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+            along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
+            difference.store(&mut differences[c], at);
+        });
+        let mut form = zero;
+        if functional.has_hessian() {
+            for a in 0..d {
+                let mut row = zero;
+                for b in 0..d {
+                    let entry = Pack::splat(self.simd, functional.of_hessian[a * d + b]);
+                    row = Pack::load(self.simd, &self.differences[b], at).mul_add(entry, row);
+                }
+                form = Pack::load(self.simd, &self.differences[a], at).mul_add(row, form);
+            }
+        }
+        (q, (along, form * kernel.inverse_square_length()))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (along, form): Self::Others, [value, slope, bend]: [Pack<S>; 3]) {
+        let Covariances { kernel, functional, .. } = *self.of;
+        let first = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        let of_slopes = first * slope * (along + self.trace);
+        let of_bends = (2.0 * first) * bend * form;
+        // φ″ may be as great as float64 has it where D is 0.
+        let jets = of_slopes + of_bends;
+        let of_value = kernel.variance() * functional.of_value;
+        value.mul_add(Pack::splat(self.simd, of_value), jets).store(self.out, at);
+    }
+}

@@ -1,0 +1,83 @@
+//! The values that are looked at.
+
+use super::{Noise, Observed};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::thinning::thinned_points;
+use crate::numerics::solver::trend::Basis;
+
+/// Points that are looked at, at most: a factorization of them takes half a millisecond.
+pub const MAX_SAMPLE: usize = 256;
+
+/// Points of a sample that lie together: what is noise shows between near points, what is not between far ones.
+const TOGETHER: usize = 16;
+
+/// Some points with their values, without what all values share.
+pub(super) struct Sample {
+    pub(super) cloud: Cloud,
+    /// In units of the greatest of them.
+    pub(super) values: Vec<f64>,
+    pub(super) unit: f64,
+    /// Mean square of the values: a process of less variance is contradicted by them.
+    pub(super) least_variance: f64,
+    /// Variances of the noise in units of their mean, where they differ.
+    pub(super) noise: Option<Vec<f64>>,
+    /// The functions of the mean at the points, `[n, p]` column by column.
+    pub(super) functions: Vec<f64>,
+    pub(super) n_functions: usize,
+}
+
+impl Sample {
+    pub(super) fn of(observed: &Observed<'_>) -> Self {
+        let points = chosen(observed);
+        let cloud = observed.cloud.select(&points);
+        let of_points = |all: &[f64]| points.iter().map(|&point| all[point]).collect::<Vec<f64>>();
+        let mut values = of_points(observed.values);
+        let basis = Basis::of(observed.mean, &cloud);
+        let n_functions = basis.n_functions();
+        if n_functions > 0 {
+            let shared = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter_mut().for_each(|value| *value -= shared);
+        }
+        let unit = values.iter().fold(0.0f64, |a, value| a.max(value.abs()));
+        if unit > 0.0 {
+            values.iter_mut().for_each(|value| *value /= unit);
+        }
+        let mean_square = values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
+        let least_variance = mean_square.max(f64::MIN_POSITIVE);
+        let noise = match observed.noise {
+            Noise::PerPoint(variances) => {
+                let mean = variances.iter().sum::<f64>() / variances.len() as f64;
+                Some(of_points(variances).iter().map(|v| if mean > 0.0 { v / mean } else { 1.0 }).collect())
+            }
+            Noise::Unknown | Noise::Uniform(_) => None,
+        };
+        Self { functions: basis.columns(&cloud), cloud, values, unit, least_variance, noise, n_functions }
+    }
+
+    /// Whether the values leave nothing to explain.
+    pub(super) fn is_constant(&self) -> bool {
+        let is_equal = self.values.iter().all(|&value| value == self.values[0]);
+        self.unit == 0.0 || (is_equal && self.n_functions > 0)
+    }
+}
+
+/// All points, or groups of near ones spread over the cloud.
+fn chosen(observed: &Observed<'_>) -> Vec<usize> {
+    let (cloud, n) = (observed.cloud, observed.cloud.n_points());
+    if n <= MAX_SAMPLE {
+        return (0..n).collect();
+    }
+    let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER);
+    let around = |&point: &usize| {
+        observed
+            .sampling
+            .neighbours()
+            .nearest(cloud, cloud.point(point), TOGETHER)
+            .into_iter()
+            .map(|n| n.point)
+    };
+    let mut points: Vec<usize> = centres.iter().flat_map(around).collect();
+    points.sort_unstable();
+    points.dedup();
+    points
+}

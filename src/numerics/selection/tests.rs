@@ -1,0 +1,85 @@
+use super::*;
+use crate::numerics::observer::Unobserved;
+use crate::numerics::testing::{Random, fibonacci_sphere};
+
+/// A smooth field on a sphere, with noise of a deviation.
+fn field(n: usize, noise: f64) -> (Cloud, Vec<f64>) {
+    let cloud = fibonacci_sphere(n);
+    let mut random = Random(n as u64 + 1);
+    let noises: Vec<f64> = (0..n).map(|_| random.normal()).collect();
+    let smooth = |x: &[f64]| (2.0 * x[0]).sin() + x[1] * x[2];
+    let values = cloud.points().enumerate().map(|(i, x)| smooth(x) + noise * noises[i]);
+    (cloud.clone(), values.collect())
+}
+
+fn learned(cloud: &Cloud, values: &[f64], noise: Noise<'_>) -> Learned {
+    let sampling = Sampling::of(cloud, &Unobserved).unwrap();
+    let observed = Observed { cloud, sampling: &sampling, values, noise, mean: Mean::Constant };
+    learn(observed, &Unobserved).unwrap()
+}
+
+#[test]
+fn exact_values_are_taken_as_exact_and_noise_is_found() {
+    for n in [100, 256, 900] {
+        let (cloud, values) = field(n, 0.0);
+        assert_eq!(learned(&cloud, &values, Noise::Unknown).ratio, 1e-10, "{n}");
+        for noise in [0.003, 0.03, 0.2] {
+            let (cloud, values) = field(n, noise);
+            let found = learned(&cloud, &values, Noise::Unknown);
+            let deviation = (found.ratio * found.variance).sqrt();
+            // A hundred values tell their noise to a tenth; the grid is as wide as a third.
+            assert!((0.6..1.6).contains(&(deviation / noise)), "{n} {noise}: {deviation}");
+        }
+    }
+}
+
+#[test]
+fn neither_units_nor_offsets_change_what_is_learned() {
+    let (cloud, values) = field(200, 0.02);
+    let plain = learned(&cloud, &values, Noise::Unknown);
+    for (factor, offset) in [(1e-6, 0.0), (1e6, -1e6), (1.0, 1e6), (1e200, 0.0)] {
+        let moved: Vec<f64> = values.iter().map(|v| factor * v + offset).collect();
+        let found = learned(&cloud, &moved, Noise::Unknown);
+        assert_eq!((found.family, found.ratio), (plain.family, plain.ratio));
+        assert_eq!(found.length_scale, plain.length_scale);
+        let variance = (factor * factor * plain.variance).min(1e140);
+        assert!((found.variance / variance - 1.0).abs() < 1e-6, "{}", found.variance);
+    }
+    let scaled = Cloud::new(cloud.coordinates().iter().map(|x| 1e3 * x).collect(), 3).unwrap();
+    let found = learned(&scaled, &values, Noise::Unknown);
+    assert!((found.length_scale / plain.length_scale - 1e3).abs() < 1e-9 && found.ratio == plain.ratio);
+}
+
+#[test]
+fn a_noise_that_is_known_is_kept() {
+    let (cloud, values) = field(200, 0.05);
+    let found = learned(&cloud, &values, Noise::Uniform(0.0025));
+    assert!((found.ratio * found.variance / 0.0025 - 1.0).abs() < 1e-12);
+    let alike = learned(&cloud, &values, Noise::PerPoint(&[0.0025; 200]));
+    assert_eq!((alike.family, alike.ratio), (found.family, found.ratio));
+    let (cloud, values) = field(200, 0.0);
+    assert_eq!(learned(&cloud, &values, Noise::Uniform(0.0)).ratio, 0.0);
+}
+
+#[test]
+fn rough_fields_get_rough_kernels() {
+    let cloud = fibonacci_sphere(400);
+    let step: Vec<f64> = cloud.points().map(|x| (x[0] / 0.05).tanh()).collect();
+    assert_eq!(learned(&cloud, &step, Noise::Unknown).family, Family::Matern { order: 2 });
+    let smooth: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin()).collect();
+    assert_eq!(learned(&cloud, &smooth, Noise::Unknown).family, Family::Gauss);
+}
+
+#[test]
+fn few_values_and_equal_ones_decide_nothing() {
+    let family = Family::Matern { order: 2 };
+    for n in [1, 2, 7] {
+        let (cloud, values) = field(n, 0.0);
+        assert_eq!(learned(&cloud, &values, Noise::Unknown).family, family);
+    }
+    let cloud = fibonacci_sphere(50);
+    assert_eq!(learned(&cloud, &[3.0; 50], Noise::Unknown).ratio, 1e-10);
+    let together = Cloud::new(vec![1.0; 60], 3).unwrap();
+    let values: Vec<f64> = (0..20).map(f64::from).collect();
+    assert!(learned(&together, &values, Noise::Unknown).variance > 0.0);
+}

@@ -1,0 +1,181 @@
+//! The mean of a function: few known functions with coefficients found together with the weights.
+//!
+//! With `u = Σ_a β_a f_a + Σ_j λ_j k(·, x_j)` and F the `f_a` at the points, generalised least squares take
+//! `β = (FᵀWF)⁻¹FᵀWY`, `Λ = W(Y − Fβ)`, W = (K + αI)⁻¹: universal kriging, and the posterior under a flat prior on β (Rasmussen and
+//! Williams 2006, sec. 2.7; Chilès and Delfiner 2012, sec. 3.4).
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, MatMut, Side};
+
+use super::Solver;
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::machine::vector::dot;
+use crate::numerics::points::cloud::Cloud;
+
+/// Which functions the mean is a combination of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Mean {
+    /// None: far from the points the function tends to 0.
+    #[default]
+    Zero,
+    /// The constant.
+    Constant,
+    /// The constant and the coordinates.
+    Linear,
+}
+
+impl Mean {
+    /// Functions in dimension d.
+    pub fn n_functions(self, dimension: usize) -> usize {
+        match self {
+            Self::Zero => 0,
+            Self::Constant => 1,
+            Self::Linear => 1 + dimension,
+        }
+    }
+}
+
+/// A mean is not determined where the points leave one of its functions to rounding: the least share of its square that must be left.
+const DEPENDENT: f64 = 1e-12;
+
+/// The functions of a mean, about the centre of a cloud and in units of its size.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Basis {
+    mean: Mean,
+    centre: Vec<f64>,
+    size: f64,
+}
+
+impl Basis {
+    pub(crate) fn of(mean: Mean, cloud: &Cloud) -> Self {
+        let (min, max) = cloud.bounding_box();
+        let centre = min.iter().zip(&max).map(|(a, b)| 0.5 * (a + b)).collect();
+        let radius = cloud.radius();
+        Self { mean, centre, size: if radius > 0.0 { radius } else { 1.0 } }
+    }
+
+    pub(crate) fn n_functions(&self) -> usize {
+        self.mean.n_functions(self.centre.len())
+    }
+
+    /// The functions at a point, `[p]`.
+    pub(crate) fn at(&self, x: &[f64], functions: &mut [f64]) {
+        let (Some((constant, linear)), true) = (functions.split_first_mut(), self.mean != Mean::Zero) else {
+            return;
+        };
+        *constant = 1.0;
+        let scaled = x.iter().zip(&self.centre).map(|(x, centre)| (x - centre) / self.size);
+        linear.iter_mut().zip(scaled).for_each(|(function, x)| *function = x);
+    }
+
+    /// Adds the derivatives of the functions along a vector.
+    pub(crate) fn add_slopes(&self, along: &[f64], functions: &mut [f64]) {
+        let slopes = functions.iter_mut().skip(1).zip(along);
+        slopes.for_each(|(function, component)| *function += component / self.size);
+    }
+
+    /// The functions at the points of a cloud, one column for each: `[n, p]` column by column.
+    pub(crate) fn columns(&self, cloud: &Cloud) -> Vec<f64> {
+        let (n, p) = (cloud.n_points(), self.n_functions());
+        let (mut columns, mut functions) = (vec![0.0; n * p], vec![0.0; p]);
+        for (i, x) in cloud.points().enumerate() {
+            self.at(x, &mut functions);
+            functions.iter().enumerate().for_each(|(a, f)| columns[a * n + i] = *f);
+        }
+        columns
+    }
+}
+
+/// A mean with its coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trend {
+    basis: Basis,
+    coefficients: Vec<f64>,
+}
+
+impl Trend {
+    /// The mean of values `[n]` under a solver; `None` for [`Mean::Zero`].
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`] if the points do not tell its functions apart.
+    pub(super) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
+        if mean == Mean::Zero {
+            return Ok(None);
+        }
+        let (cloud, n) = (solver.cloud(), values.len());
+        let basis = Basis::of(mean, cloud);
+        let columns = basis.columns(cloud);
+        let mut weights = solver.weights_of_one().to_vec();
+        weights.extend_from_slice(&columns[n..]);
+        let p = basis.n_functions();
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));
+        // What all values share is taken off first: it would cost digits of what they do not share.
+        let shared = values.iter().sum::<f64>() / n as f64;
+        let rest: Vec<f64> = values.iter().map(|value| value - shared).collect();
+        let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
+        let moments = Mat::from_fn(p, 1, |a, _| dot(&weights[a * n..][..n], &rest));
+        let solved = solve_gram(&gram, moments).ok_or(NumericsError::MeanNotDetermined)?;
+        let mut coefficients: Vec<f64> = solved.col(0).iter().copied().collect();
+        coefficients[0] += shared;
+        Ok(Some(Self { basis, coefficients }))
+    }
+
+    /// `m(x)`.
+    pub(crate) fn at(&self, x: &[f64]) -> f64 {
+        let mut functions = vec![0.0; self.coefficients.len()];
+        self.basis.at(x, &mut functions);
+        dot(&functions, &self.coefficients)
+    }
+
+    /// `∇m`, the same everywhere.
+    pub(crate) fn gradient(&self) -> Vec<f64> {
+        let slopes = self.coefficients[1..].iter().map(|slope| slope / self.basis.size);
+        slopes.chain(std::iter::repeat(0.0)).take(self.basis.centre.len()).collect()
+    }
+
+    /// Values without the mean, `[n]`.
+    pub(crate) fn removed_from(&self, values: &[f64], cloud: &Cloud) -> Vec<f64> {
+        cloud.points().zip(values).map(|(x, value)| value - self.at(x)).collect()
+    }
+
+    pub(crate) fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// The mean as a function of the coordinates: the constant, then the slopes, if it has any.
+    pub fn of_coordinates(&self) -> Vec<f64> {
+        let slopes: Vec<f64> = self.coefficients[1..].iter().map(|slope| slope / self.basis.size).collect();
+        let at_centre: f64 = slopes.iter().zip(&self.basis.centre).map(|(slope, x)| slope * x).sum();
+        std::iter::once(self.coefficients[0] - at_centre).chain(slopes).collect()
+    }
+
+    /// Functions of the mean.
+    pub fn n_functions(&self) -> usize {
+        self.coefficients.len()
+    }
+
+    /// Bytes held on the heap.
+    pub(super) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.coefficients) + vec_bytes(&self.basis.centre)
+    }
+}
+
+/// `G⁻¹` times some columns, G symmetric and positive definite; `None` if it is not by [`DEPENDENT`].
+pub(crate) fn solve_gram(gram: &Mat<f64>, columns: Mat<f64>) -> Option<Mat<f64>> {
+    let p = gram.nrows();
+    // In units of its diagonal, so that the functions may have any size.
+    let roots: Vec<f64> = (0..p).map(|a| gram[(a, a)].sqrt()).collect();
+    if roots.iter().any(|root| root.is_nan() || *root <= 0.0) {
+        return None;
+    }
+    let scaled = Mat::from_fn(p, p, |a, b| gram[(a, b)] / (roots[a] * roots[b]));
+    let factor = scaled.llt(Side::Lower).ok()?;
+    let pivots = factor.L().diagonal().column_vector();
+    if pivots.iter().any(|pivot| pivot * pivot < DEPENDENT) {
+        return None;
+    }
+    let right = Mat::from_fn(p, columns.ncols(), |a, b| columns[(a, b)] / roots[a]);
+    let solved = factor.solve(right);
+    Some(Mat::from_fn(p, columns.ncols(), |a, b| solved[(a, b)] / roots[a]))
+}

@@ -1,0 +1,126 @@
+//! How sure operators applied to values are.
+//!
+//! Two things are not known: the function, of which the posterior has the covariance of all derivatives, and the surface under it. With δν and δH
+//! the errors of the normal and of `H = tr Dν`, and P the projection onto the tangent plane, `Δ_M u` is off by
+//! `−(2PD²uν + HP∇u)·δν − ∂_νu δH`, and `∇_M u` by `−∂_νu δν − (∇u·δν)ν`. Where the geometry has deviations, they add to those of the
+//! function in squares.
+
+use super::super::geometry::Geometry;
+use super::{Operator, regular};
+use crate::numerics::error::NumericsError;
+use crate::numerics::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::machine::vector::{dot, norm};
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::sums::jets::JetOrder;
+
+/// Standard deviations of `Δ_M u`, `[m]`, unit V/L²; 0 at null queries. Kernel and noise are `factor` times those of the solver.
+///
+/// # Errors
+/// [`NumericsError::DerivativesVary`] where the process has no second derivatives; [`NumericsError::NotPositiveDefinite`] without a Cholesky
+/// factor; those of [`Interpolant::at`].
+pub fn laplace_beltrami_deviations(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    factor: f64,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let of = Applied { geometry, interpolant, factor, queries };
+    let mut total = of.of_function(Operator::LaplaceBeltrami, observer)?;
+    let Some(known) = geometry.deviations() else { return Ok(total) };
+    let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+    for query in regular(geometry) {
+        let (normal, gradient, hessian) = (geometry.normal(query), jets.gradient(query), jets.hessian(query));
+        let trace = geometry.trace_of_shape_operator(query);
+        let d = normal.len();
+        let along = dot(gradient, normal);
+        let turned: Vec<f64> =
+            (0..d).map(|c| 2.0 * dot(&hessian[c * d..][..d], normal) + trace * gradient[c]).collect();
+        let normal_part = dot(&turned, normal);
+        let tangential: Vec<f64> = turned.iter().zip(normal).map(|(t, n)| t - normal_part * n).collect();
+        let of_normal = known.normal[query] * norm(&tangential);
+        let of_trace = (d - 1) as f64 * known.mean[query] * along;
+        total[query] = norm(&[total[query], of_normal, of_trace]);
+    }
+    Ok(total)
+}
+
+/// Standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L; 0 at null queries. Kernel and noise are `factor` times those of the
+/// solver.
+///
+/// # Errors
+/// Those of [`laplace_beltrami_deviations`], for first derivatives.
+pub fn surface_gradient_deviations(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    factor: f64,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let of = Applied { geometry, interpolant, factor, queries };
+    let mut total = of.of_function(Operator::SurfaceGradient, observer)?;
+    let Some(known) = geometry.deviations() else { return Ok(total) };
+    let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
+    let d = queries.dimension();
+    for query in regular(geometry) {
+        let (normal, gradient) = (geometry.normal(query), jets.gradient(query));
+        let along = dot(gradient, normal);
+        let tangential: Vec<f64> = gradient.iter().zip(normal).map(|(g, n)| g - along * n).collect();
+        for (c, slot) in total[query * d..][..d].iter_mut().enumerate() {
+            let across = along * (1.0 - normal[c] * normal[c]).max(0.0).sqrt();
+            let tilted = norm(&tangential) * normal[c];
+            *slot = norm(&[*slot, known.normal[query] * across, known.normal[query] * tilted]);
+        }
+    }
+    Ok(total)
+}
+
+/// An operator on a function.
+struct Applied<'a> {
+    geometry: &'a Geometry,
+    interpolant: &'a Interpolant,
+    factor: f64,
+    queries: &'a Cloud,
+}
+
+impl Applied<'_> {
+    /// The function's part: `[m]` or `[m, d]`.
+    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
+        let order = operator.order();
+        if !has_variance(solver.kernel(), order) {
+            return Err(NumericsError::DerivativesVary { order });
+        }
+        let width = operator.n_components(self.queries.dimension());
+        let functionals: Vec<JetFunctional> =
+            regular(self.geometry).flat_map(|query| self.functionals(operator, query)).collect();
+        let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+        let mut total = vec![0.0; self.queries.n_points() * width];
+        for (query, found) in regular(self.geometry).zip(found.chunks_exact(width)) {
+            total[query * width..][..width].copy_from_slice(found);
+        }
+        Ok(total)
+    }
+
+    fn functionals(&self, operator: Operator, query: usize) -> Vec<JetFunctional> {
+        let normal = self.geometry.normal(query);
+        let d = normal.len();
+        let projection = |a: usize, b: usize| f64::from(u8::from(a == b)) - normal[a] * normal[b];
+        match operator {
+            Operator::SurfaceGradient => (0..d)
+                .map(|c| {
+                    let row: Vec<f64> = (0..d).map(|b| projection(c, b)).collect();
+                    JetFunctional::derivative(query, &row)
+                })
+                .collect(),
+            Operator::LaplaceBeltrami => {
+                let trace = self.geometry.trace_of_shape_operator(query);
+                let along: Vec<f64> = normal.iter().map(|n| -trace * n).collect();
+                let of_hessian = (0..d * d).map(|at| projection(at / d, at % d)).collect();
+                vec![JetFunctional { of_hessian, ..JetFunctional::derivative(query, &along) }]
+            }
+        }
+    }
+}
