@@ -17,6 +17,7 @@ use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::regularization::Regularization;
@@ -72,7 +73,7 @@ fn factorize(cloud: &Arc<Cloud>) -> Solver {
 fn laplace_beltrami(factor: &Arc<Solver>) -> Vec<f64> {
     let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
     let geometry = Geometry::of(&fits::surface(factor), factor.cloud(), &request, &Unobserved).unwrap();
-    laplace_beltrami_matrix(&geometry, factor, factor.cloud(), &Unobserved).unwrap()
+    laplace_beltrami_matrix(&geometry, factor, factor.cloud(), Mean::Zero, &Unobserved).unwrap()
 }
 
 /// The time of one fused pass over n points at n queries.

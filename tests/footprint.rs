@@ -103,6 +103,8 @@ async fn keep_weights(store: &Factors, k: usize) {
         native_norm_squared: 0.0,
         misfit: 0.0,
         refined: false,
+        energy: 0.0,
+        trend: None,
     };
     store.keep_solution(key, ValuesKey::of(&[k as f64]), Arc::new(solution));
 }

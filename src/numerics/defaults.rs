@@ -55,7 +55,7 @@ pub fn default_fit(
     let rule = match purpose {
         Purpose::Values => {
             let family = Family::Matern { order: 2 };
-            return Ok((Kernel::new(family, family.default_length_scale(scales), 1.0)?, DEFAULT_ALPHA));
+            return Ok((Kernel::new(family, family.length_scale_of_values(scales), 1.0)?, DEFAULT_ALPHA));
         }
         Purpose::Normals => NORMALS,
         Purpose::Curvatures => CURVATURES,

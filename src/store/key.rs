@@ -3,9 +3,10 @@
 use std::fmt;
 
 use super::Owner;
-use crate::numerics::kernel::Kernel;
+use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::kind::SolverKind;
+use crate::numerics::solver::trend::Mean;
 use crate::numerics::sums::regularization::Regularization;
 
 /// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
@@ -72,23 +73,13 @@ impl FitKey {
         regularization: &Regularization,
         merged: bool,
     ) -> Self {
-        let (family, parameter) = kernel.family().canonical();
         let mut hasher = blake3::Hasher::new();
         if solver == SolverKind::Local {
             hasher.update(b"local");
         }
-        hasher.update(&[family, u8::from(merged)]);
-        update_with_floats(&mut hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
-        match regularization {
-            Regularization::Uniform(alpha) => {
-                hasher.update(&[0]);
-                update_with_floats(&mut hasher, &[*alpha]);
-            }
-            Regularization::PerPoint(variances) => {
-                hasher.update(&[1]);
-                update_with_floats(&mut hasher, variances);
-            }
-        }
+        hasher.update(&[u8::from(merged)]);
+        update_with_kernel(&mut hasher, kernel);
+        update_with_regularization(&mut hasher, regularization);
         Self { owner, cloud_id, fit: hasher.finalize().into() }
     }
 }
@@ -99,9 +90,63 @@ pub struct ValuesKey([u8; 32]);
 
 impl ValuesKey {
     pub fn of(values: &[f64]) -> Self {
+        Self::with_mean(values, Mean::Zero)
+    }
+
+    /// Values that are fitted by a function with a mean.
+    pub fn with_mean(values: &[f64], mean: Mean) -> Self {
         let mut hasher = blake3::Hasher::new();
         update_with_floats(&mut hasher, values);
+        match mean {
+            Mean::Zero => {}
+            Mean::Constant => {
+                hasher.update(b"constant");
+            }
+            Mean::Linear => {
+                hasher.update(b"linear");
+            }
+        }
         Self(hasher.finalize().into())
+    }
+
+    /// These values with what is known beforehand of what would be learned from them: family, length scale if it is given, and variance of
+    /// the kernel; the noise.
+    pub fn given(
+        self,
+        kernel: Option<(Family, Option<f64>, f64)>,
+        regularization: Option<&Regularization>,
+    ) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&self.0);
+        if let Some((family, length_scale, variance)) = kernel {
+            let (family, parameter) = family.canonical();
+            hasher.update(&[1, family]);
+            update_with_floats(&mut hasher, &[parameter, length_scale.unwrap_or(0.0), variance]);
+        }
+        if let Some(regularization) = regularization {
+            hasher.update(&[2]);
+            update_with_regularization(&mut hasher, regularization);
+        }
+        Self(hasher.finalize().into())
+    }
+}
+
+fn update_with_kernel(hasher: &mut blake3::Hasher, kernel: &Kernel) {
+    let (family, parameter) = kernel.family().canonical();
+    hasher.update(&[family]);
+    update_with_floats(hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
+}
+
+fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regularization) {
+    match regularization {
+        Regularization::Uniform(alpha) => {
+            hasher.update(&[0]);
+            update_with_floats(hasher, &[*alpha]);
+        }
+        Regularization::PerPoint(variances) => {
+            hasher.update(&[1]);
+            update_with_floats(hasher, variances);
+        }
     }
 }
 
@@ -119,7 +164,6 @@ fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::kernel::Family;
 
     #[test]
     fn the_cloud_id_is_the_hash_of_the_documented_bytes() {

@@ -17,6 +17,7 @@ pub mod budget;
 pub mod clouds;
 mod fair_cache;
 pub mod key;
+pub mod learned;
 pub mod prepared;
 mod single_flight;
 

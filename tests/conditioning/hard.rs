@@ -8,6 +8,7 @@ use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::solver::{Method, Solver};
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
@@ -139,7 +140,8 @@ impl<'a> Case<'a> {
         self.check("surface gradient", &gradient, &expected["surface_gradient"], reached.gradient);
         let applied = laplace_beltrami(&geometry, u, &self.queries, &Unobserved).unwrap();
         self.check("Laplace–Beltrami", &applied, &expected["laplace_beltrami"], reached.laplacian);
-        let matrix = laplace_beltrami_matrix(&geometry, &self.factor, &self.queries, &Unobserved).unwrap();
+        let matrix =
+            laplace_beltrami_matrix(&geometry, &self.factor, &self.queries, Mean::Zero, &Unobserved).unwrap();
         self.check("its matrix", &matrix, &expected["laplace_beltrami_matrix"], reached.matrix);
     }
 

@@ -8,6 +8,7 @@ use gramian::numerics::function::posterior::{covariance, log_marginal_likelihood
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::Solver;
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Curvatures, Geometry, GeometryRequest, SurfaceModel};
@@ -52,10 +53,10 @@ pub const VERBS: [Verb; 13] = [
         laplace_beltrami(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
     }),
     matrix("surface gradient as matrices", |setting| {
-        surface_gradient_matrices(&geometry(setting)?, &setting.solver, &queries(), &Unobserved)
+        surface_gradient_matrices(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
     }),
     matrix("Laplace–Beltrami operator as matrix", |setting| {
-        laplace_beltrami_matrix(&geometry(setting)?, &setting.solver, &queries(), &Unobserved)
+        laplace_beltrami_matrix(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
     }),
     verb("variances", |setting| Ok(variances(&setting.solver, &queries(), &Unobserved)?.latent)),
     verb("covariance", |setting| Ok(covariance(&setting.solver, &queries(), &Unobserved)?.latent)),

@@ -19,6 +19,7 @@ mod ending;
 mod examples;
 mod fits;
 mod golden;
+mod learned;
 mod limits;
 mod load;
 mod local;

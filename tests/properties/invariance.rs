@@ -7,6 +7,7 @@ use gramian::numerics::function::posterior::variances;
 use gramian::numerics::kernel::Kernel;
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
 
@@ -102,7 +103,7 @@ fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha
         ("gaussian", curvatures.gaussian),
         ("gradient", surface_gradient(&geometry, &u, queries, &Unobserved).unwrap()),
         ("laplacian", laplace_beltrami(&geometry, &u, queries, &Unobserved).unwrap()),
-        ("matrix", laplace_beltrami_matrix(&geometry, &factor, queries, &Unobserved).unwrap()),
+        ("matrix", laplace_beltrami_matrix(&geometry, &factor, queries, Mean::Zero, &Unobserved).unwrap()),
     ];
     Answers { rounding: rounding(&factor), degenerate: geometry.is_null().to_vec(), fields }
 }

@@ -8,6 +8,7 @@ use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::solver::Solver;
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
 use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
@@ -59,7 +60,7 @@ fn one_fit_for_surface_and_values_annihilates_constants() {
         let (u, geometry) = (fit(&factor, &vec![1.0; 100]), geometry(&factor, &queries));
         let gradients = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
         let laplacians = laplacian(&geometry, &u, &queries);
-        let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, &Unobserved).unwrap();
+        let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
         let jets = u.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
         for query in 0..queries.n_points() {
             // The two terms cancel up to the few operations that make each of them.

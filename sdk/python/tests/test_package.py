@@ -118,6 +118,30 @@ def test_answers_have_the_documented_shapes(client: gramian.Client) -> None:
     assert posterior.variances is None
 
 
+def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
+    random = np.random.default_rng(3)
+    z = (2 * np.arange(300) + 1) / 300 - 1
+    turn = np.arange(300) * np.pi * (3 - np.sqrt(5))
+    points = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
+    sphere, values = client.cloud(points), 20 + z + 0.02 * random.normal(size=300)
+    answer = sphere.interpolate(values, points[:40], derivatives=2, deviations=True)
+    assert answer.value_deviations is not None
+    assert answer.gradient_deviations is not None
+    assert answer.hessian_deviations is not None
+    assert answer.gradient_deviations.shape == (40, 3)
+    assert answer.hessian_deviations.shape == (40, 3, 3)
+    assert np.all(np.abs(answer.values - 20 - z[:40]) < 4 * answer.value_deviations)
+    assert answer.fit["mean"] == "constant"
+    laplacian = sphere.laplace_beltrami(values, deviations=True)
+    assert laplacian.value_deviations is not None
+    within = np.abs(laplacian.values + 2 * z) < 1.96 * laplacian.value_deviations
+    assert within.mean() > 0.88
+    gradient = sphere.surface_gradient(values, include="deviations", mean="linear")
+    assert gradient.gradient_deviations is not None
+    assert gradient.gradient_deviations.shape == (300, 3)
+    assert sphere.surface_gradient(values, kernel="matern").gradient_deviations is None
+
+
 def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) -> None:
     answer = client.cloud(circle).curvatures(QUERIES, kernel=GAUSS, alpha=0)
     np.testing.assert_allclose(answer.principal_curvatures[0], 1, atol=1e-4)

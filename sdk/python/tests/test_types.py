@@ -129,7 +129,7 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
 
 @pytest.mark.parametrize(
     "alias",
-    [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Quantity, fit.Deviations],
+    [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Mean, fit.Quantity, fit.Deviations],
     ids=str,
 )
 def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:

@@ -213,8 +213,8 @@ counts as absent.*/
     #[serde(deny_unknown_fields)]
     pub struct CurvaturesRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -225,7 +225,8 @@ the noise of the points, 1e-3 at least.*/
         ///What is wanted beside what every answer has.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
@@ -331,6 +332,8 @@ where that has no answer.*/
         VanishingGradient,
         #[serde(rename = "under_resolved")]
         UnderResolved,
+        #[serde(rename = "uncertain")]
+        Uncertain,
         #[serde(rename = "kernel_too_rough")]
         KernelTooRough,
         #[serde(rename = "far_from_cloud")]
@@ -343,6 +346,7 @@ where that has no answer.*/
             match *self {
                 Self::VanishingGradient => f.write_str("vanishing_gradient"),
                 Self::UnderResolved => f.write_str("under_resolved"),
+                Self::Uncertain => f.write_str("uncertain"),
                 Self::KernelTooRough => f.write_str("kernel_too_rough"),
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
                 Self::UnaffordableRescue => f.write_str("unaffordable_rescue"),
@@ -357,6 +361,7 @@ where that has no answer.*/
             match value {
                 "vanishing_gradient" => Ok(Self::VanishingGradient),
                 "under_resolved" => Ok(Self::UnderResolved),
+                "uncertain" => Ok(Self::Uncertain),
                 "kernel_too_rough" => Ok(Self::KernelTooRough),
                 "far_from_cloud" => Ok(Self::FarFromCloud),
                 "unaffordable_rescue" => Ok(Self::UnaffordableRescue),
@@ -397,6 +402,9 @@ where that has no answer.*/
         pub geometry: ::std::option::Option<::std::boxed::Box<Diagnostics>>,
         ///The kernel used, in full.
         pub kernel: KernelUsed,
+        ///The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_coefficients: ::std::vec::Vec<f64>,
         ///|u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub misfit: ::std::option::Option<f64>,
@@ -418,7 +426,7 @@ where that has no answer.*/
         ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub reciprocal_condition: ::std::option::Option<f64>,
-        ///‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+        ///‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and surfaces, with Y = 1.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub relative_residual: ::std::option::Option<f64>,
         ///The solver used.
@@ -670,8 +678,8 @@ the request.*/
     #[serde(deny_unknown_fields)]
     pub struct InterpolationRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -682,9 +690,16 @@ the noise of the points, 1e-3 at least.*/
         ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        ///What is wanted beside what was asked for; nothing if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<ValuesInclude>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -707,12 +722,22 @@ the noise of the points, 1e-3 at least.*/
     pub struct InterpolationResponse {
         ///How the answer came about.
         pub diagnostics: Diagnostics,
+        ///The same for the components of ∇u.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradient_deviations: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///The same for the entries of D²u.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub hessian_deviations: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
         ///D²u at each query, unit of the values per length squared; with `derivatives` of 2.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub hessians: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        /**Standard deviation of u at each query given the values, under the kernel as covariance and alpha as variance of the noise; with
+`deviations`.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub value_deviations: ::std::vec::Vec<f64>,
         ///u at each query.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -892,8 +917,8 @@ the noise of the points, 1e-3 at least.*/
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiMatrixRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -907,9 +932,13 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -946,8 +975,8 @@ in general.*/
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -958,9 +987,16 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        ///What is wanted beside; nothing if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<ValuesInclude>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -985,6 +1021,10 @@ the noise of the points, 1e-3 at least.*/
         pub degenerate: ::std::vec::Vec<Degenerate>,
         ///How the answer came about.
         pub diagnostics: Diagnostics,
+        /**Standard deviation of Δu given the values and, as far as its deviations are known, the surface; null where there is no
+answer or no deviation; with `deviations`.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub value_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
         ///Δu at each query, unit of the values per length squared; null where there is no normal.
         pub values: ::std::vec::Vec<::std::option::Option<f64>>,
     }
@@ -998,8 +1038,8 @@ the noise of the points, 1e-3 at least.*/
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiSparseMatrixRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1010,7 +1050,8 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where it is not that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
@@ -1100,13 +1141,72 @@ the noise of the points, 1e-3 at least.*/
             value.parse()
         }
     }
+    ///The mean of a function: what it is made of beside the kernel, and tends to far from the points.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum MeanChoice {
+        #[serde(rename = "zero")]
+        Zero,
+        #[serde(rename = "constant")]
+        Constant,
+        #[serde(rename = "linear")]
+        Linear,
+    }
+    impl ::std::fmt::Display for MeanChoice {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Zero => f.write_str("zero"),
+                Self::Constant => f.write_str("constant"),
+                Self::Linear => f.write_str("linear"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for MeanChoice {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "zero" => Ok(Self::Zero),
+                "constant" => Ok(Self::Constant),
+                "linear" => Ok(Self::Linear),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for MeanChoice {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for MeanChoice {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
     ///A cloud that samples a hypersurface, and where its normals are wanted.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct NormalsRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1117,7 +1217,8 @@ the noise of the points, 1e-3 at least.*/
         ///What is wanted beside what every answer has.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
@@ -1293,8 +1394,8 @@ there is no answer or none is known.*/
     #[serde(deny_unknown_fields)]
     pub struct PosteriorRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1305,9 +1406,13 @@ the noise of the points, 1e-3 at least.*/
         ///What is wanted beside the mean; nothing if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<PosteriorQuantity>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the process; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -1629,8 +1734,8 @@ the noise of the points, 1e-3 at least.*/
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientMatrixRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1641,9 +1746,13 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -1682,8 +1791,8 @@ is no normal.*/
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1694,9 +1803,16 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        ///What is wanted beside; nothing if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<ValuesInclude>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
@@ -1721,6 +1837,12 @@ the noise of the points, 1e-3 at least.*/
         pub degenerate: ::std::vec::Vec<Degenerate>,
         ///How the answer came about.
         pub diagnostics: Diagnostics,
+        /**Standard deviation of each component given the values and, as far as its deviations are known, the surface; null where there is no
+answer or no deviation; with `deviations`.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradient_deviations: ::std::vec::Vec<
+            ::std::option::Option<::std::vec::Vec<f64>>,
+        >,
         ///∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
         pub gradients: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
     }
@@ -1734,8 +1856,8 @@ the noise of the points, 1e-3 at least.*/
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientSparseMatrixRequest {
         /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-the noise of the points, 1e-3 at least.*/
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The points where values are known, or that sample the surface.
@@ -1746,7 +1868,8 @@ the noise of the points, 1e-3 at least.*/
         ///The surface, where it is not that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
@@ -1837,6 +1960,57 @@ the noise of the points, 1e-3 at least.*/
         }
     }
     impl ::std::convert::TryFrom<::std::string::String> for SurfaceUsed {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    ///What an answer about values has beside what it always has.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum ValuesInclude {
+        #[serde(rename = "deviations")]
+        Deviations,
+    }
+    impl ::std::fmt::Display for ValuesInclude {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Deviations => f.write_str("deviations"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for ValuesInclude {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "deviations" => Ok(Self::Deviations),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for ValuesInclude {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for ValuesInclude {
         type Error = self::error::ConversionError;
         fn try_from(
             value: ::std::string::String,
@@ -3028,6 +3202,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::string::String,
             >,
             kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
+            mean_coefficients: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
             misfit: ::std::result::Result<
                 ::std::option::Option<f64>,
                 ::std::string::String,
@@ -3076,6 +3254,7 @@ the noise of the points, 1e-3 at least.*/
                     ),
                     geometry: Ok(Default::default()),
                     kernel: Err("no value supplied for kernel".to_string()),
+                    mean_coefficients: Ok(Default::default()),
                     misfit: Ok(Default::default()),
                     n_merged_duplicates: Err(
                         "no value supplied for n_merged_duplicates".to_string(),
@@ -3165,6 +3344,20 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean_coefficients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_coefficients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_coefficients: {e}"
+                        )
                     });
                 self
             }
@@ -3335,6 +3528,7 @@ the noise of the points, 1e-3 at least.*/
                     factorization: value.factorization?,
                     geometry: value.geometry?,
                     kernel: value.kernel?,
+                    mean_coefficients: value.mean_coefficients?,
                     misfit: value.misfit?,
                     n_merged_duplicates: value.n_merged_duplicates?,
                     n_points: value.n_points?,
@@ -3359,6 +3553,7 @@ the noise of the points, 1e-3 at least.*/
                     factorization: Ok(value.factorization),
                     geometry: Ok(value.geometry),
                     kernel: Ok(value.kernel),
+                    mean_coefficients: Ok(value.mean_coefficients),
                     misfit: Ok(value.misfit),
                     n_merged_duplicates: Ok(value.n_merged_duplicates),
                     n_points: Ok(value.n_points),
@@ -3627,8 +3822,16 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::DuplicatePolicy>,
                 ::std::string::String,
             >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::ValuesInclude>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
                 ::std::string::String,
             >,
             noise_variances: ::std::result::Result<
@@ -3652,7 +3855,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     derivatives: Ok(Default::default()),
                     duplicates: Ok(Default::default()),
+                    include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -3711,6 +3916,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::ValuesInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
             pub fn kernel<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
@@ -3720,6 +3937,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
                     });
                 self
             }
@@ -3785,7 +4014,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: value.cloud?,
                     derivatives: value.derivatives?,
                     duplicates: value.duplicates?,
+                    include: value.include?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -3800,7 +4031,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Ok(value.cloud),
                     derivatives: Ok(value.derivatives),
                     duplicates: Ok(value.duplicates),
+                    include: Ok(value.include),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -3814,12 +4047,24 @@ the noise of the points, 1e-3 at least.*/
                 super::Diagnostics,
                 ::std::string::String,
             >,
+            gradient_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             gradients: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            hessian_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
             hessians: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            value_deviations: ::std::result::Result<
+                ::std::vec::Vec<f64>,
                 ::std::string::String,
             >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
@@ -3828,8 +4073,11 @@ the noise of the points, 1e-3 at least.*/
             fn default() -> Self {
                 Self {
                     diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    gradient_deviations: Ok(Default::default()),
                     gradients: Ok(Default::default()),
+                    hessian_deviations: Ok(Default::default()),
                     hessians: Ok(Default::default()),
+                    value_deviations: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -3847,6 +4095,20 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn gradient_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gradient_deviations: {e}"
+                        )
+                    });
+                self
+            }
             pub fn gradients<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
@@ -3856,6 +4118,22 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for gradients: {e}")
+                    });
+                self
+            }
+            pub fn hessian_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hessian_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hessian_deviations: {e}"
+                        )
                     });
                 self
             }
@@ -3870,6 +4148,20 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for hessians: {e}")
+                    });
+                self
+            }
+            pub fn value_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.value_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for value_deviations: {e}"
+                        )
                     });
                 self
             }
@@ -3894,8 +4186,11 @@ the noise of the points, 1e-3 at least.*/
             ) -> ::std::result::Result<Self, super::error::ConversionError> {
                 Ok(Self {
                     diagnostics: value.diagnostics?,
+                    gradient_deviations: value.gradient_deviations?,
                     gradients: value.gradients?,
+                    hessian_deviations: value.hessian_deviations?,
                     hessians: value.hessians?,
+                    value_deviations: value.value_deviations?,
                     values: value.values?,
                 })
             }
@@ -3905,8 +4200,11 @@ the noise of the points, 1e-3 at least.*/
             fn from(value: super::InterpolationResponse) -> Self {
                 Self {
                     diagnostics: Ok(value.diagnostics),
+                    gradient_deviations: Ok(value.gradient_deviations),
                     gradients: Ok(value.gradients),
+                    hessian_deviations: Ok(value.hessian_deviations),
                     hessians: Ok(value.hessians),
+                    value_deviations: Ok(value.value_deviations),
                     values: Ok(value.values),
                 }
             }
@@ -4445,6 +4743,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
             >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
             noise_variances: ::std::result::Result<
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
@@ -4467,6 +4769,7 @@ the noise of the points, 1e-3 at least.*/
                     format: Ok(Default::default()),
                     geometry: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -4548,6 +4851,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
             pub fn noise_variances<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -4600,6 +4915,7 @@ the noise of the points, 1e-3 at least.*/
                     format: value.format?,
                     geometry: value.geometry?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -4616,6 +4932,7 @@ the noise of the points, 1e-3 at least.*/
                     format: Ok(value.format),
                     geometry: Ok(value.geometry),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -4724,8 +5041,16 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::ValuesInclude>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
                 ::std::string::String,
             >,
             noise_variances: ::std::result::Result<
@@ -4749,7 +5074,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -4808,6 +5135,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::ValuesInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
             pub fn kernel<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
@@ -4817,6 +5156,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
                     });
                 self
             }
@@ -4882,7 +5233,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    include: value.include?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -4898,7 +5251,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    include: Ok(value.include),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -4916,6 +5271,10 @@ the noise of the points, 1e-3 at least.*/
                 super::Diagnostics,
                 ::std::string::String,
             >,
+            value_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             values: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<f64>>,
                 ::std::string::String,
@@ -4926,6 +5285,7 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Err("no value supplied for degenerate".to_string()),
                     diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    value_deviations: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -4955,6 +5315,20 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn value_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.value_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for value_deviations: {e}"
+                        )
+                    });
+                self
+            }
             pub fn values<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
@@ -4977,6 +5351,7 @@ the noise of the points, 1e-3 at least.*/
                 Ok(Self {
                     degenerate: value.degenerate?,
                     diagnostics: value.diagnostics?,
+                    value_deviations: value.value_deviations?,
                     values: value.values?,
                 })
             }
@@ -4987,6 +5362,7 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Ok(value.degenerate),
                     diagnostics: Ok(value.diagnostics),
+                    value_deviations: Ok(value.value_deviations),
                     values: Ok(value.values),
                 }
             }
@@ -5704,6 +6080,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
             >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
             noise_variances: ::std::result::Result<
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
@@ -5726,6 +6106,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: Ok(Default::default()),
                     include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -5796,6 +6177,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
             pub fn noise_variances<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -5858,6 +6251,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: value.duplicates?,
                     include: value.include?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -5873,6 +6267,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: Ok(value.duplicates),
                     include: Ok(value.include),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -6337,6 +6732,10 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::Kernel>,
                 ::std::string::String,
             >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
             noise_variances: ::std::result::Result<
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
@@ -6358,6 +6757,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -6427,6 +6827,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
             pub fn noise_variances<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -6478,6 +6890,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -6493,6 +6906,7 @@ the noise of the points, 1e-3 at least.*/
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -6605,8 +7019,16 @@ the noise of the points, 1e-3 at least.*/
                 ::std::option::Option<super::Geometry>,
                 ::std::string::String,
             >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::ValuesInclude>,
+                ::std::string::String,
+            >,
             kernel: ::std::result::Result<
                 ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
                 ::std::string::String,
             >,
             noise_variances: ::std::result::Result<
@@ -6630,7 +7052,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Err("no value supplied for cloud".to_string()),
                     duplicates: Ok(Default::default()),
                     geometry: Ok(Default::default()),
+                    include: Ok(Default::default()),
                     kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
                     solver: Ok(Default::default()),
@@ -6689,6 +7113,18 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::ValuesInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
             pub fn kernel<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
@@ -6698,6 +7134,18 @@ the noise of the points, 1e-3 at least.*/
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
                     });
                 self
             }
@@ -6763,7 +7211,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: value.cloud?,
                     duplicates: value.duplicates?,
                     geometry: value.geometry?,
+                    include: value.include?,
                     kernel: value.kernel?,
+                    mean: value.mean?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
                     solver: value.solver?,
@@ -6779,7 +7229,9 @@ the noise of the points, 1e-3 at least.*/
                     cloud: Ok(value.cloud),
                     duplicates: Ok(value.duplicates),
                     geometry: Ok(value.geometry),
+                    include: Ok(value.include),
                     kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
                     solver: Ok(value.solver),
@@ -6797,6 +7249,10 @@ the noise of the points, 1e-3 at least.*/
                 super::Diagnostics,
                 ::std::string::String,
             >,
+            gradient_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
             gradients: ::std::result::Result<
                 ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
                 ::std::string::String,
@@ -6807,6 +7263,7 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Err("no value supplied for degenerate".to_string()),
                     diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    gradient_deviations: Ok(Default::default()),
                     gradients: Err("no value supplied for gradients".to_string()),
                 }
             }
@@ -6836,6 +7293,22 @@ the noise of the points, 1e-3 at least.*/
                     });
                 self
             }
+            pub fn gradient_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gradient_deviations: {e}"
+                        )
+                    });
+                self
+            }
             pub fn gradients<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<
@@ -6860,6 +7333,7 @@ the noise of the points, 1e-3 at least.*/
                 Ok(Self {
                     degenerate: value.degenerate?,
                     diagnostics: value.diagnostics?,
+                    gradient_deviations: value.gradient_deviations?,
                     gradients: value.gradients?,
                 })
             }
@@ -6870,6 +7344,7 @@ the noise of the points, 1e-3 at least.*/
                 Self {
                     degenerate: Ok(value.degenerate),
                     diagnostics: Ok(value.diagnostics),
+                    gradient_deviations: Ok(value.gradient_deviations),
                     gradients: Ok(value.gradients),
                 }
             }

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::numerics::solver::trend::Mean;
+
 /// How the linear system is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -26,6 +28,28 @@ pub enum DuplicatePolicy {
     Refuse,
     /// Average their values; columns of matrices split the weight equally.
     Merge,
+}
+
+/// The mean of a function: what it is made of beside the kernel, and tends to far from the points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MeanChoice {
+    /// 0.
+    Zero,
+    /// A constant, found from the values by generalised least squares.
+    Constant,
+    /// A constant and a slope for each coordinate, likewise.
+    Linear,
+}
+
+impl From<MeanChoice> for Mean {
+    fn from(choice: MeanChoice) -> Self {
+        match choice {
+            MeanChoice::Zero => Self::Zero,
+            MeanChoice::Constant => Self::Constant,
+            MeanChoice::Linear => Self::Linear,
+        }
+    }
 }
 
 /// Which function's level surface is meant.
@@ -66,6 +90,14 @@ pub enum OrientationChoice {
     Outward,
     /// Along the gradient of the signature function, whatever its sign; with the offset model, the opposite of `outward`.
     Gradient,
+}
+
+/// What an answer about values has beside what it always has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ValuesInclude {
+    /// Standard deviations, given the values.
+    Deviations,
 }
 
 /// What a geometric answer has beside what it always has.

@@ -111,7 +111,7 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
     #[schema(nullable = false)]
     pub reciprocal_condition: Option<f64>,
-    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and surfaces, with Y = 1.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
     #[schema(nullable = false)]
     pub relative_residual: Option<f64>,
@@ -119,6 +119,10 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
     #[schema(nullable = false)]
     pub native_norm_squared: Option<f64>,
+    /// The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub mean_coefficients: Option<Vec<f64>>,
     /// |u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
     #[schema(nullable = false)]
@@ -152,6 +156,8 @@ pub enum DegenerateReason {
     VanishingGradient,
     /// The points around the query do not confirm its curvatures; the number is served.
     UnderResolved,
+    /// The deviation of what is served is more than a quarter of its root mean square over the queries; the number is served.
+    Uncertain,
     /// The kernel's cusp at the points shows in the curvatures, which may be off by factors; the number is served.
     KernelTooRough,
     /// The query is farther from the cloud than three spacings; the number is served.

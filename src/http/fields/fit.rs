@@ -1,9 +1,11 @@
 //! The fields that determine a fit, and the macro that gives them to a request.
 
+use std::sync::Arc;
+
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::choices::{DuplicatePolicy, SolverChoice, SurfaceChoice};
+use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
 use super::cloud_ref::CloudRef;
 use super::kernel::Kernel;
 use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word};
@@ -48,6 +50,9 @@ pub struct Fit {
     pub noise_variances: Option<Vec<f64>>,
     pub solver: SolverChoice,
     pub duplicates: DuplicatePolicy,
+    /// Values at the points of the cloud, where the fit is one of values.
+    pub values: Option<Arc<Vec<f64>>>,
+    pub mean: Option<MeanChoice>,
 }
 
 /// Declares a request: the fields of a fit, which stand directly in it, and its own.
@@ -63,13 +68,14 @@ macro_rules! request {
             /// The points where values are known, or that sample the surface.
             #[serde(deserialize_with = "crate::http::wire::read::members::object")]
             pub cloud: $crate::http::fields::CloudRef,
-            /// The kernel; chosen from the cloud if absent, `alpha` included, and repeated in the diagnostics.
+            /// The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+            /// they are given, the noise and a constant mean. The diagnostics repeat all of it.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_object")]
             #[schema(nullable = false)]
             pub kernel: Option<$crate::http::fields::Kernel>,
             /// Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-            /// of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            /// the noise of the points, 1e-3 at least.
+            /// of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+            /// chosen by the noise of the points of a surface, 1e-3 at least.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present")]
             #[schema(nullable = false, minimum = 0.0)]
             pub alpha: Option<f64>,
@@ -98,6 +104,8 @@ macro_rules! request {
                     noise_variances: self.noise_variances.take(),
                     solver: self.solver.unwrap_or_default(),
                     duplicates: self.duplicates.unwrap_or_default(),
+                    values: None,
+                    mean: None,
                 }
             }
         }

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::{present, word};
+use crate::numerics::defaults::Purpose;
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::sampling::Scales;
@@ -85,12 +86,21 @@ impl PlannedKernel {
     ///
     /// # Errors
     /// 422 if the cloud is too small or large for any.
-    pub fn resolve(&self, scales: Option<&Scales>, pointers: Pointers) -> Result<NumericalKernel, Problem> {
+    pub fn resolve(
+        &self,
+        scales: Option<&Scales>,
+        purpose: Purpose,
+        pointers: Pointers,
+    ) -> Result<NumericalKernel, Problem> {
         match *self {
             Self::Given(kernel) => Ok(kernel),
             Self::OfCloud { family, variance } => {
                 let scales = scales.ok_or_else(Problem::internal)?;
-                NumericalKernel::new(family, family.default_length_scale(scales), variance)
+                let length_scale = match purpose {
+                    Purpose::Values => family.length_scale_of_values(scales),
+                    Purpose::Normals | Purpose::Curvatures => family.default_length_scale(scales),
+                };
+                NumericalKernel::new(family, length_scale, variance)
                     .map_err(|error| Problem::from_numerics(error, pointers))
             }
         }
@@ -170,6 +180,14 @@ impl KernelUsed {
             nu: Some(4.5),
             smoothness: None,
         }
+    }
+}
+
+impl KernelUsed {
+    /// A kernel whose variance is so many times as large.
+    pub fn scaled(kernel: &NumericalKernel, factor: f64) -> Self {
+        let used = Self::from(kernel);
+        Self { variance: used.variance * factor, ..used }
     }
 }
 

@@ -9,7 +9,8 @@ mod fit;
 pub mod schemas;
 
 pub use choices::{
-    DuplicatePolicy, GeometryInclude, OrientationChoice, SolverChoice, SurfaceChoice, SurfaceUsed,
+    DuplicatePolicy, GeometryInclude, MeanChoice, OrientationChoice, SolverChoice, SurfaceChoice,
+    SurfaceUsed, ValuesInclude,
 };
 pub use cloud_ref::CloudRef;
 pub use diagnostics::{

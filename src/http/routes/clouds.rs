@@ -257,6 +257,7 @@ pub async fn delete_cloud(
         return Err(unknown_cloud(&cloud_id));
     }
     app.prepared.forget_cloud(owner, id);
+    app.learned.forget_cloud(owner, id);
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -7,21 +7,22 @@ use axum::extract::{Request, State};
 use axum::response::Response;
 
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, request};
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::{DenseOnly, Planner};
 use crate::http::serve::values::{ValuesAt, ValuesRequest};
-use crate::http::wire::read::members::present;
+use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
+use crate::numerics::function::deviations::JetDeviations;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{Asked, work_price};
+use crate::numerics::solver::choose::{Asked, deviations_price, work_price};
 use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 
@@ -31,6 +32,10 @@ request! {
         /// The values at the points, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
+        /// The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
         /// Where answers are wanted; the points of the cloud if absent.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -39,6 +44,10 @@ request! {
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
+        /// What is wanted beside what was asked for; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<ValuesInclude>>,
     }
 }
 
@@ -54,6 +63,16 @@ answer! {
         /// D²u at each query, unit of the values per length squared; with `derivatives` of 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         hessians: Option<Array>,
+        /// Standard deviation of u at each query given the values, under the kernel as covariance and alpha as variance of the noise; with
+        /// `deviations`.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        value_deviations: Option<Array>,
+        /// The same for the components of ∇u.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradient_deviations: Option<Array>,
+        /// The same for the entries of D²u.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        hessian_deviations: Option<Array>,
         /// How the answer came about.
         diagnostics: Diagnostics,
     }
@@ -83,9 +102,10 @@ pub async fn compute_interpolation(
 
 /// A checked request.
 pub struct Work {
-    values: Vec<f64>,
+    values: Arc<Vec<f64>>,
     queries: Arc<Cloud>,
     derivatives: u8,
+    has_deviations: bool,
 }
 
 impl Operation for InterpolationRequest {
@@ -98,30 +118,63 @@ impl Operation for InterpolationRequest {
         if derivatives > 2 {
             return Err(Problem::invalid_request("/derivatives", "derivatives must be 0, 1 or 2"));
         }
-        let mut main = planner.values_fit(self.take_fit(), None)?;
-        planner.check_values(&self.values, &main)?;
+        let values = Arc::new(std::mem::take(&mut self.values));
+        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let has_deviations = self.include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
+        let of_derivatives = DenseOnly { name: "deviations of derivatives", pointer: "/include" };
+        let dense_only = (has_deviations && derivatives > 0).then_some(of_derivatives);
+        let mut main = planner.values_fit(fit, dense_only)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let per_query = [1, 1 + d, 1 + d + d * d][usize::from(derivatives)];
+        let order = usize::from(derivatives);
+        let per_query = [1, 1 + d, 1 + d + d * d][order];
         let asked = if main.is_moving() { Asked::Moving } else { Asked::Function };
+        let mut work = work_price(asked, n, m, d);
+        if has_deviations && !main.is_moving() {
+            let per_query = [1, 1 + d, 1 + d + d * (d + 1) / 2][order];
+            work = work.and(deviations_price(n, m.saturating_mul(per_query)));
+        }
+        let n_lists = if has_deviations { 2 } else { 1 };
         let cost = Cost {
-            work: work_price(asked, n, m, d),
-            n_numbers: planner.check_answer(m.checked_mul(per_query))?,
+            work,
+            n_numbers: planner.check_answer(m.checked_mul(n_lists * per_query))?,
             n_held: n + m * d,
         };
-        Ok(Plan { main, surface: None, work: Work { values: self.values, queries, derivatives }, cost })
+        Ok(Plan { main, surface: None, work: Work { values, queries, derivatives, has_deviations }, cost })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
+        // The dense solver has them with those of derivatives.
+        let has_variances = work.has_deviations && fits.main.stored.of_queries().is_some();
         let order = [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian][usize::from(work.derivatives)];
-        let asked =
-            ValuesRequest { values: &work.values, queries: &work.queries, order, has_variances: false };
-        let ValuesAt { jets, diagnostics, .. } = fits.values_at(asked, observer)?;
+        let asked = ValuesRequest { values: &work.values, queries: &work.queries, order, has_variances };
+        let ValuesAt { jets, diagnostics, interpolant, variances } = fits.values_at(asked, observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
+        let deviations = match (&interpolant, variances) {
+            (Some(u), _) if work.has_deviations => {
+                let (scale, order) = (fits.main.plan.scale, usize::from(work.derivatives));
+                let found = JetDeviations::of(u, scale, &work.queries, order, observer);
+                Some(found.map_err(|error| fits.main.refused(error))?)
+            }
+            (None, Some(variances)) => Some(JetDeviations::of_values(&variances)),
+            (Some(_), _) | (None, None) => None,
+        };
+        let lists = deviations.map(|of| (of.values, of.gradients, of.hessians));
+        let (of_values, of_gradients, of_hessians) = match lists {
+            None => (None, None, None),
+            Some((values, gradients, hessians)) => (
+                Some(Array::new(values, &[m])),
+                (work.derivatives >= 1).then(|| Array::new(gradients, &[m, d])),
+                (work.derivatives >= 2).then(|| Array::new(hessians, &[m, d, d])),
+            ),
+        };
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
             gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
             hessians: (work.derivatives >= 2).then(|| Array::new(jets.hessians(), &[m, d, d])),
+            value_deviations: of_values,
+            gradient_deviations: of_gradients,
+            hessian_deviations: of_hessians,
             diagnostics,
         })
     }

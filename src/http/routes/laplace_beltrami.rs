@@ -8,9 +8,11 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::surfaces::{AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils};
+use super::surfaces::{
+    Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
+};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -18,13 +20,13 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{present, present_object, present_word};
+use crate::http::wire::read::members::{present, present_object, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
-    laplace_beltrami, laplace_beltrami_matrix, laplace_beltrami_stencils,
+    laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix, laplace_beltrami_stencils,
 };
 use crate::store::Owner;
 
@@ -34,6 +36,10 @@ request! {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
+        /// The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
         /// Where answers are wanted; the points of the surface's cloud if absent.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -42,6 +48,10 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
+        /// What is wanted beside; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<ValuesInclude>>,
     }
 }
 
@@ -65,6 +75,10 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
+        /// The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
         /// Retired: a matrix of this path is dense. Sparse ones are answered by `/v1/laplace-beltrami/sparse-matrix`.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false, deprecated)]
@@ -78,6 +92,10 @@ answer! {
         /// Δu at each query, unit of the values per length squared; null where there is no normal.
         #[schema(value_type = Vec<Option<f64>>)]
         values: Array,
+        /// Standard deviation of Δu given the values and, as far as its deviations are known, the surface; null where there is no
+        /// answer or no deviation; with `deviations`.
+        #[schema(nullable = false, value_type = Option<Vec<Option<f64>>>)]
+        value_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// How the answer came about.
@@ -146,8 +164,11 @@ impl Operation for LaplaceBeltramiRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
-        let fit = self.take_fit();
-        plan_applied(planner, fit, self.geometry, self.values, self.queries, |_| 1)
+        let values = Arc::new(std::mem::take(&mut self.values));
+        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let applied =
+            Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
+        plan_applied(planner, fit, applied, |_| 1)
     }
 
     fn compute(
@@ -160,6 +181,7 @@ impl Operation for LaplaceBeltramiRequest {
             let values = work.by_stencils(fits, &mut surface, nodes, laplace_beltrami_stencils, observer)?;
             return Ok(LaplaceBeltramiResponse {
                 values: surface.per_query(values, &[surface.geometry.n_queries()]),
+                value_deviations: None,
                 degenerate: surface.degenerate(),
                 diagnostics: surface.diagnostics(fits)?,
             });
@@ -171,9 +193,19 @@ impl Operation for LaplaceBeltramiRequest {
         let m = geometry.n_queries();
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
+        let mut degenerate = surface.degenerate();
+        let mut of_values = None;
+        if work.request.has_deviations {
+            let scale = fits.main.plan.scale;
+            let found = laplace_beltrami_deviations(geometry, &interpolant, scale, &work.queries, observer)
+                .map_err(|error| fits.main.refused(error))?;
+            surface.flag_uncertain(&values, &found, &mut degenerate);
+            of_values = Some(surface.known_per_query(found, &[m]));
+        }
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
-            degenerate: surface.degenerate(),
+            value_deviations: of_values,
+            degenerate,
             diagnostics,
         })
     }
@@ -187,7 +219,7 @@ impl Operation for LaplaceBeltramiMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let MatrixFormat::Dense = self.format.unwrap_or_default();
-        let fit = self.take_fit();
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         plan_matrix(planner, fit, self.geometry, self.queries, |_| 1)
     }
 
@@ -198,8 +230,14 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrix = laplace_beltrami_matrix(geometry, fits.main.solver()?, &work.queries, observer)
-            .map_err(|error| fits.main.refused(error))?;
+        let matrix = laplace_beltrami_matrix(
+            geometry,
+            fits.main.solver()?,
+            &work.queries,
+            fits.main.plan.mean,
+            observer,
+        )
+        .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(LaplaceBeltramiMatrixResponse {

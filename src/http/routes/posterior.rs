@@ -9,7 +9,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Warning, WarningCode, request};
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, Warning, WarningCode, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -19,11 +19,12 @@ use crate::http::serve::plan::Cost;
 use crate::http::serve::plan::PlannedFit;
 use crate::http::serve::planner::{DenseOnly, Planner};
 use crate::http::serve::values::{ValuesAt, ValuesRequest};
-use crate::http::wire::read::members::{present, present_words};
+use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::function::posterior::{covariance, log_marginal_likelihood};
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::function::posterior::{covariance_with_mean, log_marginal_likelihood};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::choose::{Asked, work_price};
 use crate::numerics::sums::jets::JetOrder;
@@ -51,6 +52,10 @@ request! {
         /// The observed values at the points, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
+        /// The mean of the process; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
         /// Where answers are wanted; the points of the cloud if absent.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -112,7 +117,7 @@ pub async fn compute_posterior(
 
 /// A checked request.
 pub struct Work {
-    values: Vec<f64>,
+    values: Arc<Vec<f64>>,
     queries: Arc<Cloud>,
     include: Vec<PosteriorQuantity>,
 }
@@ -129,12 +134,12 @@ impl Operation for PosteriorRequest {
     const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let fit = self.take_fit();
+        let values = Arc::new(std::mem::take(&mut self.values));
+        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
         let include = self.include.unwrap_or_default();
         let mut main = planner.values_fit(fit, dense_only(&include))?;
-        planner.check_values(&self.values, &main)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
-        let work = Work { values: self.values, queries, include };
+        let work = Work { values, queries, include };
         check_observation_noise(&work, &main)?;
         let (n, m, d) = (main.n_points(), work.queries.n_points(), work.queries.dimension());
         let has_covariance = work.wants(PosteriorQuantity::Covariance);
@@ -164,10 +169,15 @@ impl Operation for PosteriorRequest {
         let ValuesAt { jets, variances: latent, mut diagnostics, interpolant } =
             fits.values_at(asked, observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
+        let scale = fits.main.plan.scale;
         let dense = || interpolant.as_ref().ok_or_else(Problem::internal);
         let covariance = match work.wants(Q::Covariance) {
             false => None,
-            true => Some(covariance(&dense()?.solver, queries, observer).map_err(refused)?),
+            true => {
+                let Interpolant { solver, solution } = dense()?;
+                let found = covariance_with_mean(solver, solution.trend.as_ref(), queries, observer);
+                Some(found.map_err(refused)?.scaled(scale))
+            }
         };
         let clamped = latent.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
         warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
@@ -175,7 +185,7 @@ impl Operation for PosteriorRequest {
             false => None,
             true => {
                 let dense = dense()?;
-                Some(log_marginal_likelihood(&dense.solver, &dense.solution, 1.0).map_err(refused)?)
+                Some(log_marginal_likelihood(&dense.solver, &dense.solution, scale).map_err(refused)?)
             }
         };
         // With noise per point it is not asked for.

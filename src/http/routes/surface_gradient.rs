@@ -6,9 +6,11 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::surfaces::{AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils};
+use super::surfaces::{
+    Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
+};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, Geometry, request};
+use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -16,13 +18,13 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{present, present_object};
+use crate::http::wire::read::members::{present, present_object, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
-    surface_gradient, surface_gradient_matrices, surface_gradient_stencils,
+    surface_gradient, surface_gradient_deviations, surface_gradient_matrices, surface_gradient_stencils,
 };
 use crate::store::Owner;
 
@@ -32,6 +34,10 @@ request! {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
+        /// The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
         /// Where answers are wanted; the points of the surface's cloud if absent.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
@@ -40,6 +46,10 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
+        /// What is wanted beside; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<ValuesInclude>>,
     }
 }
 
@@ -54,6 +64,10 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
+        /// The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
     }
 }
 
@@ -63,6 +77,10 @@ answer! {
         /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
         #[schema(value_type = Vec<Option<Vec<f64>>>)]
         gradients: Array,
+        /// Standard deviation of each component given the values and, as far as its deviations are known, the surface; null where there is no
+        /// answer or no deviation; with `deviations`.
+        #[schema(nullable = false, value_type = Option<Vec<Option<Vec<f64>>>>)]
+        gradient_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
         /// How the answer came about.
@@ -130,8 +148,11 @@ impl Operation for SurfaceGradientRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
-        let fit = self.take_fit();
-        plan_applied(planner, fit, self.geometry, self.values, self.queries, |d| d)
+        let values = Arc::new(std::mem::take(&mut self.values));
+        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let applied =
+            Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
+        plan_applied(planner, fit, applied, |d| d)
     }
 
     fn compute(
@@ -147,6 +168,7 @@ impl Operation for SurfaceGradientRequest {
             let gradients = (0..m * d).map(|at| components[at % d * m + at / d]).collect();
             return Ok(SurfaceGradientResponse {
                 gradients: surface.per_query(gradients, &[m, d]),
+                gradient_deviations: None,
                 degenerate: surface.degenerate(),
                 diagnostics: surface.diagnostics(fits)?,
             });
@@ -158,9 +180,19 @@ impl Operation for SurfaceGradientRequest {
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
+        let mut degenerate = surface.degenerate();
+        let mut of_gradients = None;
+        if work.request.has_deviations {
+            let scale = fits.main.plan.scale;
+            let found = surface_gradient_deviations(geometry, &interpolant, scale, &work.queries, observer)
+                .map_err(|error| fits.main.refused(error))?;
+            surface.flag_uncertain(&gradients, &found, &mut degenerate);
+            of_gradients = Some(surface.known_per_query(found, &[m, d]));
+        }
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
-            degenerate: surface.degenerate(),
+            gradient_deviations: of_gradients,
+            degenerate,
             diagnostics,
         })
     }
@@ -173,7 +205,7 @@ impl Operation for SurfaceGradientMatrixRequest {
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
-        let fit = self.take_fit();
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         plan_matrix(planner, fit, self.geometry, self.queries, |d| d)
     }
 
@@ -184,8 +216,14 @@ impl Operation for SurfaceGradientMatrixRequest {
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
         let surface = fits.geometry(&work.queries, &work.request, observer)?;
         let geometry = &surface.geometry;
-        let matrices = surface_gradient_matrices(geometry, fits.main.solver()?, &work.queries, observer)
-            .map_err(|error| fits.main.refused(error))?;
+        let matrices = surface_gradient_matrices(
+            geometry,
+            fits.main.solver()?,
+            &work.queries,
+            fits.main.plan.mean,
+            observer,
+        )
+        .map_err(|error| fits.main.refused(error))?;
         let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
         let diagnostics = work.diagnostics(fits, &surface, observer)?;
         Ok(SurfaceGradientMatrixResponse {

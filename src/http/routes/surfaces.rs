@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Fit, Geometry, GeometryInclude, OrientationChoice, SurfaceChoice};
+use crate::http::fields::{
+    Diagnostics, Fit, Geometry, GeometryInclude, OrientationChoice, SurfaceChoice, ValuesInclude,
+};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::fitted::{Fits, SurfaceGeometry};
@@ -17,7 +19,9 @@ use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
-use crate::numerics::solver::choose::{Asked, MAX_OFFSETS, Offsets, n_entries_per_row, work_price};
+use crate::numerics::solver::choose::{
+    Asked, MAX_OFFSETS, Offsets, deviations_price, n_entries_per_row, work_price,
+};
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
@@ -35,9 +39,17 @@ pub struct GeometryWork {
 pub struct AppliedWork {
     /// The nodes of the values, where stencils and not a solver serve them.
     pub nodes: Option<Arc<RegisteredCloud>>,
-    pub values: Vec<f64>,
+    pub values: Arc<Vec<f64>>,
     pub queries: Arc<Cloud>,
     pub request: GeometryRequest,
+}
+
+/// What a request to apply an operator has beside its fit.
+pub struct Applied {
+    pub geometry: Option<Geometry>,
+    pub values: Arc<Vec<f64>>,
+    pub queries: Option<Points>,
+    pub include: Option<Vec<ValuesInclude>>,
 }
 
 /// A checked request for an operator as a matrix.
@@ -60,7 +72,7 @@ impl MatrixWork {
         let m = self.queries.n_points();
         let constant = match (&fits.surface, &*surface.surface) {
             (None, Surface::Signature(surface)) => surface.signature().clone(),
-            _ => fits.interpolant(&vec![1.0; fits.main.plan.stored.cloud.n_points()], observer)?,
+            _ => fits.interpolant_of_one(observer)?,
         };
         let mut diagnostics = fits.main.diagnostics(&constant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
@@ -102,13 +114,18 @@ pub fn plan_geometry(
 pub fn plan_applied(
     planner: &Planner<'_>,
     fit: Fit,
-    geometry: Option<Geometry>,
-    values: Vec<f64>,
-    queries: Option<Points>,
+    applied: Applied,
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<AppliedWork>, Problem> {
-    let request = operator_request(&geometry);
+    let Applied { geometry, values, queries, include } = applied;
+    let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
+    let request = GeometryRequest { has_deviations, ..operator_request(&geometry) };
+    let has_mean = fit.mean.is_some();
     let (mut main, mut surface, nodes) = match planner.operator_fits(fit, geometry, &request)? {
+        OperatorFits::Stencils { .. } if has_mean => return Err(stencils_lack("mean", "/mean")),
+        OperatorFits::Stencils { .. } if has_deviations => {
+            return Err(stencils_lack("deviations", "/include"));
+        }
         OperatorFits::Solved { values, surface } => (values, Some(surface), None),
         OperatorFits::Stencils { nodes, surface } => (surface, None, Some(nodes)),
     };
@@ -118,10 +135,7 @@ pub fn plan_applied(
             planner.check_values_of(&values, &nodes.cloud)?;
             nodes.cloud.n_points()
         }
-        None => {
-            planner.check_values(&values, &main)?;
-            main.n_points()
-        }
+        None => main.n_points(),
     };
     let queries = match &mut surface {
         None => planner.queries(queries, &mut [&mut main])?,
@@ -133,9 +147,15 @@ pub fn plan_applied(
         Some(_) => Asked::Stencils,
         None => Asked::Operator { n_surface_points },
     };
+    let mut work = work_price(asked, n_values, m, d);
+    let mut n_numbers = m.checked_mul(numbers_per_query(d));
+    if has_deviations {
+        work = work.and(deviations_price(n_values, n_numbers.unwrap_or(usize::MAX)));
+        n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
+    }
     let cost = Cost {
-        work: work_price(asked, n_values, m, d),
-        n_numbers: planner.check_answer(m.checked_mul(numbers_per_query(d)))?,
+        work,
+        n_numbers: planner.check_answer(n_numbers)?,
         n_held: n_values + n_surface_points + m * d,
     };
     Ok(Plan { main, surface, work: AppliedWork { values, queries, request, nodes }, cost })
@@ -257,6 +277,14 @@ pub fn plan_stencils(
         n_held: m * d,
     };
     Ok(Plan { main, surface: None, work: StencilWork { nodes, queries, request }, cost })
+}
+
+/// 422 for what only a kernel has.
+fn stencils_lack(what: &str, pointer: &str) -> Problem {
+    let detail = format!(
+        "stencils reproduce polynomials and have no {what}; leave it out, or take \"solver\": \"dense\""
+    );
+    Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
 }
 
 /// Who is near whom among nodes: known where they are the points of the surface.

@@ -13,6 +13,7 @@ use crate::http::problem::Problem;
 use crate::memory::Memory;
 use crate::store::budget::Budget;
 use crate::store::clouds::CloudStore;
+use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
 
 /// Configuration, stores and compute pool.
@@ -24,6 +25,7 @@ pub struct App {
     pub intake: Budget,
     pub clouds: CloudStore<Problem>,
     pub prepared: PreparedStore<FitFailure>,
+    pub learned: LearnedStore<Problem>,
     pub compute: Arc<Compute>,
     /// Requests between their arrival and their answer.
     pub n_requests: AtomicUsize,
@@ -45,6 +47,7 @@ impl App {
             intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
             prepared: PreparedStore::new(of_prepared),
+            learned: LearnedStore::default(),
             compute: Arc::new(Compute::new(
                 config.n_threads(),
                 config.max_queue,

@@ -19,12 +19,14 @@ use crate::numerics::kernel::Family;
 use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::choose::AutoLocal;
+use crate::numerics::solver::trend::{Mean, Trend};
 use crate::numerics::solver::{Method, Solution, Solver};
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
 use crate::numerics::surface::local::LocalSurface;
+use crate::numerics::surface::operators::uncertain;
 use crate::numerics::surface::served::ServedBy;
 use crate::numerics::surface::signature::SignatureSurface;
 use crate::store::key::ValuesKey;
@@ -54,7 +56,16 @@ impl Fits {
     /// # Errors
     /// Those of [`Solution::of`] as a [`Problem`].
     pub fn interpolant(&self, values: &[f64], observer: &JobObserver) -> Result<Interpolant, Problem> {
-        self.main.interpolant(&self.app, values, observer)
+        self.main.interpolant(&self.app, values, self.main.plan.mean, observer)
+    }
+
+    /// The function through the constant 1, without a mean: what the quality of a fit without values is judged by.
+    ///
+    /// # Errors
+    /// Those of [`Solution::of`] as a [`Problem`].
+    pub fn interpolant_of_one(&self, observer: &JobObserver) -> Result<Interpolant, Problem> {
+        let ones = vec![1.0; self.main.plan.stored.cloud.n_points()];
+        self.main.interpolant(&self.app, &ones, Mean::Zero, observer)
     }
 
     /// The geometry of the surface at queries.
@@ -111,14 +122,20 @@ impl Fitted {
     }
 
     /// Finds the weights of values that were solved before, or solves.
-    fn interpolant(&self, app: &App, values: &[f64], observer: &JobObserver) -> Result<Interpolant, Problem> {
+    fn interpolant(
+        &self,
+        app: &App,
+        values: &[f64],
+        mean: Mean,
+        observer: &JobObserver,
+    ) -> Result<Interpolant, Problem> {
         let solver = self.solver()?.clone();
-        let key = ValuesKey::of(values);
+        let key = ValuesKey::with_mean(values, mean);
         if let Some(solution) = app.prepared.solution(self.plan.key, key) {
             return Ok(Interpolant { solver, solution });
         }
-        let interpolant =
-            Interpolant::fit(solver, &self.merged(values), observer).map_err(|error| self.refused(error))?;
+        let interpolant = Interpolant::fit_with_mean(solver, &self.merged(values), mean, observer)
+            .map_err(|error| self.refused(error))?;
         app.prepared.keep_solution(self.plan.key, key, interpolant.solution.clone());
         Ok(interpolant)
     }
@@ -146,10 +163,11 @@ impl Fitted {
     pub fn diagnostics(&self, solution: &Solution, n_queries: usize) -> Result<Diagnostics, Problem> {
         let (plan, solver) = (&self.plan, self.solver()?);
         let FitModel::Dense { kernel, regularization } = &plan.model else { return Err(Problem::internal()) };
-        let reciprocal_condition = solver.reciprocal_condition();
+        let (reciprocal_condition, scale) = (solver.reciprocal_condition(), plan.scale);
         Ok(Diagnostics {
-            kernel: kernel.into(),
-            alpha: uniform(regularization),
+            kernel: KernelUsed::scaled(kernel, scale),
+            alpha: uniform(regularization).map(|alpha| alpha * scale),
+            mean_coefficients: solution.trend.as_ref().map(Trend::of_coordinates),
             factorization: match solver.method() {
                 Method::Cholesky => FactorizationUsed::Cholesky,
                 Method::PivotedCholesky => FactorizationUsed::PivotedCholesky,
@@ -157,7 +175,7 @@ impl Fitted {
             rank: Some(solver.rank()),
             reciprocal_condition: Some(reciprocal_condition),
             relative_residual: Some(solution.relative_residual),
-            native_norm_squared: Some(solution.native_norm_squared),
+            native_norm_squared: Some(solution.native_norm_squared / scale),
             misfit: Some(solution.misfit),
             warnings: self.warnings(solver, solution),
             ..self.blank(SolverUsed::Dense, n_queries)
@@ -181,6 +199,7 @@ impl Fitted {
             reciprocal_condition: None,
             relative_residual: None,
             native_norm_squared: None,
+            mean_coefficients: None,
             misfit: None,
             noise_deviation: None,
             n_merged_duplicates: self.plan.merge.as_ref().map_or(0, |merge| merge.n_merged()),
@@ -199,7 +218,8 @@ impl Fitted {
                 "Cholesky fails in float64; least squares on {rank} of {n} points, which span the rest to rounding"
             );
             warn(WarningCode::IllConditioned, detail);
-        } else if reciprocal_condition < ILL_CONDITIONED {
+        } else if reciprocal_condition < ILL_CONDITIONED && !self.plan.is_learned {
+            // Where the values decided, the least noise is what float64 bears, and the weights follow it on purpose.
             let detail = format!("the reciprocal condition is {reciprocal_condition:.1e}");
             warn(WarningCode::IllConditioned, detail);
         }
@@ -238,9 +258,11 @@ impl Fitted {
             );
             warnings.push(Warning { code: WarningCode::IllConditioned, detail });
         }
+        let (scale, trend) = (self.plan.scale, self.plan.trend.as_ref());
         Ok(Diagnostics {
-            kernel: kernel.into(),
-            alpha: uniform(regularization),
+            kernel: KernelUsed::scaled(kernel, scale),
+            alpha: uniform(regularization).map(|alpha| alpha * scale),
+            mean_coefficients: trend.map(Trend::of_coordinates),
             solver_reason: reason.words().map(str::to_owned),
             warnings,
             ..self.blank(SolverUsed::Local, m)
@@ -304,6 +326,31 @@ impl SurfaceGeometry {
             gradient_norm: d.gradient_norm,
         };
         self.geometry.degenerate().iter().map(entry).collect()
+    }
+
+    /// Flags queries, unless they are flagged already, whose deviation leaves little of what is found: `[m, k]` both.
+    pub fn flag_uncertain(&self, found: &[f64], deviations: &[f64], degenerate: &mut Vec<Degenerate>) {
+        let mut is_flagged = vec![false; self.geometry.n_queries()];
+        degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
+        for query in uncertain(found, deviations, self.geometry.is_null()) {
+            if !is_flagged[query] {
+                let gradient_norm = self.geometry.gradient_norms()[query];
+                degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
+            }
+        }
+        degenerate.sort_by_key(|entry| entry.query);
+    }
+
+    /// Deviations per query, null where there is no answer, and where those of the surface are not known.
+    pub fn known_per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
+        let is_null: Vec<bool> = match self.geometry.deviations() {
+            None => self.geometry.is_null().to_vec(),
+            Some(known) => {
+                let both = known.is_known.iter().zip(self.geometry.is_null());
+                both.map(|(is_known, is_null)| !is_known || *is_null).collect()
+            }
+        };
+        Array::new(data, shape).with_nulls(0, &is_null)
     }
 
     /// Numbers per query, null where there is no answer.

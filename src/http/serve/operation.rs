@@ -149,10 +149,10 @@ async fn prepare<O: Operation>(
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
         let (request, mut memory) = intake.parse::<O>(&shared, observer)?;
-        let plan = request.plan(&Planner { app: &shared, owner: admitted.owner })?;
+        let mut plan = request.plan(&Planner { app: &shared, owner: admitted.owner })?;
         memory.shrink_to(n_bytes_held(&plan));
-        if lacking(&plan).is_some() {
-            return Ok(Parsed::Lacking(plan, memory));
+        if lacking_mut(&mut plan).is_some() {
+            return Ok(Parsed::Lacking(Box::new(plan), memory));
         }
         let plan = resolve(plan, memory)?;
         let mut report = Report::parsed_in(began.elapsed());
@@ -169,15 +169,15 @@ async fn prepare<O: Operation>(
             }
         })
     };
-    let (plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
+    let (mut plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
         Parsed::Done(prepared) => return Ok(prepared),
         Parsed::Lacking(plan, memory) => (plan, memory),
     };
-    while let Some(fit) = lacking(&plan) {
+    while let Some(fit) = lacking_mut(&mut plan) {
         find_lacking(app, admission, fit).await?;
     }
     app.compute
-        .run(admission, 0.0, move |_| resolve(plan, memory))
+        .run(admission, 0.0, move |_| resolve(*plan, memory))
         .await?
         .0
         .map(|plan| Prepared::Ready(Box::new(plan)))
@@ -186,13 +186,13 @@ async fn prepare<O: Operation>(
 enum Parsed<W> {
     Done(Prepared<W>),
     /// Its fits need to know more of their clouds.
-    Lacking(Plan<W>, Reservation),
+    Lacking(Box<Plan<W>>, Reservation),
 }
 
-/// A fit that needs to know more of its cloud.
-fn lacking<W>(plan: &Plan<W>) -> Option<&PlannedFit> {
-    let mut fits = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
-    fits.find(|fit| fit.lacks_scales() || fit.lacks_noise())
+/// A fit that needs to know more of its cloud or of its values.
+fn lacking_mut<W>(plan: &mut Plan<W>) -> Option<&mut PlannedFit> {
+    let mut fits = [Some(&mut plan.main), plan.surface.as_mut()].into_iter().flatten();
+    fits.find(|fit| fit.lacks_anything())
 }
 
 fn resolve<W>(plan: Plan<W>, intake: Reservation) -> Result<Resolved<W>, Problem> {

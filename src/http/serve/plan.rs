@@ -1,6 +1,7 @@
 //! The fit of a request: checked as far as the request goes, and then with everything that follows from the cloud.
 
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use crate::http::fields::DuplicatePolicy;
@@ -9,14 +10,19 @@ use crate::http::problem::{Pointers, Problem};
 use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::Kernel as NumericalKernel;
+use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::Merge;
+use crate::numerics::points::sampling::Sampling;
+use crate::numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
 use crate::numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
 use crate::numerics::solver::kind::SolverKind;
+use crate::numerics::solver::trend::{Mean, Trend};
 use crate::numerics::sums::regularization::Regularization;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
+use crate::store::learned::LearnedKey;
 
 /// A fit that is checked as far as the request goes; what is left out follows from the cloud.
 pub struct PlannedFit {
@@ -28,6 +34,47 @@ pub struct PlannedFit {
     pub(super) duplicates: DuplicatePolicy,
     pub(super) purpose: Purpose,
     pub(super) way: Way,
+    /// Those of a fit of values.
+    pub(super) values: Option<Box<PlannedValues>>,
+    pub(super) mean: Mean,
+}
+
+/// Values, and what is learned from them.
+pub(super) struct PlannedValues {
+    pub(super) values: Arc<Vec<f64>>,
+    pub(super) key: LearnedKey,
+    pub(super) learned: Option<Arc<Learned>>,
+}
+
+/// Values to learn from, with what is known beforehand.
+pub(super) struct Learning {
+    cloud: Arc<Cloud>,
+    sampling: Arc<Sampling>,
+    values: Arc<Vec<f64>>,
+    mean: Mean,
+    kernel: Option<NumericalKernel>,
+    regularization: Option<Regularization>,
+}
+
+impl Learning {
+    pub(super) fn learn(&self, observer: &dyn Observer) -> Result<Learned, NumericsError> {
+        let observed = Observed {
+            cloud: &self.cloud,
+            sampling: &self.sampling,
+            values: &self.values,
+            noise: match &self.regularization {
+                None if self.kernel.is_some() => Noise::Uniform(DEFAULT_ALPHA),
+                None => Noise::Unknown,
+                Some(Regularization::Uniform(alpha)) => Noise::Uniform(*alpha),
+                Some(Regularization::PerPoint(variances)) => Noise::PerPoint(variances),
+            },
+            mean: self.mean,
+        };
+        match &self.kernel {
+            None => learn(observed, observer),
+            Some(kernel) => learn_mean(observed, kernel, observer),
+        }
+    }
 }
 
 /// How a fit is served.
@@ -69,8 +116,13 @@ impl PlannedFit {
         matches!(self.regularization, Some(Regularization::PerPoint(_)))
     }
 
+    /// Whether something decides that is not known yet.
+    pub fn lacks_anything(&self) -> bool {
+        self.lacks_scales() || self.lacks_noise() || self.lacks_learned()
+    }
+
     /// Whether the lengths of the cloud decide, and are not known yet.
-    pub fn lacks_scales(&self) -> bool {
+    fn lacks_scales(&self) -> bool {
         !self.is_local()
             && !matches!(self.kernel, Some(PlannedKernel::Given(_)))
             && self.stored.scales().is_none()
@@ -79,6 +131,35 @@ impl PlannedFit {
     /// Whether the noise of the points decides, and is not known yet.
     pub fn lacks_noise(&self) -> bool {
         self.needs_noise() && self.stored.noise().is_none()
+    }
+
+    /// Whether the values decide, and were not looked at yet.
+    pub fn lacks_learned(&self) -> bool {
+        self.needs_learned() && self.values.as_ref().is_some_and(|values| values.learned.is_none())
+    }
+
+    /// A kernel that is not given follows from the values; so does a mean for a solver that never sees all of them at once.
+    fn needs_learned(&self) -> bool {
+        let has_moving_mean = self.mean != Mean::Zero && self.is_moving();
+        self.purpose == Purpose::Values && (self.kernel.is_none() || has_moving_mean)
+    }
+
+    /// What is to be learned from the values of this fit.
+    ///
+    /// # Errors
+    /// Those of the kernel that is given.
+    pub(super) fn learning(&self, sampling: Arc<Sampling>) -> Result<Learning, Problem> {
+        let values = self.values.as_ref().ok_or_else(Problem::internal)?;
+        let kernel =
+            self.kernel.map(|kernel| kernel.resolve(Some(sampling.scales()), self.purpose, self.pointers));
+        Ok(Learning {
+            cloud: self.stored.cloud.clone(),
+            kernel: kernel.transpose()?,
+            sampling,
+            values: values.values.clone(),
+            mean: self.mean,
+            regularization: self.regularization.clone(),
+        })
     }
 
     fn needs_noise(&self) -> bool {
@@ -98,21 +179,36 @@ impl PlannedFit {
         if let Way::Regressions(reason) = way {
             let (key, fitted) = (FitKey::of_local(owner, stored.id), stored.cloud.clone());
             let model = FitModel::Local(reason);
-            return Ok(FitPlan { stored, fitted, merge: None, model, key, pointers });
+            let (scale, is_learned, mean, trend) = (1.0, false, Mean::Zero, None);
+            return Ok(FitPlan {
+                stored,
+                fitted,
+                merge: None,
+                model,
+                key,
+                pointers,
+                scale,
+                is_learned,
+                mean,
+                trend,
+            });
         }
         let refuse = |error| Problem::from_numerics(error, pointers);
-        let (kernel, default_alpha) = match &self.kernel {
-            Some(kernel) => (kernel.resolve(stored.scales(), pointers)?, DEFAULT_ALPHA),
-            None => {
+        let (mean, learned) = (self.mean, self.values.and_then(|values| values.learned));
+        let (kernel, regularization, scale) = match (&self.kernel, &learned) {
+            (Some(kernel), _) => {
+                let kernel = kernel.resolve(stored.scales(), self.purpose, pointers)?;
+                let regularization = given_or(self.regularization, DEFAULT_ALPHA).map_err(refuse)?;
+                of_variance_one(kernel, regularization).map_err(refuse)?
+            }
+            (None, Some(learned)) => by_values(learned, self.regularization).map_err(refuse)?,
+            (None, None) => {
                 let scales = stored.scales().ok_or_else(Problem::internal)?;
                 // With a regularization given, nothing follows from it.
                 let noise = || stored.noise().unwrap_or_default();
-                default_fit(scales, self.purpose, noise).map_err(refuse)?
+                let (kernel, alpha) = default_fit(scales, self.purpose, noise).map_err(refuse)?;
+                (kernel, given_or(self.regularization, alpha).map_err(refuse)?, 1.0)
             }
-        };
-        let regularization = match self.regularization {
-            Some(given) => given,
-            None => Regularization::uniform(default_alpha).map_err(refuse)?,
         };
         kernel.check_dimension(stored.cloud.dimension()).map_err(refuse)?;
         let merges =
@@ -128,8 +224,43 @@ impl PlannedFit {
             Way::Moving(reason) => FitModel::Moving { kernel, regularization, reason },
             Way::Dense | Way::Regressions(_) => FitModel::Dense { kernel, regularization },
         };
-        Ok(FitPlan { stored, fitted, merge, model, key, pointers })
+        let is_learned = self.kernel.is_none() && learned.is_some();
+        let trend = learned.filter(|_| is_moving).and_then(|learned| learned.trend.clone());
+        Ok(FitPlan { stored, fitted, merge, model, key, pointers, scale, is_learned, mean, trend })
     }
+}
+
+fn given_or(given: Option<Regularization>, alpha: f64) -> Result<Regularization, NumericsError> {
+    given.map_or_else(|| Regularization::uniform(alpha), Ok)
+}
+
+/// Ratios of noise to variance that lose no digit.
+const RATIOS: RangeInclusive<f64> = 1e-280..=1e280;
+
+/// Kernel and noise for a process of variance 1, and the variance by which both are scaled afterwards: the factor depends on their ratio alone,
+/// and serves values of any size. Noise per point stays as it is.
+fn of_variance_one(
+    kernel: NumericalKernel,
+    regularization: Regularization,
+) -> Result<(NumericalKernel, Regularization, f64), NumericsError> {
+    let variance = kernel.variance();
+    match regularization {
+        Regularization::Uniform(alpha) if alpha == 0.0 || RATIOS.contains(&(alpha / variance)) => {
+            let unit = NumericalKernel::new(kernel.family(), kernel.length_scale(), 1.0)?;
+            Ok((unit, Regularization::uniform(alpha / variance)?, variance))
+        }
+        Regularization::Uniform(_) | Regularization::PerPoint(_) => Ok((kernel, regularization, 1.0)),
+    }
+}
+
+/// The kernel that was learned, with the noise, likewise.
+fn by_values(
+    learned: &Learned,
+    given: Option<Regularization>,
+) -> Result<(NumericalKernel, Regularization, f64), NumericsError> {
+    let Learned { family, length_scale, ratio, variance, .. } = *learned;
+    let kernel = NumericalKernel::new(family, length_scale, variance)?;
+    of_variance_one(kernel, given_or(given, ratio * variance)?)
 }
 
 /// A fit whose inputs are checked and whose cost is known and admitted.
@@ -142,6 +273,13 @@ pub struct FitPlan {
     pub model: FitModel,
     pub key: FitKey,
     pub pointers: Pointers,
+    /// Kernel and noise are so many times those of the model, unit V².
+    pub scale: f64,
+    /// Whether the values decided kernel and noise.
+    pub is_learned: bool,
+    pub mean: Mean,
+    /// The mean of values that are never seen all at once.
+    pub trend: Option<Trend>,
 }
 
 /// What is fitted.
@@ -191,6 +329,9 @@ impl FitPlan {
             | NotPositiveDefinite { reason: NotDefinite::NeedsCholesky { point }, .. } = &mut error
         {
             *point = merge.first_point(*point);
+        }
+        if let NotPositiveDefinite { minimum_alpha, .. } = &mut error {
+            *minimum_alpha *= self.scale;
         }
         Problem::from_numerics(error, self.pointers)
     }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::plan::{LocalReason, PlannedFit, Way};
+use super::plan::{LocalReason, PlannedFit, PlannedValues, Way};
+use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
@@ -15,11 +16,12 @@ use crate::numerics::defaults::Purpose;
 use crate::numerics::error::NumericsError;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
+use crate::numerics::solver::trend::Mean;
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
-use crate::store::key::CloudId;
+use crate::store::key::{CloudId, ValuesKey};
 
 /// Bytes that a number takes in JSON at most, with its comma.
 const BYTES_PER_NUMBER: usize = 25;
@@ -35,9 +37,9 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn values_fit(&self, fit: Fit, dense_only: Option<DenseOnly>) -> Result<PlannedFit, Problem> {
+    pub fn values_fit(&self, mut fit: Fit, dense_only: Option<DenseOnly>) -> Result<PlannedFit, Problem> {
         let pointers = pointers_of(&fit);
-        let stored = self.cloud(fit.cloud, "/cloud")?;
+        let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
         let is_beyond = stored.cloud.n_points() > self.app.config.max_dense_points;
         let way = match (fit.solver, dense_only) {
             (SolverChoice::Local, None) => Way::Moving(LocalReason::Asked),
@@ -48,8 +50,8 @@ impl Planner<'_> {
             }
             (SolverChoice::Auto | SolverChoice::Dense, _) => Way::Dense,
         };
-        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
-        self.plan(stored, chosen, way, fit.duplicates, Purpose::Values, pointers)
+        let duplicates = fit.duplicates;
+        self.plan(stored, Chosen::of(fit), way, duplicates, Purpose::Values, pointers)
     }
 
     /// Checks the fit of a surface: of a signature function, or local regressions.
@@ -58,14 +60,14 @@ impl Planner<'_> {
     /// A [`Problem`] with a pointer to the field.
     pub fn surface_fit(
         &self,
-        fit: Fit,
+        mut fit: Fit,
         purpose: Purpose,
         request: &GeometryRequest,
     ) -> Result<PlannedFit, Problem> {
         let pointers = pointers_of(&fit);
-        let stored = self.cloud(fit.cloud, "/cloud")?;
-        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
-        self.plan_surface(stored, chosen, fit.solver, fit.duplicates, (purpose, request), pointers)
+        let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+        let (solver, duplicates) = (fit.solver, fit.duplicates);
+        self.plan_surface(stored, Chosen::of(fit), solver, duplicates, (purpose, request), pointers)
     }
 
     fn plan_surface(
@@ -91,6 +93,8 @@ impl Planner<'_> {
             duplicates,
             purpose,
             way,
+            values: None,
+            mean: Mean::Zero,
         })
     }
 
@@ -218,8 +222,8 @@ impl Planner<'_> {
         if expected != found {
             return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
         }
-        let solver = geometry.solver.unwrap_or(fit.solver);
-        let chosen = Chosen { kernel: fit.kernel, alpha: fit.alpha, noise_variances: fit.noise_variances };
+        let (solver, duplicates) = (geometry.solver.unwrap_or(fit.solver), fit.duplicates);
+        let chosen = Chosen::of(fit);
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
         if inherits_noise && chosen.noise_variances.is_some() && surface_cloud.id != values_cloud.id {
             let detail =
@@ -230,7 +234,7 @@ impl Planner<'_> {
         let is_local = solver == SolverChoice::Local || request.model == SurfaceModel::Local;
         let has_own = geometry.kernel.is_some() || !inherits_noise;
         let surface_chosen = if is_local && !has_own && has_values {
-            Chosen { kernel: None, alpha: None, noise_variances: None }
+            Chosen::default()
         } else {
             Chosen {
                 kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
@@ -239,28 +243,18 @@ impl Planner<'_> {
                     true => chosen.noise_variances.clone(),
                     false => geometry.noise_variances,
                 },
+                ..Chosen::default()
             }
         };
         let values = match has_values {
-            true => Some(self.plan(
-                values_cloud,
-                chosen,
-                Way::Dense,
-                fit.duplicates,
-                Purpose::Values,
-                pointers,
-            )?),
+            true => {
+                Some(self.plan(values_cloud, chosen, Way::Dense, duplicates, Purpose::Values, pointers)?)
+            }
             false => None,
         };
         let asked = (Purpose::Curvatures, request);
-        let surface = self.plan_surface(
-            surface_cloud,
-            surface_chosen,
-            solver,
-            fit.duplicates,
-            asked,
-            surface_pointers,
-        )?;
+        let surface =
+            self.plan_surface(surface_cloud, surface_chosen, solver, duplicates, asked, surface_pointers)?;
         Ok((values, surface))
     }
 
@@ -402,7 +396,13 @@ impl Planner<'_> {
             self.check_max_dense_points(&stored, pointers)?;
         }
         let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(pointers)).transpose()?;
+        let follows = kernel.is_none() && chosen.values.is_some();
+        let mean = chosen.mean.unwrap_or(if follows { Mean::Constant } else { Mean::Zero });
+        let values = chosen.values.clone();
         let regularization = chosen.regularization(&stored, pointers)?;
+        let values = values
+            .map(|values| self.planned_values(values, mean, &stored, kernel, &regularization))
+            .transpose()?;
         Ok(PlannedFit {
             owner: self.owner,
             stored,
@@ -412,7 +412,29 @@ impl Planner<'_> {
             duplicates,
             purpose,
             way,
+            values,
+            mean,
         })
+    }
+
+    /// Values of a fit, with what was learned from them if that is known.
+    fn planned_values(
+        &self,
+        values: Arc<Vec<f64>>,
+        mean: Mean,
+        stored: &RegisteredCloud,
+        kernel: Option<PlannedKernel>,
+        regularization: &Option<Regularization>,
+    ) -> Result<Box<PlannedValues>, Problem> {
+        self.check_values_of(&values, &stored.cloud)?;
+        let named = ValuesKey::with_mean(&values, mean);
+        // A length scale that the cloud gives is the same whenever it is asked for.
+        let given = kernel.map(|kernel| match kernel {
+            PlannedKernel::Given(kernel) => (kernel.family(), Some(kernel.length_scale()), kernel.variance()),
+            PlannedKernel::OfCloud { family, variance } => (family, None, variance),
+        });
+        let key = (self.owner, stored.id, named.given(given, regularization.as_ref()));
+        Ok(Box::new(PlannedValues { values, key, learned: self.app.learned.get(key) }))
     }
 }
 
@@ -487,14 +509,27 @@ pub fn unknown_cloud(id: &str) -> Problem {
     Problem::new(Slug::UnknownCloud, format!("no cloud {shown:?} is registered; post its points again"))
 }
 
-/// What the client chose of kernel and regularization.
+/// What the client chose of kernel and regularization, for values or without.
+#[derive(Default)]
 struct Chosen {
     kernel: Option<Kernel>,
     alpha: Option<f64>,
     noise_variances: Option<Vec<f64>>,
+    values: Option<Arc<Vec<f64>>>,
+    mean: Option<Mean>,
 }
 
 impl Chosen {
+    fn of(fit: Fit) -> Self {
+        Self {
+            kernel: fit.kernel,
+            alpha: fit.alpha,
+            noise_variances: fit.noise_variances,
+            values: fit.values,
+            mean: fit.mean.map(Mean::from),
+        }
+    }
+
     /// What is given; `None` leaves it to the service.
     fn regularization(
         self,

@@ -1,4 +1,4 @@
-//! What the positions of a cloud say, looked at once for all who ask.
+//! What the positions of a cloud and the values at them say, looked at once for all who ask.
 
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use crate::http::problem::{Pointers, Problem};
 use crate::numerics::error::NumericsError;
 use crate::numerics::points::noise::estimate_noise;
 use crate::numerics::points::sampling::Sampling;
+use crate::numerics::selection::learning_flops;
 use crate::numerics::solver::choose::{noise_flops, sampling_flops};
 use crate::store::clouds::RegisteredCloud;
 
@@ -19,7 +20,7 @@ use crate::store::clouds::RegisteredCloud;
 pub async fn find_lacking(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    fit: &PlannedFit,
+    fit: &mut PlannedFit,
 ) -> Result<(), Problem> {
     let sampling = find_sampling(app, admission, &fit.stored).await?;
     if fit.lacks_noise() {
@@ -28,6 +29,14 @@ pub async fn find_lacking(
         let look = move |observer: &JobObserver| estimate_noise(&cloud, sampling.neighbours(), observer);
         let looking = look_at(app, admission, flops, look);
         app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
+    } else if fit.lacks_learned() {
+        let asked = fit.learning(sampling)?;
+        let flops = learning_flops(fit.n_points());
+        let learn = move |observer: &JobObserver| asked.learn(observer);
+        let looking = look_at(app, admission, flops, learn);
+        if let Some(values) = &mut fit.values {
+            values.learned = Some(app.learned.get_or_learn(values.key, || looking).await?);
+        }
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use super::functionals::{JetFunctional, deviations, has_variance};
 use super::interpolant::Interpolant;
+use super::posterior::Variances;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
@@ -18,6 +19,12 @@ pub struct JetDeviations {
 }
 
 impl JetDeviations {
+    /// Of values alone, whose variances are known.
+    pub fn of_values(variances: &Variances) -> Self {
+        let values = variances.latent.iter().map(|variance| variance.sqrt()).collect();
+        Self { values, gradients: Vec::new(), hessians: Vec::new() }
+    }
+
     /// Up to the derivatives of an order, 0 to 2; kernel and noise are `factor` times those of the solver.
     ///
     /// # Errors

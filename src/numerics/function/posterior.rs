@@ -29,6 +29,14 @@ pub struct Variances {
     pub clamped: Vec<usize>,
 }
 
+impl Variances {
+    /// Those of a process of so many times the variance.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.latent.iter_mut().for_each(|variance| *variance *= factor);
+        self
+    }
+}
+
 /// Covariance of the latent function with the queries where rounding was clamped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
@@ -36,6 +44,14 @@ pub struct Covariance {
     pub latent: Vec<f64>,
     /// Queries whose variance, on the diagonal, came out negative within rounding and is served as 0.
     pub clamped: Vec<usize>,
+}
+
+impl Covariance {
+    /// That of a process of so many times the variance.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.latent.iter_mut().for_each(|entry| *entry *= factor);
+        self
+    }
 }
 
 /// Posterior variance of the latent function (no noise added) at queries `[m, d]`.

@@ -38,8 +38,13 @@ pub(super) trait Facts {
         None
     }
 
-    /// ℓ for a cloud of these lengths, where none is given.
+    /// ℓ for a surface through a cloud of these lengths, where none is given.
     fn default_length_scale(&self, scales: &Scales) -> f64;
+
+    /// The same for values at its points.
+    fn length_scale_of_values(&self, scales: &Scales) -> f64 {
+        self.default_length_scale(scales)
+    }
 
     /// A number of the family and its parameter, by which factorizations are named. Never changed, nor given twice.
     fn canonical(&self) -> (u8, f64);

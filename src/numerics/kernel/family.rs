@@ -83,7 +83,12 @@ impl Family {
         self.facts(|facts| facts.max_dimension())
     }
 
-    /// ℓ for a cloud of these lengths, where none is given, unit L.
+    /// The same for values at its points.
+    pub fn length_scale_of_values(self, scales: &Scales) -> f64 {
+        self.facts(|facts| facts.length_scale_of_values(scales))
+    }
+
+    /// ℓ for a surface through a cloud of these lengths, where none is given, unit L.
     pub fn default_length_scale(self, scales: &Scales) -> f64 {
         self.facts(|facts| facts.default_length_scale(scales))
     }

@@ -25,6 +25,11 @@ impl Facts for InverseMultiquadric {
         analytic_length_scale(scales)
     }
 
+    /// Five h₄, as for Gauss.
+    fn length_scale_of_values(&self, scales: &Scales) -> f64 {
+        (5.0 * scales.spacing).min(2.0 * scales.radius)
+    }
+
     fn canonical(&self) -> (u8, f64) {
         (4, 0.0)
     }

@@ -69,6 +69,11 @@ impl Kernel {
         self.variance
     }
 
+    /// The same correlations with variance 1.
+    pub(crate) fn of_variance_one(self) -> Self {
+        Self { variance: 1.0, ..self }
+    }
+
     /// k₀ = k(x, x), unit V².
     pub fn at_zero(&self) -> f64 {
         self.variance * self.family.at_zero()

@@ -3,18 +3,18 @@
 //! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a grid: smoothness, length scale, and
 //! the ratio of noise to variance. Nothing finer than the grid is told apart by a few hundred values, and since a factorization depends on these
 //! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
-//! three to a hundred times what Gauss is, and has bands that are too long (docs/defaults.md).
+//! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
 
 mod likelihood;
 mod sample;
 mod search;
 
 use crate::numerics::error::NumericsError;
-use crate::numerics::kernel::Family;
+use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::sampling::Sampling;
-use crate::numerics::solver::trend::Mean;
+use crate::numerics::solver::trend::{Mean, Trend};
 use sample::Sample;
 use search::{Grid, Search};
 
@@ -43,7 +43,7 @@ pub struct Observed<'a> {
 }
 
 /// What the values decide.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     pub family: Family,
     /// ℓ, unit L.
@@ -52,6 +52,15 @@ pub struct Learned {
     pub ratio: f64,
     /// The variance of the process as the sample has it, unit V²; exactly what it has to be for the ratio where the noise is known.
     pub variance: f64,
+    /// The mean as the sample has it: for solvers that never see all values at once.
+    pub trend: Option<Trend>,
+}
+
+impl Learned {
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        self.trend.as_ref().map_or(0, Trend::n_bytes)
+    }
 }
 
 /// Fewer values decide nothing.
@@ -65,13 +74,45 @@ const LEAST_VALUES: usize = 8;
 /// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`].
 pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned, NumericsError> {
     observed.cloud.check_one_per_point(observed.values)?;
-    let grid = Grid::of(&observed);
     let sample = Sample::of(&observed);
-    if sample.values.len() < LEAST_VALUES || sample.is_constant() {
-        return Ok(grid.undecided(&observed));
-    }
-    let undecided = grid.undecided(&observed);
-    Ok(Search::new(&sample, grid).run(observer)?.unwrap_or(undecided))
+    let grid = Grid::of(&observed);
+    let undecided = grid.undecided(&observed, &sample);
+    let learned = match sample.values.len() < LEAST_VALUES || sample.is_constant() {
+        true => undecided,
+        false => Search::new(&sample, grid).run(observer)?.unwrap_or(undecided),
+    };
+    let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
+    let trend = sample.trend(&observed, kernel, learned.ratio, observer)?;
+    Ok(Learned { trend, ..learned })
+}
+
+/// Cells of the grid that are looked at, mostly.
+const CELLS: f64 = 70.0;
+
+/// Flops of [`learn`] for n values.
+pub fn learning_flops(n_points: usize) -> f64 {
+    let n = n_points.min(MAX_SAMPLE) as f64;
+    CELLS * n * n * (n / 3.0 + 20.0) + n_points as f64
+}
+
+/// The mean of values under a kernel and a noise that are given, as [`MAX_SAMPLE`] of them have it, with these.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
+pub fn learn_mean(
+    observed: Observed<'_>,
+    kernel: &Kernel,
+    observer: &dyn Observer,
+) -> Result<Learned, NumericsError> {
+    observed.cloud.check_one_per_point(observed.values)?;
+    let variance = kernel.variance();
+    let ratio = match observed.noise {
+        Noise::Unknown => 0.0,
+        Noise::Uniform(alpha) => alpha / variance,
+        Noise::PerPoint(all) => all.iter().sum::<f64>() / all.len() as f64 / variance,
+    };
+    let trend = Sample::of(&observed).trend(&observed, *kernel, ratio, observer)?;
+    Ok(Learned { family: kernel.family(), length_scale: kernel.length_scale(), ratio, variance, trend })
 }
 
 #[cfg(test)]

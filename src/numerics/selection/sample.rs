@@ -1,9 +1,16 @@
 //! The values that are looked at.
 
+use std::sync::Arc;
+
 use super::{Noise, Observed};
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::Kernel;
+use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::thinning::thinned_points;
-use crate::numerics::solver::trend::Basis;
+use crate::numerics::solver::trend::{Basis, Mean, Trend};
+use crate::numerics::solver::{Solver, System};
+use crate::numerics::sums::regularization::Regularization;
 
 /// Points that are looked at, at most: a factorization of them takes half a millisecond.
 pub const MAX_SAMPLE: usize = 256;
@@ -11,12 +18,16 @@ pub const MAX_SAMPLE: usize = 256;
 /// Points of a sample that lie together: what is noise shows between near points, what is not between far ones.
 const TOGETHER: usize = 16;
 
+/// Noise over variance that a mean is found with at least.
+const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
+
 /// Some points with their values, without what all values share.
 pub(super) struct Sample {
     pub(super) cloud: Cloud,
     /// In units of the greatest of them.
     pub(super) values: Vec<f64>,
     pub(super) unit: f64,
+    shared: f64,
     /// Mean square of the values: a process of less variance is contradicted by them.
     pub(super) least_variance: f64,
     /// Variances of the noise in units of their mean, where they differ.
@@ -34,8 +45,9 @@ impl Sample {
         let mut values = of_points(observed.values);
         let basis = Basis::of(observed.mean, &cloud);
         let n_functions = basis.n_functions();
+        let mut shared = 0.0;
         if n_functions > 0 {
-            let shared = values.iter().sum::<f64>() / values.len() as f64;
+            shared = values.iter().sum::<f64>() / values.len() as f64;
             values.iter_mut().for_each(|value| *value -= shared);
         }
         let unit = values.iter().fold(0.0f64, |a, value| a.max(value.abs()));
@@ -51,7 +63,49 @@ impl Sample {
             }
             Noise::Unknown | Noise::Uniform(_) => None,
         };
-        Self { functions: basis.columns(&cloud), cloud, values, unit, least_variance, noise, n_functions }
+        Self {
+            functions: basis.columns(&cloud),
+            cloud,
+            values,
+            unit,
+            shared,
+            least_variance,
+            noise,
+            n_functions,
+        }
+    }
+
+    /// Whether all of the values are 0.
+    pub(super) fn is_zero(&self) -> bool {
+        self.unit == 0.0 && self.shared == 0.0
+    }
+
+    /// The mean of the values under a kernel of variance 1 and a noise in its units.
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+    pub(super) fn trend(
+        &self,
+        observed: &Observed<'_>,
+        kernel: Kernel,
+        ratio: f64,
+        observer: &dyn Observer,
+    ) -> Result<Option<Trend>, NumericsError> {
+        if observed.mean == Mean::Zero {
+            return Ok(None);
+        }
+        // Enough for points that coincide: the mean is none the worse for it.
+        let ratio = ratio.max(LEAST_RATIO_OF_MEAN);
+        let noise = match &self.noise {
+            None => Regularization::uniform(ratio)?,
+            Some(noise) => Regularization::per_point(
+                noise.iter().map(|v| (v * ratio).max(LEAST_RATIO_OF_MEAN)).collect(),
+            )?,
+        };
+        let system = System::new(Arc::new(self.cloud.clone()), kernel.of_variance_one(), noise)?;
+        let solver = Solver::dense(system, observer)?;
+        let values: Vec<f64> = self.values.iter().map(|value| value * self.unit + self.shared).collect();
+        Trend::fit(&solver, &values, observed.mean)
     }
 
     /// Whether the values leave nothing to explain.

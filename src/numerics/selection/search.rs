@@ -14,12 +14,15 @@ const FAMILIES: [Family; 3] = [Family::Matern { order: 2 }, Family::Matern { ord
 const SHORTER: usize = 2;
 
 /// The least length scale in spacings, and the factor from one to the next.
-const LEAST_SPACINGS: f64 = 2.5;
+const LEAST_SPACINGS: f64 = 0.625;
 const LENGTH_FACTOR: f64 = std::f64::consts::SQRT_2;
-const N_LENGTHS: usize = 11;
+const N_LENGTHS: usize = 15;
 
 /// Where the search begins: 14 spacings.
-const FIRST_LENGTH: usize = 5;
+const FIRST_LENGTH: usize = 9;
+
+/// That of a field that neighbours hardly explain: 1.25 spacings.
+const ROUGH_LENGTH: usize = 2;
 
 /// Ratios of noise to variance: the least, and quarters of a decade up to 10.
 const LEAST_RATIO: f64 = 1e-10;
@@ -31,6 +34,11 @@ const COARSE_RATIOS: usize = 2 * RATIOS_PER_DECADE;
 
 /// The least ratio for every point: with less a factorization of many points does not leave a digit of a variance.
 const RATIO_PER_POINT: f64 = 1e-13;
+
+/// Noise beyond this share of the mean square of the values is unlikely from the start, by [`AGAINST_NOISE`] for the square of each decade more:
+/// values that no neighbours explain are as well a field too rough for them as noise, and the bars of the rough field cover both.
+const LIKELY_SHARE: f64 = 0.1;
+const AGAINST_NOISE: f64 = 3.0;
 
 /// What a step has to gain.
 const GAIN: f64 = 1e-6;
@@ -69,15 +77,19 @@ impl Grid {
     }
 
     /// What is taken where the values do not say.
-    pub(super) fn undecided(&self, observed: &Observed<'_>) -> Learned {
+    pub(super) fn undecided(&self, observed: &Observed<'_>, sample: &Sample) -> Learned {
         let family = FAMILIES[0];
-        let length_scale = family.default_length_scale(observed.sampling.scales());
+        let length_scale = family.length_scale_of_values(observed.sampling.scales());
         let ratio = self.ratio(self.least_ratio);
+        // With no spread to go by, the size of the values is all there is to say how much they may vary.
+        let mean_square = observed.values.iter().map(|v| v * v).sum::<f64>() / observed.values.len() as f64;
+        let by_values = if sample.is_zero() { 1.0 } else { in_units(1.0, mean_square.sqrt()) };
         Learned {
             family,
             length_scale,
             ratio: if self.is_exact() { 0.0 } else { ratio },
-            variance: self.variance(ratio).unwrap_or(1.0),
+            variance: self.variance(ratio).unwrap_or(by_values),
+            trend: None,
         }
     }
 
@@ -86,7 +98,8 @@ impl Grid {
     }
 
     fn ratio(&self, index: usize) -> f64 {
-        LEAST_RATIO * 10f64.powf(index as f64 / RATIOS_PER_DECADE as f64)
+        let ratio = LEAST_RATIO * 10f64.powf(index as f64 / RATIOS_PER_DECADE as f64);
+        rounded(ratio, BITS_OF_RATIO)
     }
 
     /// What the ratio makes of a noise that is known.
@@ -132,6 +145,9 @@ impl<'a> Search<'a> {
                 from = Cell([family, length.saturating_sub(SHORTER), ratio]);
             }
             from = self.descend(from, observer)?;
+            if family == 0 && self.is_mostly_noise(from, observer)? {
+                from = self.or_rough(from, observer)?;
+            }
             if self.height(from, observer)? < self.height(best, observer)? {
                 best = from;
             }
@@ -146,7 +162,21 @@ impl<'a> Search<'a> {
             length_scale: self.grid.length_scale(length),
             ratio,
             variance,
+            trend: None,
         }))
+    }
+
+    fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool, NumericsError> {
+        let Some(score) = self.score(cell, observer)? else { return Ok(false) };
+        Ok(self.against_noise(self.grid.ratio(cell.0[2]) * score.variance) > 0.0)
+    }
+
+    /// This, or what is found from where the values are a rough field without noise, if that is better.
+    fn or_rough(&mut self, found: Cell, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+        let rough = Cell([found.0[0], ROUGH_LENGTH, self.grid.least_ratio]);
+        let other = self.descend(rough, observer)?;
+        let is_better = self.height(other, observer)? < self.height(found, observer)?;
+        Ok(if is_better { other } else { found })
     }
 
     /// The best of some ratios far apart.
@@ -210,7 +240,19 @@ impl<'a> Search<'a> {
     }
 
     fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
-        Ok(self.score(cell, observer)?.map_or(f64::INFINITY, |score| score.negative_log))
+        let Some(score) = self.score(cell, observer)? else { return Ok(f64::INFINITY) };
+        Ok(score.negative_log + self.against_noise(self.grid.ratio(cell.0[2]) * score.variance))
+    }
+
+    /// What noise of this variance costs beforehand.
+    fn against_noise(&self, noise: f64) -> f64 {
+        match self.grid.noise {
+            KnownNoise::Known(_) => 0.0,
+            KnownNoise::Unknown => {
+                let share = noise / self.sample.least_variance;
+                AGAINST_NOISE * (share / LIKELY_SHARE).log10().max(0.0).powi(2)
+            }
+        }
     }
 
     fn score(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Score>, NumericsError> {
@@ -233,7 +275,18 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Significant bits of ratios, and of variances: their product has all of its bits in float64, so that the noise over the variance is the
+/// ratio again, to the last bit, for whoever sends both back.
+const BITS_OF_RATIO: i32 = 20;
+const BITS_OF_VARIANCE: i32 = 32;
+
+/// To so many significant bits.
+fn rounded(x: f64, bits: i32) -> f64 {
+    let unit = 2f64.powi(x.log2().floor() as i32 + 1 - bits);
+    (x / unit).round() * unit
+}
+
 /// A variance in other units, within what kernels take.
 fn in_units(variance: f64, unit: f64) -> f64 {
-    (variance * unit * unit).clamp(1e-140, 1e140)
+    rounded((variance * unit * unit).clamp(1e-140, 1e140), BITS_OF_VARIANCE)
 }

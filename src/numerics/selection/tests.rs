@@ -22,7 +22,7 @@ fn learned(cloud: &Cloud, values: &[f64], noise: Noise<'_>) -> Learned {
 fn exact_values_are_taken_as_exact_and_noise_is_found() {
     for n in [100, 256, 900] {
         let (cloud, values) = field(n, 0.0);
-        assert_eq!(learned(&cloud, &values, Noise::Unknown).ratio, 1e-10, "{n}");
+        assert!(learned(&cloud, &values, Noise::Unknown).ratio < 1.01e-10, "{n}");
         for noise in [0.003, 0.03, 0.2] {
             let (cloud, values) = field(n, noise);
             let found = learned(&cloud, &values, Noise::Unknown);
@@ -78,7 +78,7 @@ fn few_values_and_equal_ones_decide_nothing() {
         assert_eq!(learned(&cloud, &values, Noise::Unknown).family, family);
     }
     let cloud = fibonacci_sphere(50);
-    assert_eq!(learned(&cloud, &[3.0; 50], Noise::Unknown).ratio, 1e-10);
+    assert!(learned(&cloud, &[3.0; 50], Noise::Unknown).ratio < 1.01e-10);
     let together = Cloud::new(vec![1.0; 60], 3).unwrap();
     let values: Vec<f64> = (0..20).map(f64::from).collect();
     assert!(learned(&together, &values, Noise::Unknown).variance > 0.0);

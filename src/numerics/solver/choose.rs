@@ -292,6 +292,25 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
     Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
 }
 
+impl Price {
+    /// Both.
+    pub fn and(self, other: Self) -> Self {
+        Self { n_bytes: self.n_bytes.saturating_add(other.n_bytes), flops: self.flops + other.flops }
+    }
+}
+
+/// Bytes of a functional of jets as it waits for its turn.
+const BYTES_PER_FUNCTIONAL: usize = 400;
+
+/// What the deviations of so many functionals take, as variances do.
+pub fn deviations_price(n_points: usize, n_functionals: usize) -> Price {
+    let n = n_points as f64;
+    let columns =
+        n_points.saturating_mul(n_functionals.min(VARIANCES_AT_ONCE) + 5).saturating_mul(size_of::<f64>());
+    let n_bytes = columns.saturating_add(n_functionals.saturating_mul(BYTES_PER_FUNCTIONAL));
+    Price { n_bytes, flops: n * (n + 60.0) * n_functionals as f64 }
+}
+
 /// Numbers that a solve for new values takes at a point: the point, its value, two sets of weights with their sums and residuals
 /// while one is refined, and a correction.
 fn numbers_at_point(dimension: usize) -> usize {

@@ -75,6 +75,18 @@ impl Basis {
         slopes.for_each(|(function, component)| *function += component / self.size);
     }
 
+    /// `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values. `None` if the points do not tell the functions
+    /// apart.
+    pub(crate) fn functionals(&self, solver: &Solver) -> Option<Vec<f64>> {
+        let (n, p) = (solver.n_points(), self.n_functions());
+        let columns = self.columns(solver.cloud());
+        let mut weights = columns.clone();
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
+        let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]))?;
+        Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
+    }
+
     /// The functions at the points of a cloud, one column for each: `[n, p]` column by column.
     pub(crate) fn columns(&self, cloud: &Cloud) -> Vec<f64> {
         let (n, p) = (cloud.n_points(), self.n_functions());
@@ -99,7 +111,7 @@ impl Trend {
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`] if the points do not tell its functions apart.
-    pub(super) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
+    pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
         if mean == Mean::Zero {
             return Ok(None);
         }
@@ -156,7 +168,7 @@ impl Trend {
     }
 
     /// Bytes held on the heap.
-    pub(super) fn n_bytes(&self) -> usize {
+    pub(crate) fn n_bytes(&self) -> usize {
         vec_bytes(&self.coefficients) + vec_bytes(&self.basis.centre)
     }
 }

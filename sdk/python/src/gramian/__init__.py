@@ -28,7 +28,7 @@ from .answers import (
 )
 from .client import Client
 from .cloud import Cloud
-from .fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, OperatorFit
+from .fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, OperatorFit, ValuesFit
 from .problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
 from .rest.models import (
     Degenerate,
@@ -97,5 +97,6 @@ __all__ = [
     "SurfaceUsed",
     "UnknownCloud",
     "Unset",
+    "ValuesFit",
     "WarningCode",
 ]

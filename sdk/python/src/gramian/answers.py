@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from .describe import described
-from .fit import Fit, OperatorFit, fit_used, operator_fit_used
+from .fit import Fit, OperatorFit, ValuesFit, fit_used, operator_fit_used, values_fit_used
 from .rest.models import Degenerate, Diagnostics, SurfaceUsed
 from .sparse import csr_matrices
 from .tensors import Array, Members
@@ -42,6 +42,8 @@ class Interpolation(Answer):
         `[m, d]`, V/L. ∇u, with `derivatives` of 1 or 2.
     hessians
         `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
+    value_deviations, gradient_deviations, hessian_deviations
+        Standard deviations of these given the values, of the same shapes, with `deviations`.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
@@ -51,8 +53,11 @@ class Interpolation(Answer):
     values: Array
     gradients: Array | None
     hessians: Array | None
+    value_deviations: Array | None
+    gradient_deviations: Array | None
+    hessian_deviations: Array | None
     diagnostics: Diagnostics
-    fit: Fit
+    fit: ValuesFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -62,8 +67,11 @@ class Interpolation(Answer):
             values=members.array("values"),
             gradients=members.optional("gradients", d),
             hessians=members.optional("hessians", d, d),
+            value_deviations=members.optional("value_deviations"),
+            gradient_deviations=members.optional("gradient_deviations", d),
+            hessian_deviations=members.optional("hessian_deviations", d, d),
             diagnostics=members.diagnostics,
-            fit=fit_used(members.diagnostics, members.request),
+            fit=values_fit_used(members.diagnostics, members.request),
         )
 
 
@@ -98,7 +106,7 @@ class Posterior(Answer):
     gradients: Array | None
     log_marginal_likelihood: float | None
     diagnostics: Diagnostics
-    fit: Fit
+    fit: ValuesFit
 
     @classmethod
     def read(cls, members: Members) -> Self:
@@ -112,7 +120,7 @@ class Posterior(Answer):
             gradients=members.optional("gradients", diagnostics.dimension),
             log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
             diagnostics=diagnostics,
-            fit=fit_used(diagnostics, members.request),
+            fit=values_fit_used(diagnostics, members.request),
         )
 
 
@@ -256,6 +264,8 @@ class SurfaceGradient(Answer):
     ----------
     gradients
         `[m, d]`, V/L, tangent to the surface.
+    gradient_deviations
+        `[m, d]`, V/L. Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
@@ -265,6 +275,7 @@ class SurfaceGradient(Answer):
     """
 
     gradients: Array
+    gradient_deviations: Array | None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
@@ -274,7 +285,9 @@ class SurfaceGradient(Answer):
         """Reads the answer of `/v1/surface-gradient`."""
         diagnostics = members.diagnostics
         fit = operator_fit_used(diagnostics, members.request)
-        return cls(members.array("gradients", diagnostics.dimension), members.degenerate, diagnostics, fit)
+        d = diagnostics.dimension
+        deviations = members.optional("gradient_deviations", d)
+        return cls(members.array("gradients", d), deviations, members.degenerate, diagnostics, fit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -344,6 +357,8 @@ class LaplaceBeltrami(Answer):
     ----------
     values
         `[m]`, V/L². Δu.
+    value_deviations
+        `[m]`, V/L². Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
@@ -353,6 +368,7 @@ class LaplaceBeltrami(Answer):
     """
 
     values: Array
+    value_deviations: Array | None
     degenerate: tuple[Degenerate, ...]
     diagnostics: Diagnostics
     fit: OperatorFit
@@ -362,7 +378,8 @@ class LaplaceBeltrami(Answer):
         """Reads the answer of `/v1/laplace-beltrami`."""
         diagnostics = members.diagnostics
         fit = operator_fit_used(diagnostics, members.request)
-        return cls(members.array("values"), members.degenerate, diagnostics, fit)
+        deviations = members.optional("value_deviations")
+        return cls(members.array("values"), deviations, members.degenerate, diagnostics, fit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAlias, TypedDict, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from .rest.models import (
     KernelDescription,
     KernelFamily,
     KernelUsed,
+    MeanChoice,
     OrientationChoice,
     PosteriorQuantity,
     SolverChoice,
@@ -43,6 +44,7 @@ Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "local"
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
 Surface: TypeAlias = SurfaceChoice | Literal["auto", "signature", "offset", "local"]
 Deviations: TypeAlias = GeometryInclude | Literal["deviations"]
+Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
 Quantity: TypeAlias = (
     PosteriorQuantity
@@ -134,8 +136,8 @@ class Fit(TypedDict, total=False):
         Chosen from the cloud if absent, and repeated in `diagnostics.kernel`.
     alpha
         Added to the diagonal of the Gram matrix, unit of the values squared: 0 interpolates, the variance of the
-        noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by the
-        noise of the points.
+        noise regresses. Absent: 1e-10 with a kernel given; without one, chosen by the noise of the values, or, for
+        surfaces, of the points.
     noise_variances
         `[n]`, the variance of the noise at each point, instead of `alpha`.
     solver
@@ -198,7 +200,19 @@ GeometryLike: TypeAlias = "Geometry | GeometryFields | Diagnostics | RegisteredC
 """A surface: of one's own, that of another cloud, one that `diagnostics.geometry` reports, or a dictionary."""
 
 
-class OperatorFit(Fit, total=False):
+class ValuesFit(Fit, total=False):
+    """How a function is fitted to values, as keywords: `cloud.interpolate(values, **fit)`.
+
+    Keys
+    ----
+    mean
+        What the function is made of beside the kernel: `"zero"`, `"constant"` or `"linear"`.
+    """
+
+    mean: Mean | None
+
+
+class OperatorFit(ValuesFit, total=False):
     """How a function and a surface are fitted, as keywords: `cloud.laplace_beltrami(values, **fit)`.
 
     Keys
@@ -224,12 +238,20 @@ def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
     return fit
 
 
+def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
+    """Returns the same with the mean, if there is one."""
+    fit, mean = cast("ValuesFit", fit_used(diagnostics, request)), diagnostics.mean_coefficients
+    if not isinstance(mean, Unset):
+        fit["mean"] = MeanChoice.CONSTANT if len(mean) == 1 else MeanChoice.LINEAR
+    return fit
+
+
 def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> OperatorFit:
     """Returns the same with the surface's fit."""
-    fit, surface = fit_used(diagnostics, request), diagnostics.geometry
+    fit, surface = values_fit_used(diagnostics, request), diagnostics.geometry
     if isinstance(surface, Unset):  # by stencils, which fit nothing to the values
         surface = diagnostics
-        fit = Fit(solver=SolverChoice.LOCAL)
+        fit = ValuesFit(solver=SolverChoice.LOCAL)
         if "duplicates" in request:
             fit["duplicates"] = DuplicatePolicy(request["duplicates"])
     asked = request.get("geometry", {})

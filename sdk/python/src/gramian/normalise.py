@@ -30,6 +30,7 @@ from .rest.models import (
     GeometryInclude,
     KernelDescription,
     KernelFamily,
+    MeanChoice,
     OrientationChoice,
     PosteriorQuantity,
     SolverChoice,
@@ -211,6 +212,7 @@ REQUEST: Mapping[str, Rule] = {
     "values": array("n"),
     "queries": array("m", "d"),
     "derivatives": whole,
+    "mean": word(*MeanChoice),
     "include": words(*PosteriorQuantity),
     "surface": word(*SurfaceChoice),
     "orientation": word(*OrientationChoice),
@@ -218,7 +220,7 @@ REQUEST: Mapping[str, Rule] = {
 }
 
 GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
-"""Those of normals and curvatures."""
+"""Those of normals and curvatures, and of values and operators that may have deviations."""
 
 CLIENT: Mapping[str, Rule] = {
     "timeout": duration,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy.typing as npt
 
 from .answers import (
@@ -12,8 +14,9 @@ from .answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
-from .fit import Duplicates, GeometryLike, KernelLike, Number, Solver
+from .fit import Deviations, Duplicates, GeometryLike, KernelLike, Mean, Number, Solver
 from .keywords import suggest_names
+from .normalise import GEOMETRIC, with_deviations
 from .registration import RegisteredCloud
 from .sparse import require_scipy
 
@@ -28,8 +31,11 @@ class OperatorsOnCloud(RegisteredCloud):
         queries: npt.ArrayLike | None = None,
         *,
         geometry: GeometryLike | None = None,
+        include: Deviations | Iterable[Deviations] | None = None,
+        deviations: bool | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -44,12 +50,21 @@ class OperatorsOnCloud(RegisteredCloud):
             On the surface, a row of coordinates each; the points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
             The surface, where it comes from another cloud or fit than the values.
+        include : str or several, optional
+            What is wanted beside: `"deviations"`; nothing if absent.
+        deviations : bool, optional
+            Whether standard deviations are wanted, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, chosen from the cloud for the surface, and repeated in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
-            the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
+            absent, 1e-10 with a kernel given, else learned from the values. The same for the surface if given here;
+            if absent, as for `Cloud.normals`.
+        mean : str, optional
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -74,11 +89,14 @@ class OperatorsOnCloud(RegisteredCloud):
         return self._compute(
             SurfaceGradient.read,
             "/v1/surface-gradient",
+            GEOMETRIC,
             values=values,
             queries=queries,
             geometry=geometry,
+            include=with_deviations(include, deviations),
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
@@ -91,6 +109,7 @@ class OperatorsOnCloud(RegisteredCloud):
         geometry: GeometryLike | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -109,6 +128,9 @@ class OperatorsOnCloud(RegisteredCloud):
         alpha : float, optional
             Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
             the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+        mean : str, optional
+            That of the functions through the values: `"zero"` if absent, `"constant"`, or `"linear"` in the
+            coordinates. With a constant the matrix makes constants exactly 0.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -137,6 +159,7 @@ class OperatorsOnCloud(RegisteredCloud):
             geometry=geometry,
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
@@ -217,8 +240,11 @@ class OperatorsOnCloud(RegisteredCloud):
         queries: npt.ArrayLike | None = None,
         *,
         geometry: GeometryLike | None = None,
+        include: Deviations | Iterable[Deviations] | None = None,
+        deviations: bool | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -233,12 +259,21 @@ class OperatorsOnCloud(RegisteredCloud):
             On the surface, a row of coordinates each; the points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
             The surface, where it comes from another cloud or fit than the values.
+        include : str or several, optional
+            What is wanted beside: `"deviations"`; nothing if absent.
+        deviations : bool, optional
+            Whether standard deviations are wanted, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, chosen from the cloud for the surface, and repeated in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
-            the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
+            absent, 1e-10 with a kernel given, else learned from the values. The same for the surface if given here;
+            if absent, as for `Cloud.normals`.
+        mean : str, optional
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -263,11 +298,14 @@ class OperatorsOnCloud(RegisteredCloud):
         return self._compute(
             LaplaceBeltrami.read,
             "/v1/laplace-beltrami",
+            GEOMETRIC,
             values=values,
             queries=queries,
             geometry=geometry,
+            include=with_deviations(include, deviations),
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
@@ -280,6 +318,7 @@ class OperatorsOnCloud(RegisteredCloud):
         geometry: GeometryLike | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -298,6 +337,9 @@ class OperatorsOnCloud(RegisteredCloud):
         alpha : float, optional
             Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
             the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+        mean : str, optional
+            That of the functions through the values: `"zero"` if absent, `"constant"`, or `"linear"` in the
+            coordinates. With a constant the matrix makes constants exactly 0.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -326,6 +368,7 @@ class OperatorsOnCloud(RegisteredCloud):
             geometry=geometry,
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 import numpy.typing as npt
 
 from .answers import Interpolation, Posterior
-from .fit import Duplicates, KernelLike, Number, Quantity, Solver, Whole
+from .fit import Deviations, Duplicates, KernelLike, Mean, Number, Quantity, Solver, Whole
 from .keywords import suggest_names
+from .normalise import GEOMETRIC, with_deviations
 from .registration import RegisteredCloud
 
 
@@ -22,8 +23,11 @@ class ValuesOfCloud(RegisteredCloud):
         queries: npt.ArrayLike | None = None,
         *,
         derivatives: Whole | None = None,
+        include: Deviations | Iterable[Deviations] | None = None,
+        deviations: bool | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -40,12 +44,20 @@ class ValuesOfCloud(RegisteredCloud):
             Where u is wanted, a row of coordinates each; the points if absent.
         derivatives : 0, 1 or 2, optional
             1 for gradients, 2 for Hessians as well; 0 if absent.
+        include : str or several, optional
+            What is wanted beside: `"deviations"`; nothing if absent.
+        deviations : bool, optional
+            Whether standard deviations are wanted, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, and repeated in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 if
-            absent.
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
+            absent, 1e-10 with a kernel given, else learned from the values.
+        mean : str, optional
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -56,7 +68,7 @@ class ValuesOfCloud(RegisteredCloud):
         Returns
         -------
         Interpolation
-            `values` of u at the queries, and `gradients` and `hessians` where asked for.
+            `values` of u at the queries, and `gradients`, `hessians` and deviations where asked for.
 
         Examples
         --------
@@ -72,11 +84,14 @@ class ValuesOfCloud(RegisteredCloud):
         return self._compute(
             Interpolation.read,
             "/v1/interpolation",
+            GEOMETRIC,
             values=values,
             queries=queries,
             derivatives=derivatives,
+            include=with_deviations(include, deviations),
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
@@ -90,6 +105,7 @@ class ValuesOfCloud(RegisteredCloud):
         include: Quantity | Iterable[Quantity] | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
+        mean: Mean | None = None,
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
@@ -107,10 +123,14 @@ class ValuesOfCloud(RegisteredCloud):
             `"log_marginal_likelihood"`; nothing if absent.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, and repeated in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 if
-            absent.
+            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
+            absent, 1e-10 with a kernel given, else learned from the values.
+        mean : str, optional
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
@@ -139,6 +159,7 @@ class ValuesOfCloud(RegisteredCloud):
             include=include,
             kernel=kernel,
             alpha=alpha,
+            mean=mean,
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,

@@ -186,12 +186,7 @@ impl Jets {
     }
 
     /// With a linear function added, given by its value at a query and its gradient `[d]`.
-    pub(crate) fn plus_linear(
-        mut self,
-        queries: &Cloud,
-        gradient: &[f64],
-        value: impl Fn(&[f64]) -> f64,
-    ) -> Self {
+    pub fn plus_linear(mut self, queries: &Cloud, gradient: &[f64], value: impl Fn(&[f64]) -> f64) -> Self {
         let layout = self.layout;
         for (jet, x) in self.packed.chunks_exact_mut(layout.width()).zip(queries.points()) {
             jet[0] += value(x);

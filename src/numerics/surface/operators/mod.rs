@@ -24,9 +24,10 @@ use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::Solver;
+use crate::numerics::solver::trend::{Basis, Mean};
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
-pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
+pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations, uncertain};
 pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
@@ -79,28 +80,32 @@ pub fn laplace_beltrami(
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
-/// [`NumericsError::Cancelled`].
+/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
 pub fn surface_gradient_matrices(
     geometry: &Geometry,
     solver: &Arc<Solver>,
     queries: &Cloud,
+    mean: Mean,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    operator_matrix(geometry, solver, queries, Operator::SurfaceGradient, observer)
+    let matrix = operator_matrix(geometry, solver, queries, Operator::SurfaceGradient, observer)?;
+    with_mean(matrix, geometry, solver, mean, Operator::SurfaceGradient)
 }
 
 /// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
-/// [`NumericsError::Cancelled`].
+/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
 pub fn laplace_beltrami_matrix(
     geometry: &Geometry,
     solver: &Arc<Solver>,
     queries: &Cloud,
+    mean: Mean,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    operator_matrix(geometry, solver, queries, Operator::LaplaceBeltrami, observer)
+    let matrix = operator_matrix(geometry, solver, queries, Operator::LaplaceBeltrami, observer)?;
+    with_mean(matrix, geometry, solver, mean, Operator::LaplaceBeltrami)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -168,6 +173,46 @@ fn operator_matrix(
         Some(index) => Err(NumericsError::Overflow { query: index % m }),
         None => Ok(matrix),
     }
+}
+
+/// The matrix `BW` for functions with a mean: with F the mean's functions at the nodes and `LF` the operator on them,
+/// `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`. On constants, and for a linear mean on coordinates, it is the operator itself.
+fn with_mean(
+    mut matrix: Vec<f64>,
+    geometry: &Geometry,
+    solver: &Solver,
+    mean: Mean,
+    operator: Operator,
+) -> Result<Vec<f64>, NumericsError> {
+    if mean == Mean::Zero {
+        return Ok(matrix);
+    }
+    let (cloud, n, m) = (solver.cloud(), solver.n_points(), geometry.n_queries());
+    let basis = Basis::of(mean, cloud);
+    let of_values = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
+    let columns = basis.columns(cloud);
+    let is_null = geometry.is_null();
+    matrix.par_chunks_mut(n).enumerate().filter(|(index, _)| !is_null[index % m]).for_each(|(index, row)| {
+        let (component, query) = (index / m, index % m);
+        let mut exact = vec![0.0; basis.n_functions()];
+        basis.add_slopes(&on_coordinates(geometry, operator, component, query), &mut exact);
+        let found = columns.chunks_exact(n).map(|function| dot(function, row));
+        let excess: Vec<f64> = found.zip(&exact).map(|(found, exact)| found - exact).collect();
+        for (functional, excess) in of_values.chunks_exact(n).zip(&excess) {
+            row.iter_mut().zip(functional).for_each(|(entry, f)| *entry -= excess * f);
+        }
+    });
+    Ok(matrix)
+}
+
+/// An operator on a linear function is its gradient times this, `[d]`: a row of P, or `−tr(Dν)ν`.
+fn on_coordinates(geometry: &Geometry, operator: Operator, component: usize, query: usize) -> Vec<f64> {
+    let normal = geometry.normal(query);
+    let entry = |c: usize| match operator {
+        Operator::SurfaceGradient => f64::from(u8::from(c == component)) - normal[component] * normal[c],
+        Operator::LaplaceBeltrami => -geometry.trace_of_shape_operator(query) * normal[c],
+    };
+    (0..normal.len()).map(entry).collect()
 }
 
 /// Right-hand sides per solve: enough for the solve to run at the speed of matrix products, few enough to notice a

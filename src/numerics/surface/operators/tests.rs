@@ -2,6 +2,7 @@ use super::*;
 use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Unobserved;
 use crate::numerics::solver::System;
+use crate::numerics::solver::trend::Mean;
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
@@ -63,7 +64,7 @@ fn matrices_times_values_are_the_operators_applied() {
         let interpolant = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
 
         let applied = laplace_beltrami(&geometry, &interpolant, &queries, &Unobserved).unwrap();
-        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, &Unobserved).unwrap();
+        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
         let product: Vec<f64> = matrix.chunks(90).map(|row| dot(row, &values)).collect();
         // Weights reach Y/α^{1/2}·…: cancellation of the row sums costs up to six digits here.
         let scale = largest(applied.iter().copied()).max(1.0);
@@ -71,7 +72,8 @@ fn matrices_times_values_are_the_operators_applied() {
         assert!(error < 1e-7 * scale, "{family:?}: {error:e}");
 
         let applied = surface_gradient(&geometry, &interpolant, &queries, &Unobserved).unwrap();
-        let matrices = surface_gradient_matrices(&geometry, &solver, &queries, &Unobserved).unwrap();
+        let matrices =
+            surface_gradient_matrices(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
         for (row, component) in matrices.chunks(90).enumerate() {
             let (axis, query) = (row / 31, row % 31);
             let error = (dot(component, &values) - applied[query * 3 + axis]).abs();
@@ -121,5 +123,35 @@ fn the_surface_gradient_is_tangent() {
         // ∇_S z = e₃ − z x.
         let expected = [-x[2] * x[0], -x[2] * x[1], 1.0 - x[2] * x[2]];
         assert!(largest(gradient.iter().zip(&expected).map(|(a, b)| a - b)) < 1e-3);
+    }
+}
+
+#[test]
+fn matrices_with_a_mean_are_the_operators_on_functions_with_one() {
+    let cloud = Arc::new(fibonacci_sphere(120));
+    let kernel = Kernel::new(Family::Matern { order: 3 }, 1.0, 1.0).unwrap();
+    let system = System::new(cloud.clone(), kernel, Regularization::uniform(1e-6).unwrap()).unwrap();
+    let solver = Arc::new(Solver::dense(system, &Unobserved).unwrap());
+    let surface =
+        Surface::of(Interpolant::signature(solver.clone(), &Unobserved).unwrap(), None, &Unobserved).unwrap();
+    let queries = cloud.select(&[0, 17, 60, 119]);
+    let geometry = Geometry::of(&surface, &queries, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
+    let values: Vec<f64> = cloud.points().map(|x| 5.0 + x[0] - 2.0 * x[1] * x[2]).collect();
+    let times = |matrix: &[f64], values: &[f64]| -> Vec<f64> {
+        matrix.chunks_exact(values.len()).map(|row| dot(row, values)).collect()
+    };
+    for mean in [Mean::Constant, Mean::Linear] {
+        let u = Interpolant::fit_with_mean(solver.clone(), &values, mean, &Unobserved).unwrap();
+        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
+        let applied = laplace_beltrami(&geometry, &u, &queries, &Unobserved).unwrap();
+        // Entries of hundreds add up to numbers of one.
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(near(&times(&matrix, &values), &applied), "{mean:?}");
+        assert!(near(&times(&matrix, &[1.0; 120]), &[0.0; 4]), "constants are 0");
+        let matrices = surface_gradient_matrices(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
+        let applied = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
+        let found = times(&matrices, &values);
+        let transposed: Vec<f64> = (0..12).map(|at| found[at % 3 * 4 + at / 3]).collect();
+        assert!(near(&transposed, &applied), "{mean:?}");
     }
 }

@@ -31,6 +31,7 @@ from .laplace_beltrami_response import LaplaceBeltramiResponse
 from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
 from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
 from .matrix_format import MatrixFormat
+from .mean_choice import MeanChoice
 from .normals_request import NormalsRequest
 from .normals_response import NormalsResponse
 from .orientation_choice import OrientationChoice
@@ -50,6 +51,7 @@ from .surface_gradient_response import SurfaceGradientResponse
 from .surface_gradient_sparse_matrix_request import SurfaceGradientSparseMatrixRequest
 from .surface_gradient_sparse_matrix_response import SurfaceGradientSparseMatrixResponse
 from .surface_used import SurfaceUsed
+from .values_include import ValuesInclude
 from .version import Version
 from .warning import Warning_
 from .warning_code import WarningCode
@@ -86,6 +88,7 @@ __all__ = (
     "LaplaceBeltramiSparseMatrixRequest",
     "LaplaceBeltramiSparseMatrixResponse",
     "MatrixFormat",
+    "MeanChoice",
     "NormalsRequest",
     "NormalsResponse",
     "OrientationChoice",
@@ -105,6 +108,7 @@ __all__ = (
     "SurfaceGradientSparseMatrixRequest",
     "SurfaceGradientSparseMatrixResponse",
     "SurfaceUsed",
+    "ValuesInclude",
     "Version",
     "WarningCode",
     "Warning_",

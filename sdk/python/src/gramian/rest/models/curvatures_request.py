@@ -30,8 +30,9 @@ class CurvaturesRequest:
             another family is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
-            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            the noise of the points, 1e-3 at least.
+            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+            likelihood, or
+            chosen by the noise of the points of a surface, 1e-3 at least.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.

@@ -5,6 +5,7 @@ class DegenerateReason(StrEnum):
     FAR_FROM_CLOUD = "far_from_cloud"
     KERNEL_TOO_ROUGH = "kernel_too_rough"
     UNAFFORDABLE_RESCUE = "unaffordable_rescue"
+    UNCERTAIN = "uncertain"
     UNDER_RESOLVED = "under_resolved"
     VANISHING_GRADIENT = "vanishing_gradient"
 

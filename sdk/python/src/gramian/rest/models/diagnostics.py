@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
@@ -40,8 +40,11 @@ class Diagnostics:
         rank (int | Unset): Numerical rank of the matrix.
         reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as
             a fraction of all.
-        relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve; for matrices and surfaces, with Y = 1.
+        relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and
+            surfaces, with Y = 1.
         native_norm_squared (float | Unset): ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+        mean_coefficients (list[float] | Unset): The mean of the function: the constant, then a slope for each
+            coordinate if it is linear; absent where it is 0.
         misfit (float | Unset): |u(X) − Y|, unit of the values; absent for values from the local solver, which is not
             asked at the points.
         noise_deviation (float | Unset): Standard deviation of the noise of the points across the surface, as estimated,
@@ -65,6 +68,7 @@ class Diagnostics:
     reciprocal_condition: float | Unset = UNSET
     relative_residual: float | Unset = UNSET
     native_norm_squared: float | Unset = UNSET
+    mean_coefficients: list[float] | Unset = UNSET
     misfit: float | Unset = UNSET
     noise_deviation: float | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
@@ -106,6 +110,10 @@ class Diagnostics:
 
         native_norm_squared = self.native_norm_squared
 
+        mean_coefficients: list[float] | Unset = UNSET
+        if not isinstance(self.mean_coefficients, Unset):
+            mean_coefficients = self.mean_coefficients
+
         misfit = self.misfit
 
         noise_deviation = self.noise_deviation
@@ -141,6 +149,8 @@ class Diagnostics:
             field_dict["relative_residual"] = relative_residual
         if native_norm_squared is not UNSET:
             field_dict["native_norm_squared"] = native_norm_squared
+        if mean_coefficients is not UNSET:
+            field_dict["mean_coefficients"] = mean_coefficients
         if misfit is not UNSET:
             field_dict["misfit"] = misfit
         if noise_deviation is not UNSET:
@@ -191,6 +201,8 @@ class Diagnostics:
 
         native_norm_squared = d.pop("native_norm_squared", UNSET)
 
+        mean_coefficients = cast(list[float], d.pop("mean_coefficients", UNSET))
+
         misfit = d.pop("misfit", UNSET)
 
         noise_deviation = d.pop("noise_deviation", UNSET)
@@ -218,6 +230,7 @@ class Diagnostics:
             reciprocal_condition=reciprocal_condition,
             relative_residual=relative_residual,
             native_norm_squared=native_norm_squared,
+            mean_coefficients=mean_coefficients,
             misfit=misfit,
             noise_deviation=noise_deviation,
             geometry=geometry,

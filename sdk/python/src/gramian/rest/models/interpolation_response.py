@@ -27,12 +27,20 @@ class InterpolationResponse:
             or 2.
         hessians (list[list[list[float]]] | Unset): D²u at each query, unit of the values per length squared; with
             `derivatives` of 2.
+        value_deviations (list[float] | Unset): Standard deviation of u at each query given the values, under the kernel
+            as covariance and alpha as variance of the noise; with
+            `deviations`.
+        gradient_deviations (list[list[float]] | Unset): The same for the components of ∇u.
+        hessian_deviations (list[list[list[float]]] | Unset): The same for the entries of D²u.
     """
 
     values: list[float]
     diagnostics: Diagnostics
     gradients: list[list[float]] | Unset = UNSET
     hessians: list[list[list[float]]] | Unset = UNSET
+    value_deviations: list[float] | Unset = UNSET
+    gradient_deviations: list[list[float]] | Unset = UNSET
+    hessian_deviations: list[list[list[float]]] | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -62,6 +70,30 @@ class InterpolationResponse:
 
                 hessians.append(hessians_item)
 
+        value_deviations: list[float] | Unset = UNSET
+        if not isinstance(self.value_deviations, Unset):
+            value_deviations = self.value_deviations
+
+        gradient_deviations: list[list[float]] | Unset = UNSET
+        if not isinstance(self.gradient_deviations, Unset):
+            gradient_deviations = []
+            for gradient_deviations_item_data in self.gradient_deviations:
+                gradient_deviations_item = gradient_deviations_item_data
+
+                gradient_deviations.append(gradient_deviations_item)
+
+        hessian_deviations: list[list[list[float]]] | Unset = UNSET
+        if not isinstance(self.hessian_deviations, Unset):
+            hessian_deviations = []
+            for hessian_deviations_item_data in self.hessian_deviations:
+                hessian_deviations_item = []
+                for hessian_deviations_item_item_data in hessian_deviations_item_data:
+                    hessian_deviations_item_item = hessian_deviations_item_item_data
+
+                    hessian_deviations_item.append(hessian_deviations_item_item)
+
+                hessian_deviations.append(hessian_deviations_item)
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -74,6 +106,12 @@ class InterpolationResponse:
             field_dict["gradients"] = gradients
         if hessians is not UNSET:
             field_dict["hessians"] = hessians
+        if value_deviations is not UNSET:
+            field_dict["value_deviations"] = value_deviations
+        if gradient_deviations is not UNSET:
+            field_dict["gradient_deviations"] = gradient_deviations
+        if hessian_deviations is not UNSET:
+            field_dict["hessian_deviations"] = hessian_deviations
 
         return field_dict
 
@@ -109,11 +147,39 @@ class InterpolationResponse:
 
                 hessians.append(hessians_item)
 
+        value_deviations = cast(list[float], d.pop("value_deviations", UNSET))
+
+        _gradient_deviations = d.pop("gradient_deviations", UNSET)
+        gradient_deviations: list[list[float]] | Unset = UNSET
+        if _gradient_deviations is not UNSET:
+            gradient_deviations = []
+            for gradient_deviations_item_data in _gradient_deviations:
+                gradient_deviations_item = cast(list[float], gradient_deviations_item_data)
+
+                gradient_deviations.append(gradient_deviations_item)
+
+        _hessian_deviations = d.pop("hessian_deviations", UNSET)
+        hessian_deviations: list[list[list[float]]] | Unset = UNSET
+        if _hessian_deviations is not UNSET:
+            hessian_deviations = []
+            for hessian_deviations_item_data in _hessian_deviations:
+                hessian_deviations_item = []
+                _hessian_deviations_item = hessian_deviations_item_data
+                for hessian_deviations_item_item_data in _hessian_deviations_item:
+                    hessian_deviations_item_item = cast(list[float], hessian_deviations_item_item_data)
+
+                    hessian_deviations_item.append(hessian_deviations_item_item)
+
+                hessian_deviations.append(hessian_deviations_item)
+
         interpolation_response = cls(
             values=values,
             diagnostics=diagnostics,
             gradients=gradients,
             hessians=hessians,
+            value_deviations=value_deviations,
+            gradient_deviations=gradient_deviations,
+            hessian_deviations=hessian_deviations,
         )
 
         interpolation_response.additional_properties = d

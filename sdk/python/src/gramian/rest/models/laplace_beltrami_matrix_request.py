@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
 from ..models.matrix_format import MatrixFormat
+from ..models.mean_choice import MeanChoice
 from ..models.solver_choice import SolverChoice
 from ..types import UNSET, Unset, without_unset
 
@@ -29,8 +30,9 @@ class LaplaceBeltramiMatrixRequest:
             another family is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
-            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            the noise of the points, 1e-3 at least.
+            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+            likelihood, or
+            chosen by the noise of the points of a surface, 1e-3 at least.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.
@@ -40,6 +42,8 @@ class LaplaceBeltramiMatrixRequest:
         geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
             the values. What is absent is as in
             the request.
+        mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
+            the points.
         format_ (MatrixFormat | Unset): How a matrix is written.
     """
 
@@ -51,6 +55,7 @@ class LaplaceBeltramiMatrixRequest:
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
+    mean: MeanChoice | Unset = UNSET
     format_: MatrixFormat | Unset = UNSET
 
     __repr__ = without_unset
@@ -88,6 +93,10 @@ class LaplaceBeltramiMatrixRequest:
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
 
+        mean: str | Unset = UNSET
+        if not isinstance(self.mean, Unset):
+            mean = self.mean.value
+
         format_: str | Unset = UNSET
         if not isinstance(self.format_, Unset):
             format_ = self.format_.value
@@ -113,6 +122,8 @@ class LaplaceBeltramiMatrixRequest:
             field_dict["queries"] = queries
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
+        if mean is not UNSET:
+            field_dict["mean"] = mean
         if format_ is not UNSET:
             field_dict["format"] = format_
 
@@ -168,6 +179,13 @@ class LaplaceBeltramiMatrixRequest:
         else:
             geometry = Geometry.from_dict(_geometry)
 
+        _mean = d.pop("mean", UNSET)
+        mean: MeanChoice | Unset
+        if isinstance(_mean, Unset):
+            mean = UNSET
+        else:
+            mean = MeanChoice(_mean)
+
         _format_ = d.pop("format", UNSET)
         format_: MatrixFormat | Unset
         if isinstance(_format_, Unset):
@@ -184,6 +202,7 @@ class LaplaceBeltramiMatrixRequest:
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,
+            mean=mean,
             format_=format_,
         )
 

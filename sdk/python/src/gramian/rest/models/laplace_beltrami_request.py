@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
+from ..models.mean_choice import MeanChoice
 from ..models.solver_choice import SolverChoice
+from ..models.values_include import ValuesInclude
 from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
@@ -29,16 +31,20 @@ class LaplaceBeltramiRequest:
             another family is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
-            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            the noise of the points, 1e-3 at least.
+            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+            likelihood, or
+            chosen by the noise of the points of a surface, 1e-3 at least.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.
         duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
+        mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
+            the points.
         queries (list[list[float]] | Unset): Where answers are wanted; the points of the surface's cloud if absent.
         geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
             the values. What is absent is as in
             the request.
+        include (list[ValuesInclude] | Unset): What is wanted beside; nothing if absent.
     """
 
     cloud: CloudRef
@@ -48,8 +54,10 @@ class LaplaceBeltramiRequest:
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
+    mean: MeanChoice | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
+    include: list[ValuesInclude] | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -76,6 +84,10 @@ class LaplaceBeltramiRequest:
         if not isinstance(self.duplicates, Unset):
             duplicates = self.duplicates.value
 
+        mean: str | Unset = UNSET
+        if not isinstance(self.mean, Unset):
+            mean = self.mean.value
+
         queries: list[list[float]] | Unset = UNSET
         if not isinstance(self.queries, Unset):
             queries = []
@@ -87,6 +99,13 @@ class LaplaceBeltramiRequest:
         geometry: dict[str, Any] | Unset = UNSET
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
+
+        include: list[str] | Unset = UNSET
+        if not isinstance(self.include, Unset):
+            include = []
+            for include_item_data in self.include:
+                include_item = include_item_data.value
+                include.append(include_item)
 
         field_dict: dict[str, Any] = {}
 
@@ -106,10 +125,14 @@ class LaplaceBeltramiRequest:
             field_dict["solver"] = solver
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
+        if mean is not UNSET:
+            field_dict["mean"] = mean
         if queries is not UNSET:
             field_dict["queries"] = queries
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
+        if include is not UNSET:
+            field_dict["include"] = include
 
         return field_dict
 
@@ -149,6 +172,13 @@ class LaplaceBeltramiRequest:
         else:
             duplicates = DuplicatePolicy(_duplicates)
 
+        _mean = d.pop("mean", UNSET)
+        mean: MeanChoice | Unset
+        if isinstance(_mean, Unset):
+            mean = UNSET
+        else:
+            mean = MeanChoice(_mean)
+
         _queries = d.pop("queries", UNSET)
         queries: list[list[float]] | Unset = UNSET
         if _queries is not UNSET:
@@ -165,6 +195,15 @@ class LaplaceBeltramiRequest:
         else:
             geometry = Geometry.from_dict(_geometry)
 
+        _include = d.pop("include", UNSET)
+        include: list[ValuesInclude] | Unset = UNSET
+        if _include is not UNSET:
+            include = []
+            for include_item_data in _include:
+                include_item = ValuesInclude(include_item_data)
+
+                include.append(include_item)
+
         laplace_beltrami_request = cls(
             cloud=cloud,
             values=values,
@@ -173,8 +212,10 @@ class LaplaceBeltramiRequest:
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            mean=mean,
             queries=queries,
             geometry=geometry,
+            include=include,
         )
 
         return laplace_beltrami_request

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
-from ..types import without_unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
@@ -26,11 +26,15 @@ class LaplaceBeltramiResponse:
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
         diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
             well.
+        value_deviations (list[float | None] | Unset): Standard deviation of Δu given the values and, as far as its
+            deviations are known, the surface; null where there is no
+            answer or no deviation; with `deviations`.
     """
 
     values: list[float | None]
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
+    value_deviations: list[float | None] | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -49,6 +53,14 @@ class LaplaceBeltramiResponse:
 
         diagnostics = self.diagnostics.to_dict()
 
+        value_deviations: list[float | None] | Unset = UNSET
+        if not isinstance(self.value_deviations, Unset):
+            value_deviations = []
+            for value_deviations_item_data in self.value_deviations:
+                value_deviations_item: float | None
+                value_deviations_item = value_deviations_item_data
+                value_deviations.append(value_deviations_item)
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -58,6 +70,8 @@ class LaplaceBeltramiResponse:
                 "diagnostics": diagnostics,
             }
         )
+        if value_deviations is not UNSET:
+            field_dict["value_deviations"] = value_deviations
 
         return field_dict
 
@@ -89,10 +103,26 @@ class LaplaceBeltramiResponse:
 
         diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
 
+        _value_deviations = d.pop("value_deviations", UNSET)
+        value_deviations: list[float | None] | Unset = UNSET
+        if _value_deviations is not UNSET:
+            value_deviations = []
+            for value_deviations_item_data in _value_deviations:
+
+                def _parse_value_deviations_item(data: object) -> float | None:
+                    if data is None:
+                        return data
+                    return cast(float | None, data)
+
+                value_deviations_item = _parse_value_deviations_item(value_deviations_item_data)
+
+                value_deviations.append(value_deviations_item)
+
         laplace_beltrami_response = cls(
             values=values,
             degenerate=degenerate,
             diagnostics=diagnostics,
+            value_deviations=value_deviations,
         )
 
         laplace_beltrami_response.additional_properties = d

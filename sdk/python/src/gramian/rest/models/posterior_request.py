@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
+from ..models.mean_choice import MeanChoice
 from ..models.posterior_quantity import PosteriorQuantity
 from ..models.solver_choice import SolverChoice
 from ..types import UNSET, Unset, without_unset
@@ -29,12 +30,15 @@ class PosteriorRequest:
             another family is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
-            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            the noise of the points, 1e-3 at least.
+            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+            likelihood, or
+            chosen by the noise of the points of a surface, 1e-3 at least.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.
         duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
+        mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
+            the points.
         queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.
         include (list[PosteriorQuantity] | Unset): What is wanted beside the mean; nothing if absent.
     """
@@ -46,6 +50,7 @@ class PosteriorRequest:
     noise_variances: list[float] | Unset = UNSET
     solver: SolverChoice | Unset = UNSET
     duplicates: DuplicatePolicy | Unset = UNSET
+    mean: MeanChoice | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     include: list[PosteriorQuantity] | Unset = UNSET
 
@@ -73,6 +78,10 @@ class PosteriorRequest:
         duplicates: str | Unset = UNSET
         if not isinstance(self.duplicates, Unset):
             duplicates = self.duplicates.value
+
+        mean: str | Unset = UNSET
+        if not isinstance(self.mean, Unset):
+            mean = self.mean.value
 
         queries: list[list[float]] | Unset = UNSET
         if not isinstance(self.queries, Unset):
@@ -107,6 +116,8 @@ class PosteriorRequest:
             field_dict["solver"] = solver
         if duplicates is not UNSET:
             field_dict["duplicates"] = duplicates
+        if mean is not UNSET:
+            field_dict["mean"] = mean
         if queries is not UNSET:
             field_dict["queries"] = queries
         if include is not UNSET:
@@ -149,6 +160,13 @@ class PosteriorRequest:
         else:
             duplicates = DuplicatePolicy(_duplicates)
 
+        _mean = d.pop("mean", UNSET)
+        mean: MeanChoice | Unset
+        if isinstance(_mean, Unset):
+            mean = UNSET
+        else:
+            mean = MeanChoice(_mean)
+
         _queries = d.pop("queries", UNSET)
         queries: list[list[float]] | Unset = UNSET
         if _queries is not UNSET:
@@ -175,6 +193,7 @@ class PosteriorRequest:
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            mean=mean,
             queries=queries,
             include=include,
         )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 
 from ..models.duplicate_policy import DuplicatePolicy
+from ..models.mean_choice import MeanChoice
 from ..models.solver_choice import SolverChoice
 from ..types import UNSET, Unset, without_unset
 
@@ -28,8 +29,9 @@ class SurfaceGradientMatrixRequest:
             another family is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
-            of the noise regresses. Absent: 1e-10 for values or with a kernel given; for surfaces without one, chosen by
-            the noise of the points, 1e-3 at least.
+            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+            likelihood, or
+            chosen by the noise of the points of a surface, 1e-3 at least.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
         solver (SolverChoice | Unset): How the linear system is solved.
@@ -39,6 +41,8 @@ class SurfaceGradientMatrixRequest:
         geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
             the values. What is absent is as in
             the request.
+        mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
+            the points.
     """
 
     cloud: CloudRef
@@ -49,6 +53,7 @@ class SurfaceGradientMatrixRequest:
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
+    mean: MeanChoice | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -85,6 +90,10 @@ class SurfaceGradientMatrixRequest:
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
 
+        mean: str | Unset = UNSET
+        if not isinstance(self.mean, Unset):
+            mean = self.mean.value
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -106,6 +115,8 @@ class SurfaceGradientMatrixRequest:
             field_dict["queries"] = queries
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
+        if mean is not UNSET:
+            field_dict["mean"] = mean
 
         return field_dict
 
@@ -159,6 +170,13 @@ class SurfaceGradientMatrixRequest:
         else:
             geometry = Geometry.from_dict(_geometry)
 
+        _mean = d.pop("mean", UNSET)
+        mean: MeanChoice | Unset
+        if isinstance(_mean, Unset):
+            mean = UNSET
+        else:
+            mean = MeanChoice(_mean)
+
         surface_gradient_matrix_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -168,6 +186,7 @@ class SurfaceGradientMatrixRequest:
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,
+            mean=mean,
         )
 
         return surface_gradient_matrix_request

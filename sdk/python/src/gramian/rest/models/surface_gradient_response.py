@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
-from ..types import without_unset
+from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.degenerate import Degenerate
@@ -26,11 +26,15 @@ class SurfaceGradientResponse:
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
         diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
             well.
+        gradient_deviations (list[list[float] | None] | Unset): Standard deviation of each component given the values
+            and, as far as its deviations are known, the surface; null where there is no
+            answer or no deviation; with `deviations`.
     """
 
     gradients: list[list[float] | None]
     degenerate: list[Degenerate]
     diagnostics: Diagnostics
+    gradient_deviations: list[list[float] | None] | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
@@ -53,6 +57,18 @@ class SurfaceGradientResponse:
 
         diagnostics = self.diagnostics.to_dict()
 
+        gradient_deviations: list[list[float] | None] | Unset = UNSET
+        if not isinstance(self.gradient_deviations, Unset):
+            gradient_deviations = []
+            for gradient_deviations_item_data in self.gradient_deviations:
+                gradient_deviations_item: list[float] | None
+                if isinstance(gradient_deviations_item_data, list):
+                    gradient_deviations_item = gradient_deviations_item_data
+
+                else:
+                    gradient_deviations_item = gradient_deviations_item_data
+                gradient_deviations.append(gradient_deviations_item)
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -62,6 +78,8 @@ class SurfaceGradientResponse:
                 "diagnostics": diagnostics,
             }
         )
+        if gradient_deviations is not UNSET:
+            field_dict["gradient_deviations"] = gradient_deviations
 
         return field_dict
 
@@ -101,10 +119,34 @@ class SurfaceGradientResponse:
 
         diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
 
+        _gradient_deviations = d.pop("gradient_deviations", UNSET)
+        gradient_deviations: list[list[float] | None] | Unset = UNSET
+        if _gradient_deviations is not UNSET:
+            gradient_deviations = []
+            for gradient_deviations_item_data in _gradient_deviations:
+
+                def _parse_gradient_deviations_item(data: object) -> list[float] | None:
+                    if data is None:
+                        return data
+                    try:
+                        if not isinstance(data, list):
+                            raise TypeError()
+                        gradient_deviations_item_type_0 = cast(list[float], data)
+
+                        return gradient_deviations_item_type_0
+                    except (TypeError, ValueError, AttributeError, KeyError):
+                        pass
+                    return cast(list[float] | None, data)
+
+                gradient_deviations_item = _parse_gradient_deviations_item(gradient_deviations_item_data)
+
+                gradient_deviations.append(gradient_deviations_item)
+
         surface_gradient_response = cls(
             gradients=gradients,
             degenerate=degenerate,
             diagnostics=diagnostics,
+            gradient_deviations=gradient_deviations,
         )
 
         surface_gradient_response.additional_properties = d

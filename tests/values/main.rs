@@ -1,0 +1,76 @@
+//! Whether values need no description: rows of docs/error-bars.md.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../error_bars/jet.rs"]
+mod jet;
+#[path = "../error_bars/sampling.rs"]
+mod sampling;
+#[path = "../error_bars/shapes.rs"]
+mod shapes;
+
+mod fields;
+mod posterior;
+mod sweep;
+
+use fields::{FIELDS, Field};
+use posterior::Sensors;
+use rayon::prelude::*;
+use sampling::Sampling;
+use shapes::Shape;
+use sweep::{Case, NOISES, ON_SURFACE, QUANTITIES, Row};
+
+/// Closed ones and one with a rim.
+const SHAPES: [Shape; 5] = [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Wave];
+
+fn rows(n_points: usize) -> Vec<(Case, Row)> {
+    let of_field =
+        |shape, field| NOISES.map(|noise| Case { shape, sampling: Sampling::Random, field, n_points, noise });
+    let cases: Vec<Case> = SHAPES
+        .iter()
+        .flat_map(|&shape| FIELDS.iter().flat_map(move |&field| of_field(shape, field)))
+        .collect();
+    cases.into_par_iter().map(|case| (case, case.run(2))).collect()
+}
+
+#[test]
+fn fields_and_operators_have_bars_that_hold_and_few_are_off_without_a_flag() {
+    for n_points in [300, 500] {
+        let rows = rows(n_points);
+        // Errors of one cloud stand and fall together, so single rows of two clouds scatter by some per cent.
+        let n_short = rows.iter().filter(|(_, row)| {
+            let coverages = row.coverages();
+            ON_SURFACE.iter().any(|&quantity| coverages[quantity] < 85.0)
+        });
+        // A front of three spacings with noise that hides in it.
+        let n_short = n_short.filter(|(case, _)| case.field != Field::Front).count();
+        assert!(n_short <= 2, "{n_points}: {n_short} of {} rows", rows.len());
+        for quantity in ON_SURFACE {
+            let n_off: usize = rows.iter().map(|(_, row)| row.n_off[quantity]).sum();
+            let n: usize = rows.iter().map(|(_, row)| row.n_unflagged[quantity]).sum();
+            let name = QUANTITIES[quantity];
+            assert!(n > 10_000 && n_off * 200 <= n, "{n_points}: {name}: {n_off} of {n} off by half");
+        }
+    }
+}
+
+#[test]
+fn sensors_have_posteriors_whose_bands_cover() {
+    let mut cases = Vec::new();
+    for dimension in [1, 2, 3] {
+        for n_points in [30, 120, 300] {
+            for field in FIELDS {
+                for (noise, factor, offset) in [(0.0, 1.0, 0.0), (0.05, 1e-6, 1.0), (0.2, 1e6, -1e6)] {
+                    cases.push(Sensors { dimension, n_points, field, noise, factor, offset });
+                }
+            }
+        }
+    }
+    let rows: Vec<(&Sensors, f64)> = cases.par_iter().map(|sensors| (sensors, sensors.coverage(6))).collect();
+    let short: Vec<_> = rows.iter().filter(|(_, coverage)| *coverage < 88.0).collect();
+    // Thirty values of a field that they do not resolve.
+    assert!(short.len() * 20 <= rows.len(), "{short:?}");
+    assert!(short.iter().all(|(_, coverage)| *coverage > 70.0), "{short:?}");
+    let all = rows.iter().map(|(_, coverage)| coverage).sum::<f64>() / rows.len() as f64;
+    assert!((94.0..99.5).contains(&all), "{all}");
+}
