@@ -17,13 +17,13 @@ pub type LearnedKey = (Owner, CloudId, ValuesKey);
 
 /// What was learned lately. `E` is what a computation may fail with.
 pub struct LearnedStore<E> {
-    kept: FairCache<LearnedKey, Arc<Learned>>,
+    kept: Arc<FairCache<LearnedKey, Arc<Learned>>>,
     flights: SingleFlight<LearnedKey, Arc<Learned>, E>,
 }
 
 impl<E: Clone + Send + Sync + 'static> Default for LearnedStore<E> {
     fn default() -> Self {
-        Self { kept: FairCache::new(MAX_BYTES), flights: SingleFlight::new() }
+        Self { kept: Arc::new(FairCache::new(MAX_BYTES)), flights: SingleFlight::new() }
     }
 }
 
@@ -48,14 +48,21 @@ impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
         if let Some(found) = self.get(key) {
             return Ok(found);
         }
+        let kept = self.kept.clone();
         let begin = || {
             let learning = compute();
-            async move { learning.await.map(Arc::new) }
+            async move {
+                // A flight may have landed between the look-up and this one's beginning.
+                if let Some(found) = kept.get(key.0, &key) {
+                    return Ok(found);
+                }
+                let learned = Arc::new(learning.await?);
+                let n_bytes = block_bytes(arc_payload::<Learned>()) + learned.n_bytes();
+                kept.insert(key.0, key, learned.clone(), n_bytes);
+                Ok(learned)
+            }
         };
-        let learned = self.flights.join(key, begin).await.1?;
-        let n_bytes = block_bytes(arc_payload::<Learned>()) + learned.n_bytes();
-        self.kept.insert(key.0, key, learned.clone(), n_bytes);
-        Ok(learned)
+        self.flights.join(key, begin).await.1
     }
 
     /// Forgets what was learned from values on a cloud.

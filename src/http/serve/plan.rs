@@ -259,8 +259,14 @@ fn by_values(
     given: Option<Regularization>,
 ) -> Result<(NumericalKernel, Regularization, f64), NumericsError> {
     let Learned { family, length_scale, ratio, variance, .. } = *learned;
-    let kernel = NumericalKernel::new(family, length_scale, variance)?;
-    of_variance_one(kernel, given_or(given, ratio * variance)?)
+    match given_or(given, ratio * variance)? {
+        // A variance that is learned may leave what kernels take.
+        Regularization::Uniform(alpha) => {
+            let unit = NumericalKernel::new(family, length_scale, 1.0)?;
+            Ok((unit, Regularization::uniform(alpha / variance)?, variance))
+        }
+        per_point => Ok((NumericalKernel::new(family, length_scale, variance)?, per_point, 1.0)),
+    }
 }
 
 /// A fit whose inputs are checked and whose cost is known and admitted.

@@ -287,14 +287,6 @@ impl Planner<'_> {
         Ok(Arc::new(queries))
     }
 
-    /// Checks one entry per point of the cloud.
-    ///
-    /// # Errors
-    /// 422 `length-mismatch`.
-    pub fn check_values(&self, values: &[f64], plan: &PlannedFit) -> Result<(), Problem> {
-        self.check_values_of(values, &plan.stored.cloud)
-    }
-
     /// Checks one entry per point of a cloud.
     ///
     /// # Errors

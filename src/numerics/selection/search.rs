@@ -136,6 +136,9 @@ impl<'a> Search<'a> {
     }
 
     /// Family by family, each from where the one before ended. `None` if no kernel explains the values in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64; [`NumericsError::Cancelled`].
     pub(super) fn run(mut self, observer: &dyn Observer) -> Result<Option<Learned>, NumericsError> {
         let mut best = self.begin(observer)?;
         let mut from = best;
@@ -156,6 +159,9 @@ impl<'a> Search<'a> {
         let [family, length, ratio] = best.0;
         let variance =
             self.grid.variance(self.grid.ratio(ratio)).unwrap_or(in_units(variance, self.sample.unit));
+        if variance > GREATEST_VARIANCE {
+            return Err(NumericsError::WeightsOverflow);
+        }
         let ratio = if self.grid.is_exact() { 0.0 } else { self.grid.ratio(ratio) };
         Ok(Some(Learned {
             family: FAMILIES[family],
@@ -286,7 +292,14 @@ fn rounded(x: f64, bits: i32) -> f64 {
     (x / unit).round() * unit
 }
 
-/// A variance in other units, within what kernels take.
+/// The greatest variance that is served, and the least, below which bars are too long rather than too short.
+const GREATEST_VARIANCE: f64 = 1e300;
+const LEAST_VARIANCE: f64 = 1e-290;
+
+/// A variance in other units.
 fn in_units(variance: f64, unit: f64) -> f64 {
-    rounded((variance * unit * unit).clamp(1e-140, 1e140), BITS_OF_VARIANCE)
+    match variance * unit * unit {
+        found if found <= GREATEST_VARIANCE => rounded(found.max(LEAST_VARIANCE), BITS_OF_VARIANCE),
+        _ => f64::INFINITY,
+    }
 }

@@ -37,12 +37,12 @@ fn exact_values_are_taken_as_exact_and_noise_is_found() {
 fn neither_units_nor_offsets_change_what_is_learned() {
     let (cloud, values) = field(200, 0.02);
     let plain = learned(&cloud, &values, Noise::Unknown);
-    for (factor, offset) in [(1e-6, 0.0), (1e6, -1e6), (1.0, 1e6), (1e200, 0.0)] {
+    for (factor, offset) in [(1e-6, 0.0), (1e6, -1e6), (1.0, 1e6), (1e140, 0.0), (1e-140, 0.0)] {
         let moved: Vec<f64> = values.iter().map(|v| factor * v + offset).collect();
         let found = learned(&cloud, &moved, Noise::Unknown);
         assert_eq!((found.family, found.ratio), (plain.family, plain.ratio));
         assert_eq!(found.length_scale, plain.length_scale);
-        let variance = (factor * factor * plain.variance).min(1e140);
+        let variance = factor * factor * plain.variance;
         assert!((found.variance / variance - 1.0).abs() < 1e-6, "{}", found.variance);
     }
     let scaled = Cloud::new(cloud.coordinates().iter().map(|x| 1e3 * x).collect(), 3).unwrap();

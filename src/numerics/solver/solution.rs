@@ -74,13 +74,6 @@ impl Solution {
         Ok(Self { trend: Some(trend), ..Self::of(solver, &rest, observer)? })
     }
 
-    /// The variance of the process that makes the values most likely, as a multiple of that of the kernel, noise included: `YᵀΛ/(n − p)`,
-    /// p functions of the mean (restricted likelihood; Rasmussen and Williams 2006, eq. 2.45). 0 for values that are their mean.
-    pub fn variance_factor(&self, n_points: usize) -> f64 {
-        let p = self.trend.as_ref().map_or(0, Trend::n_functions);
-        self.energy.max(0.0) / n_points.saturating_sub(p).max(1) as f64
-    }
-
     /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
     ///
     /// # Errors
