@@ -67,6 +67,19 @@ fn main() {
             group("all".to_owned(), &|_| true);
         }
     }
+    print_retirement();
+}
+
+/// The same points with noise, flagged by T3 and T4 and by deviations.
+fn print_retirement() {
+    println!("\nnoise, flags by\n\n{HEADER}");
+    let cases: Vec<_> = cases().into_iter().filter(|case| case.kernel.0 == sweep::KERNELS[0].0).collect();
+    for noise in [0.0, 0.002, 0.005, 0.01, 0.02] {
+        let tallies: Vec<[Tally; 2]> = cases.par_iter().map(|case| case.run_with_noise(noise)).collect();
+        let total = |way: usize| tallies.iter().map(|both| both[way]).fold(Tally::default(), Tally::add);
+        print_row(&format!("{noise}, T3 and T4"), total(0));
+        print_row(&format!("{noise}, deviations"), total(1));
+    }
 }
 
 fn print_row(label: &str, t: Tally) {

@@ -1,15 +1,21 @@
 //! Curvatures of every shape, kernel, size and sampling against the exact ones, and how many of the wrong ones are flagged.
 
+use std::sync::Arc;
+
+use gramian::numerics::defaults::Purpose;
 use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::kernel::{Family, WendlandSmoothness};
 use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::degeneracy::DegeneracyReason;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
+use gramian::numerics::surface::local::LocalSurface;
 use gramian::numerics::surface::served::ServedBy;
 
 use super::common::clouds::cloud;
-use super::common::fits::{factorize, kernel};
+use super::common::fits::{default_kernel_and_alpha, factorize, kernel, surface};
 use super::common::random::Random;
 use super::shapes::Shape;
 
@@ -89,8 +95,7 @@ pub fn cases() -> Vec<Case> {
 impl Case {
     /// Queries are 60 points of the cloud, and 60 other points of the surface.
     pub fn run(&self, model: SurfaceModel, scale: f64) -> Tally {
-        let mut random = Random(1000 + self.n_points as u64);
-        let points = self.shape.sample(self.n_points, self.is_random.then_some(&mut random));
+        let (points, mut random) = self.sample();
         let factor = factorize(&cloud(&points), kernel(self.kernel.1, self.kernel.2 * scale), 1e-10);
         let Ok(signature) = Interpolant::signature(factor, &Unobserved) else {
             return Tally::default();
@@ -100,13 +105,44 @@ impl Case {
         let mut queries: Vec<[f64; 3]> = points.iter().copied().step_by(step).collect();
         queries.extend(self.shape.sample(60, Some(&mut random)));
         let request = GeometryRequest { model, ..GeometryRequest::CURVATURES };
-        let geometry = Geometry::of(&surface, &cloud(&queries), &request, &Unobserved).unwrap();
+        self.tally(&surface, &cloud(&queries), &queries, &request)
+    }
+
+    /// The points of the cloud with noise, by the default kernel and what confirms curvatures (T3, T4), and by local regressions
+    /// with their deviations.
+    pub fn run_with_noise(&self, noise: f64) -> [Tally; 2] {
+        let (points, mut random) = self.sample();
+        let moved = points.iter().map(|x| x.map(|x| x + noise * random.normal())).collect::<Vec<_>>();
+        let noisy = Arc::new(cloud(&moved));
+        let (kernel, alpha) = default_kernel_and_alpha(&noisy, Purpose::Curvatures);
+        let before = surface(&factorize(&noisy, kernel, alpha));
+        let before = self.tally(&before, &noisy, &points, &GeometryRequest::CURVATURES);
+        let sampling = Arc::new(Sampling::of(&noisy, &Unobserved).unwrap());
+        let local = LocalSurface::of(noisy.clone(), sampling, None, &Unobserved).unwrap();
+        let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
+        [before, self.tally(&local.into(), &noisy, &points, &request)]
+    }
+
+    fn sample(&self) -> (Vec<[f64; 3]>, Random) {
+        let mut random = Random(1000 + self.n_points as u64);
+        (self.shape.sample(self.n_points, self.is_random.then_some(&mut random)), random)
+    }
+
+    /// Answers at queries against the surface at the places they belong to.
+    fn tally(
+        &self,
+        surface: &Surface,
+        queries: &Cloud,
+        places: &[[f64; 3]],
+        request: &GeometryRequest,
+    ) -> Tally {
+        let geometry = Geometry::of(surface, queries, request, &Unobserved).unwrap();
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
         let radius = surface.cloud().radius();
-        let mut tally = Tally { queries: queries.len(), ..Tally::default() };
-        let mut flags = vec![None; queries.len()];
+        let mut tally = Tally { queries: places.len(), ..Tally::default() };
+        let mut flags = vec![None; places.len()];
         geometry.degenerate().iter().for_each(|entry| flags[entry.query] = Some(entry.reason));
-        for (query, &x) in queries.iter().enumerate() {
+        for (query, &x) in places.iter().enumerate() {
             let (normal, exact) = (self.shape.normal(x), self.shape.curvatures(x));
             let found = &curvatures.principal[query * 2..][..2];
             // Open shapes have no outside: compare for the normal that was answered.
