@@ -80,7 +80,9 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .layer(from_fn(middleware::negotiate))
         // Whatever follows computes, and negotiates by itself.
         .routes(routes!(interpolation::compute_interpolation))
+        .routes(routes!(interpolation::compute_interpolation_batch))
         .routes(routes!(posterior::compute_posterior))
+        .routes(routes!(posterior::compute_posterior_batch))
         .routes(routes!(normals::compute_normals))
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))

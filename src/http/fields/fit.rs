@@ -52,6 +52,8 @@ pub struct Fit {
     pub duplicates: DuplicatePolicy,
     /// Values at the points of the cloud, where the fit is one of values.
     pub values: Option<Arc<Vec<f64>>>,
+    /// Lists of them, where there may be many; 0 where there is one.
+    pub n_lists: usize,
     pub mean: Option<MeanChoice>,
 }
 
@@ -105,6 +107,7 @@ macro_rules! request {
                     solver: self.solver.unwrap_or_default(),
                     duplicates: self.duplicates.unwrap_or_default(),
                     values: None,
+                    n_lists: 0,
                     mean: None,
                 }
             }

@@ -390,10 +390,10 @@ impl Planner<'_> {
         let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(pointers)).transpose()?;
         let follows = kernel.is_none() && chosen.values.is_some();
         let mean = chosen.mean.unwrap_or(if follows { Mean::Constant } else { Mean::Zero });
-        let values = chosen.values.clone();
+        let (values, n_lists) = (chosen.values.clone(), chosen.n_lists);
         let regularization = chosen.regularization(&stored, pointers)?;
         let values = values
-            .map(|values| self.planned_values(values, mean, &stored, kernel, &regularization))
+            .map(|values| self.planned_values((values, n_lists), mean, &stored, kernel, &regularization))
             .transpose()?;
         Ok(PlannedFit {
             owner: self.owner,
@@ -412,13 +412,19 @@ impl Planner<'_> {
     /// Values of a fit, with what was learned from them if that is known.
     fn planned_values(
         &self,
-        values: Arc<Vec<f64>>,
+        (values, n_lists): (Arc<Vec<f64>>, usize),
         mean: Mean,
         stored: &RegisteredCloud,
         kernel: Option<PlannedKernel>,
         regularization: &Option<Regularization>,
     ) -> Result<Box<PlannedValues>, Problem> {
-        self.check_values_of(&values, &stored.cloud)?;
+        match n_lists {
+            0 => self.check_values_of(&values, &stored.cloud)?,
+            _ if values.len() != n_lists * stored.cloud.n_points() => {
+                return Err(length_mismatch("/values/0", &stored.cloud, values.len() / n_lists));
+            }
+            _ => {}
+        }
         let named = ValuesKey::with_mean(&values, mean);
         // A length scale that the cloud gives is the same whenever it is asked for.
         let given = kernel.map(|kernel| match kernel {
@@ -508,6 +514,7 @@ struct Chosen {
     alpha: Option<f64>,
     noise_variances: Option<Vec<f64>>,
     values: Option<Arc<Vec<f64>>>,
+    n_lists: usize,
     mean: Option<Mean>,
 }
 
@@ -518,6 +525,7 @@ impl Chosen {
             alpha: fit.alpha,
             noise_variances: fit.noise_variances,
             values: fit.values,
+            n_lists: fit.n_lists,
             mean: fit.mean.map(Mean::from),
         }
     }
@@ -544,6 +552,20 @@ impl Chosen {
                 Regularization::per_point(variances).map(Some).map_err(refuse)
             }
         }
+    }
+}
+
+/// Lists of values of one length, and how many they are.
+///
+/// # Errors
+/// 422 for no list, and for one of another length than the first.
+pub fn value_lists(lists: Points) -> Result<(Arc<Vec<f64>>, usize), Problem> {
+    if let Some((row, found)) = lists.ragged {
+        return Err(Problem::length_mismatch(&format!("/values/{row}"), lists.dimension, found));
+    }
+    match lists.n_rows {
+        0 => Err(Problem::invalid_request("/values", "at least one list of values is needed")),
+        n_rows => Ok((Arc::new(lists.coordinates), n_rows)),
     }
 }
 

@@ -6,10 +6,13 @@ use super::fitted::Fits;
 use crate::http::compute::JobObserver;
 use crate::http::fields::Diagnostics;
 use crate::http::problem::Problem;
+use crate::http::wire::write::array::Array;
+use crate::numerics::function::batch::{Batch, BatchJets};
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::function::moving::{Moving, MovingRequest};
 use crate::numerics::function::posterior::{Variances, variances_with_mean};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::trend::Trend;
 use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// A function at queries, and how sure it is.
@@ -22,10 +25,30 @@ pub struct ValuesAt {
     pub interpolant: Option<Interpolant>,
 }
 
+/// k functions at queries, and how sure all of them are.
+pub struct EachAt {
+    pub jets: BatchJets,
+    /// If asked for.
+    pub variances: Option<Variances>,
+    pub diagnostics: Diagnostics,
+    pub batch: Batch,
+}
+
+impl EachAt {
+    /// `[k, p]`; none where the functions have no mean.
+    pub fn mean_coefficients(batch: &Batch) -> Option<Array> {
+        let trends =
+            batch.solutions.iter().map(|solution| solution.trend.as_ref().map(Trend::of_coordinates));
+        let rows: Vec<Vec<f64>> = trends.collect::<Option<_>>()?;
+        let width = rows.first()?.len();
+        Some(Array::new(rows.concat(), &[rows.len(), width]))
+    }
+}
+
 /// What is asked at queries.
 #[derive(Clone, Copy)]
 pub struct ValuesRequest<'a> {
-    /// One per point of the request's cloud.
+    /// One per point of the request's cloud; so many lists of them where each has a function of its own.
     pub values: &'a [f64],
     pub queries: &'a Cloud,
     pub order: JetOrder,
@@ -42,6 +65,36 @@ impl Fits {
             Some(moving) => self.around_queries(moving, asked, observer),
             None => self.of_one_function(asked, observer),
         }
+    }
+
+    /// The functions with these lists of values at queries.
+    ///
+    /// # Errors
+    /// What the numerics refuses as a [`Problem`].
+    pub fn each_at(&self, asked: ValuesRequest<'_>, observer: &JobObserver) -> Result<EachAt, Problem> {
+        let refused = |error| self.main.refused(error);
+        let n = self.main.plan.stored.cloud.n_points();
+        let values: Cow<'_, [f64]> = match &self.main.plan.merge {
+            None => Cow::Borrowed(asked.values),
+            Some(merge) => asked.values.chunks_exact(n).flat_map(|list| merge.mean(list)).collect(),
+        };
+        let solver = self.main.solver()?.clone();
+        let batch = Batch::fit(solver, &values, self.main.plan.mean, observer).map_err(refused)?;
+        let jets = batch.at(asked.queries, asked.order, observer).map_err(refused)?;
+        let worst = batch.solutions.iter().max_by(|a, b| a.relative_residual.total_cmp(&b.relative_residual));
+        let worst = worst.ok_or_else(Problem::internal)?;
+        let variances = match asked.has_variances {
+            false => None,
+            true => {
+                let found = variances_with_mean(&batch.solver, worst.trend.as_ref(), asked.queries, observer);
+                Some(found.map_err(refused)?.scaled(self.main.plan.scale))
+            }
+        };
+        let mut diagnostics = self.main.diagnostics(worst, asked.queries.n_points())?;
+        // Each list has its own.
+        (diagnostics.native_norm_squared, diagnostics.misfit) = (None, None);
+        diagnostics.mean_coefficients = None;
+        Ok(EachAt { jets, variances, diagnostics, batch })
     }
 
     fn around_queries(

@@ -2,10 +2,12 @@
 
 pub mod heap;
 pub mod instruction_set;
+pub mod normal;
 pub mod pages;
 
 pub(crate) mod eigen;
 pub(crate) mod exp;
+pub(crate) mod random;
 pub(crate) mod registers;
 pub(crate) mod small;
 pub(crate) mod vector;

@@ -27,7 +27,8 @@ pub(super) struct Score {
 /// matrix is not positive definite in float64.
 ///
 /// With K the covariances, `z = L⁻¹y` without its part in the range of `L⁻¹F` and s² the variance:
-/// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45; Patterson and Thompson 1971).
+/// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45; Patterson and Thompson 1971), summed over
+/// the lists of values, each with a mean of its own.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -38,7 +39,8 @@ pub(super) fn score(
     variance: Option<f64>,
     observer: &dyn Observer,
 ) -> Result<Option<Score>, NumericsError> {
-    let (n, p) = (sample.values.len(), sample.n_functions);
+    let (n, p) = (sample.n_points(), sample.n_functions);
+    let n_lists = sample.values.len() / n;
     let noise = match &sample.noise {
         None => Regularization::Uniform(ratio),
         Some(noise) => Regularization::PerPoint(noise.iter().map(|v| v * ratio).collect()),
@@ -60,18 +62,19 @@ pub(super) fn score(
     }
     let mut columns = sample.functions.clone();
     columns.extend_from_slice(&sample.values);
-    let right = MatMut::from_column_major_slice_mut(&mut columns, n, p + 1);
+    let right = MatMut::from_column_major_slice_mut(&mut columns, n, p + n_lists);
     solve_lower_triangular_in_place(factor.rb(), right, Par::Seq);
     let log_determinant: f64 = (0..n).map(|i| factor[(i, i)].ln()).sum::<f64>() * 2.0;
     let Some(of_mean) = remove_mean(&mut columns, n, p) else { return Ok(None) };
     let energy = dot(&columns[p * n..], &columns[p * n..]);
-    let degrees = (n - p) as f64;
+    let degrees = (n_lists * (n - p)) as f64;
     let variance = variance.unwrap_or((energy / degrees).max(sample.least_variance));
-    let negative_log = 0.5 * (energy / variance + degrees * variance.ln() + log_determinant + of_mean);
+    let of_determinants = n_lists as f64 * (log_determinant + of_mean);
+    let negative_log = 0.5 * (energy / variance + degrees * variance.ln() + of_determinants);
     Ok(negative_log.is_finite().then_some(Score { negative_log, variance }))
 }
 
-/// Makes the first p of some columns orthonormal and the last one orthogonal to them (modified Gram–Schmidt); says `ln det FᵀF` of the first.
+/// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt); says `ln det FᵀF` of the first.
 fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
     let mut log_determinant = 0.0;
     for a in 0..p {

@@ -36,10 +36,22 @@ pub enum Noise<'a> {
 pub struct Observed<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
-    /// `[n]`, unit V.
+    /// `[n]`, unit V; or `[k, n]`, k lists that have kernel and noise in common.
     pub values: &'a [f64],
     pub noise: Noise<'a>,
     pub mean: Mean,
+}
+
+impl Observed<'_> {
+    /// # Errors
+    /// [`NumericsError::LengthMismatch`] for no list, or one that is not whole.
+    fn check(&self) -> Result<(), NumericsError> {
+        let n = self.cloud.n_points();
+        match self.values.len() >= n && self.values.len().is_multiple_of(n) {
+            true => Ok(()),
+            false => self.cloud.check_one_per_point(self.values),
+        }
+    }
 }
 
 /// What the values decide.
@@ -73,11 +85,11 @@ const LEAST_VALUES: usize = 8;
 /// # Errors
 /// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`].
 pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned, NumericsError> {
-    observed.cloud.check_one_per_point(observed.values)?;
+    observed.check()?;
     let sample = Sample::of(&observed);
     let grid = Grid::of(&observed);
     let undecided = grid.undecided(&observed, &sample);
-    let learned = match sample.values.len() < LEAST_VALUES || sample.is_constant() {
+    let learned = match sample.n_points() < LEAST_VALUES || sample.is_constant() {
         true => undecided,
         false => Search::new(&sample, grid).run(observer)?.unwrap_or(undecided),
     };
@@ -104,7 +116,7 @@ pub fn learn_mean(
     kernel: &Kernel,
     observer: &dyn Observer,
 ) -> Result<Learned, NumericsError> {
-    observed.cloud.check_one_per_point(observed.values)?;
+    observed.check()?;
     let variance = kernel.variance();
     let ratio = match observed.noise {
         Noise::Unknown => 0.0,

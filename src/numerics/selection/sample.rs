@@ -15,6 +15,9 @@ use crate::numerics::sums::regularization::Regularization;
 /// Points that are looked at, at most: a factorization of them takes half a millisecond.
 pub const MAX_SAMPLE: usize = 256;
 
+/// Lists of values that are looked at, at most: with one noise and one kernel for all, more say nothing new.
+const MAX_LISTS: usize = 16;
+
 /// Points of a sample that lie together: what is noise shows between near points, what is not between far ones.
 const TOGETHER: usize = 16;
 
@@ -24,10 +27,11 @@ const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
 /// Some points with their values, without what all values share.
 pub(super) struct Sample {
     pub(super) cloud: Cloud,
-    /// In units of the greatest of them.
+    /// `[k, n]`, in units of the greatest of them.
     pub(super) values: Vec<f64>,
     pub(super) unit: f64,
-    shared: f64,
+    /// What the values of each list share, `[k]`.
+    shared: Vec<f64>,
     /// Mean square of the values: a process of less variance is contradicted by them.
     pub(super) least_variance: f64,
     /// Variances of the noise in units of their mean, where they differ.
@@ -42,13 +46,16 @@ impl Sample {
         let points = chosen(observed);
         let cloud = observed.cloud.select(&points);
         let of_points = |all: &[f64]| points.iter().map(|&point| all[point]).collect::<Vec<f64>>();
-        let mut values = of_points(observed.values);
         let basis = Basis::of(observed.mean, &cloud);
         let n_functions = basis.n_functions();
-        let mut shared = 0.0;
-        if n_functions > 0 {
-            shared = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter_mut().for_each(|value| *value -= shared);
+        let lists = observed.values.chunks_exact(observed.cloud.n_points());
+        let every = lists.len().div_ceil(MAX_LISTS);
+        let (mut values, mut shared) = (Vec::new(), Vec::new());
+        for list in lists.step_by(every) {
+            let list = of_points(list);
+            let mean = if n_functions > 0 { list.iter().sum::<f64>() / list.len() as f64 } else { 0.0 };
+            values.extend(list.iter().map(|value| value - mean));
+            shared.push(mean);
         }
         let unit = values.iter().fold(0.0f64, |a, value| a.max(value.abs()));
         if unit > 0.0 {
@@ -77,10 +84,15 @@ impl Sample {
 
     /// Whether all of the values are 0.
     pub(super) fn is_zero(&self) -> bool {
-        self.unit == 0.0 && self.shared == 0.0
+        self.unit == 0.0 && self.shared.iter().all(|&shared| shared == 0.0)
     }
 
-    /// The mean of the values under a kernel of variance 1 and a noise in its units.
+    /// Values of each list.
+    pub(super) fn n_points(&self) -> usize {
+        self.cloud.n_points()
+    }
+
+    /// The mean of the values, or of the first of several lists, under a kernel of variance 1 and a noise in its units.
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
@@ -104,13 +116,15 @@ impl Sample {
         };
         let system = System::new(Arc::new(self.cloud.clone()), kernel.of_variance_one(), noise)?;
         let solver = Solver::dense(system, observer)?;
-        let values: Vec<f64> = self.values.iter().map(|value| value * self.unit + self.shared).collect();
+        let first = &self.values[..self.n_points()];
+        let values: Vec<f64> = first.iter().map(|value| value * self.unit + self.shared[0]).collect();
         Trend::fit(&solver, &values, observed.mean)
     }
 
     /// Whether the values leave nothing to explain.
     pub(super) fn is_constant(&self) -> bool {
-        let is_equal = self.values.iter().all(|&value| value == self.values[0]);
+        let mut lists = self.values.chunks_exact(self.n_points());
+        let is_equal = lists.all(|list| list.iter().all(|&value| value == list[0]));
         self.unit == 0.0 || (is_equal && self.n_functions > 0)
     }
 }

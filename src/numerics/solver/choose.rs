@@ -299,6 +299,23 @@ impl Price {
     }
 }
 
+/// What k lists of values take beside the first: solves and sums in matrix products, and derivatives `n_derivatives` of each on their own.
+pub fn many_price(n_points: usize, n_queries: usize, n_lists: usize, n_derivatives: usize) -> Price {
+    let (n, m, k) = (n_points as f64, n_queries as f64, n_lists as f64);
+    let of_derivatives = if n_derivatives > 0 { 40.0 * n * m } else { 0.0 };
+    let numbers = n_points.saturating_mul(6).saturating_add(n_queries.saturating_mul(1 + n_derivatives));
+    let n_bytes = n_lists.saturating_mul(numbers).saturating_mul(size_of::<f64>());
+    Price { n_bytes, flops: k * (6.0 * n * n + 2.0 * n * m + of_derivatives) }
+}
+
+/// What so many joint draws at m queries take beside their covariance: its factor, and the draws.
+pub fn samples_price(n_queries: usize, n_draws: usize) -> Price {
+    let (m, count) = (n_queries as f64, n_draws as f64);
+    let numbers = n_queries.saturating_mul(n_queries.saturating_mul(3).saturating_add(n_draws));
+    let n_bytes = numbers.saturating_mul(size_of::<f64>());
+    Price { n_bytes, flops: m * m * (m / 3.0 + 2.0 * count) }
+}
+
 /// Bytes of a functional of jets as it waits for its turn.
 const BYTES_PER_FUNCTIONAL: usize = 400;
 

@@ -7,6 +7,7 @@ pub mod trend;
 
 mod condition;
 mod dense;
+mod many;
 mod solution;
 
 use std::sync::Arc;

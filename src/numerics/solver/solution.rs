@@ -100,9 +100,7 @@ impl Solution {
         let weights = if is_one { solver.weights_of_one().to_vec() } else { solve(solver, values) };
         let mut best = candidate(weights)?;
         let mut refined = false;
-        let is_rounding =
-            solver.method() == Method::Cholesky && best.backward_error(solver, values) <= ROUNDING;
-        if best.relative_residual(values) > REFINE_ABOVE && !is_rounding {
+        if best.wants_refinement(solver, values) {
             let correction = solve(solver, &best.residual);
             let weights = best.weights.iter().zip(&correction).map(|(a, b)| a + b).collect();
             match candidate(weights) {
@@ -130,7 +128,7 @@ fn solve(solver: &Solver, values: &[f64]) -> Vec<f64> {
 }
 
 /// Weights at all points with `KΛ`, evaluated afresh from the kernel, and the residual.
-struct Candidate {
+pub(super) struct Candidate {
     weights: Vec<f64>,
     at_points: Vec<f64>,
     /// To the order that was asked for.
@@ -157,10 +155,22 @@ impl Candidate {
                 (jets.values(), Some(jets))
             }
         };
+        Ok(Self { jets, ..Self::evaluated(solver, values, weights, at_points) })
+    }
+
+    /// With `KΛ` at hand.
+    pub(super) fn evaluated(solver: &Solver, values: &[f64], weights: Vec<f64>, at_points: Vec<f64>) -> Self {
         let residual = (0..values.len())
             .map(|i| values[i] - at_points[i] - solver.regularization().at(i) * weights[i])
             .collect();
-        Ok(Self { weights, at_points, jets, residual })
+        Self { weights, at_points, jets: None, residual }
+    }
+
+    /// Whether a step of refinement promises something.
+    pub(super) fn wants_refinement(&self, solver: &Solver, values: &[f64]) -> bool {
+        let is_rounding =
+            || solver.method() == Method::Cholesky && self.backward_error(solver, values) <= ROUNDING;
+        self.relative_residual(values) > REFINE_ABOVE && !is_rounding()
     }
 
     fn relative_residual(&self, values: &[f64]) -> f64 {
@@ -174,7 +184,7 @@ impl Candidate {
         if scale == 0.0 { 0.0 } else { norm_max(&self.residual) / scale }
     }
 
-    fn accept(
+    pub(super) fn accept(
         self,
         solver: &Solver,
         values: &[f64],

@@ -112,25 +112,47 @@ impl Trend {
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`] if the points do not tell its functions apart.
     pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
+        Ok(Self::fit_each(solver, values, mean)?.map(|mut trends| trends.remove(0)))
+    }
+
+    /// The mean of each of k lists of values `[k, n]`.
+    ///
+    /// # Errors
+    /// Those of [`Trend::fit`].
+    pub(super) fn fit_each(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+    ) -> Result<Option<Vec<Self>>, NumericsError> {
         if mean == Mean::Zero {
             return Ok(None);
         }
-        let (cloud, n) = (solver.cloud(), values.len());
+        let (cloud, n) = (solver.cloud(), solver.n_points());
         let basis = Basis::of(mean, cloud);
         let columns = basis.columns(cloud);
         let mut weights = solver.weights_of_one().to_vec();
         weights.extend_from_slice(&columns[n..]);
         let p = basis.n_functions();
         solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));
-        // What all values share is taken off first: it would cost digits of what they do not share.
-        let shared = values.iter().sum::<f64>() / n as f64;
-        let rest: Vec<f64> = values.iter().map(|value| value - shared).collect();
+        // What all values of a list share is taken off first: it would cost digits of what they do not share.
+        let lists = values.chunks_exact(n);
+        let shared: Vec<f64> = lists.clone().map(|list| list.iter().sum::<f64>() / n as f64).collect();
+        let moments: Vec<f64> = lists
+            .zip(&shared)
+            .flat_map(|(list, shared)| {
+                let rest: Vec<f64> = list.iter().map(|value| value - shared).collect();
+                weights.chunks_exact(n).map(|weights| dot(weights, &rest)).collect::<Vec<f64>>()
+            })
+            .collect();
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
-        let moments = Mat::from_fn(p, 1, |a, _| dot(&weights[a * n..][..n], &rest));
+        let moments = Mat::from_fn(p, shared.len(), |a, list| moments[list * p + a]);
         let solved = solve_gram(&gram, moments).ok_or(NumericsError::MeanNotDetermined)?;
-        let mut coefficients: Vec<f64> = solved.col(0).iter().copied().collect();
-        coefficients[0] += shared;
-        Ok(Some(Self { basis, coefficients }))
+        let trend = |(list, shared): (usize, &f64)| {
+            let mut coefficients: Vec<f64> = solved.col(list).iter().copied().collect();
+            coefficients[0] += shared;
+            Self { basis: basis.clone(), coefficients }
+        };
+        Ok(Some(shared.iter().enumerate().map(trend).collect()))
     }
 
     /// `m(x)`.

@@ -3,6 +3,7 @@
 pub mod expansion;
 pub mod gram;
 pub mod jets;
+pub(crate) mod many;
 pub mod nodes;
 pub mod regularization;
 pub(crate) mod symmetric;

@@ -1,5 +1,7 @@
 //! `POST /v1/interpolation`.
 
+mod batch;
+
 use std::sync::Arc;
 
 use axum::Extension;
@@ -22,9 +24,10 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::numerics::function::deviations::JetDeviations;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{Asked, deviations_price, work_price};
+use crate::numerics::solver::choose::{Asked, Price, deviations_price, work_price};
 use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
+pub use batch::*;
 
 request! {
     /// Values at the points of a cloud, and where the function through them is wanted.
@@ -114,30 +117,24 @@ impl Operation for InterpolationRequest {
     const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let derivatives = self.derivatives.unwrap_or(0);
-        if derivatives > 2 {
-            return Err(Problem::invalid_request("/derivatives", "derivatives must be 0, 1 or 2"));
-        }
+        let derivatives = checked_order(self.derivatives)?;
         let values = Arc::new(std::mem::take(&mut self.values));
         let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
-        let has_deviations = self.include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
+        let has_deviations = has_deviations(self.include);
         let of_derivatives = DenseOnly { name: "deviations of derivatives", pointer: "/include" };
         let dense_only = (has_deviations && derivatives > 0).then_some(of_derivatives);
         let mut main = planner.values_fit(fit, dense_only)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let order = usize::from(derivatives);
-        let per_query = [1, 1 + d, 1 + d + d * d][order];
         let asked = if main.is_moving() { Asked::Moving } else { Asked::Function };
         let mut work = work_price(asked, n, m, d);
         if has_deviations && !main.is_moving() {
-            let per_query = [1, 1 + d, 1 + d + d * (d + 1) / 2][order];
-            work = work.and(deviations_price(n, m.saturating_mul(per_query)));
+            work = work.and(price_of_deviations(n, m, d, derivatives));
         }
         let n_lists = if has_deviations { 2 } else { 1 };
         let cost = Cost {
             work,
-            n_numbers: planner.check_answer(m.checked_mul(n_lists * per_query))?,
+            n_numbers: planner.check_answer(m.checked_mul(n_lists * numbers_per_query(d, derivatives)))?,
             n_held: n + m * d,
         };
         Ok(Plan { main, surface: None, work: Work { values, queries, derivatives, has_deviations }, cost })
@@ -146,7 +143,7 @@ impl Operation for InterpolationRequest {
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
         // The dense solver has them with those of derivatives.
         let has_variances = work.has_deviations && fits.main.stored.of_queries().is_some();
-        let order = [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian][usize::from(work.derivatives)];
+        let order = order_of(work.derivatives);
         let asked = ValuesRequest { values: &work.values, queries: &work.queries, order, has_variances };
         let ValuesAt { jets, diagnostics, interpolant, variances } = fits.values_at(asked, observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
@@ -159,15 +156,7 @@ impl Operation for InterpolationRequest {
             (None, Some(variances)) => Some(JetDeviations::of_values(&variances)),
             (Some(_), _) | (None, None) => None,
         };
-        let lists = deviations.map(|of| (of.values, of.gradients, of.hessians));
-        let (of_values, of_gradients, of_hessians) = match lists {
-            None => (None, None, None),
-            Some((values, gradients, hessians)) => (
-                Some(Array::new(values, &[m])),
-                (work.derivatives >= 1).then(|| Array::new(gradients, &[m, d])),
-                (work.derivatives >= 2).then(|| Array::new(hessians, &[m, d, d])),
-            ),
-        };
+        let [of_values, of_gradients, of_hessians] = arrays(deviations, (m, d), work.derivatives);
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
             gradients: (work.derivatives >= 1).then(|| Array::new(jets.gradients(), &[m, d])),
@@ -178,4 +167,40 @@ impl Operation for InterpolationRequest {
             diagnostics,
         })
     }
+}
+
+fn checked_order(derivatives: Option<u8>) -> Result<u8, Problem> {
+    match derivatives.unwrap_or(0) {
+        order @ 0..=2 => Ok(order),
+        _ => Err(Problem::invalid_request("/derivatives", "derivatives must be 0, 1 or 2")),
+    }
+}
+
+fn order_of(derivatives: u8) -> JetOrder {
+    [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian][usize::from(derivatives)]
+}
+
+fn has_deviations(include: Option<Vec<ValuesInclude>>) -> bool {
+    include.is_some_and(|include| include.contains(&ValuesInclude::Deviations))
+}
+
+/// Value, gradient and Hessian, as far as they are asked for.
+fn numbers_per_query(d: usize, derivatives: u8) -> usize {
+    [1, 1 + d, 1 + d + d * d][usize::from(derivatives)]
+}
+
+/// Entries of a Hessian that are equal are counted once.
+fn price_of_deviations(n: usize, m: usize, d: usize, derivatives: u8) -> Price {
+    let per_query = [1, 1 + d, 1 + d + d * (d + 1) / 2][usize::from(derivatives)];
+    deviations_price(n, m.saturating_mul(per_query))
+}
+
+/// Deviations of values, gradients and Hessians, those that are asked for.
+fn arrays(deviations: Option<JetDeviations>, (m, d): (usize, usize), derivatives: u8) -> [Option<Array>; 3] {
+    let Some(JetDeviations { values, gradients, hessians }) = deviations else { return [None, None, None] };
+    [
+        Some(Array::new(values, &[m])),
+        (derivatives >= 1).then(|| Array::new(gradients, &[m, d])),
+        (derivatives >= 2).then(|| Array::new(hessians, &[m, d, d])),
+    ]
 }

@@ -1,0 +1,166 @@
+//! `POST /v1/interpolation/batch`.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+
+use super::{Work, arrays, checked_order, has_deviations, numbers_per_query, order_of, price_of_deviations};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::plan::Cost;
+use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
+use crate::http::serve::values::{EachAt, ValuesRequest};
+use crate::http::wire::read::members::{present, present_word, present_words};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::numerics::function::deviations::JetDeviations;
+use crate::numerics::solver::choose::{Asked, many_price, work_price};
+use crate::store::Owner;
+
+request! {
+    /// Many lists of values at the points of a cloud, and where the functions through them are wanted.
+    pub struct InterpolationBatchRequest {
+        /// Lists of values, one per point each, in their order. They have kernel and noise in common.
+        #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
+        pub values: Points,
+        /// The mean of each function; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// 0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, minimum = 0, maximum = 2)]
+        pub derivatives: Option<u8>,
+        /// What is wanted beside what was asked for; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<ValuesInclude>>,
+    }
+}
+
+answer! {
+    /// The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+    pub struct InterpolationBatchResponse {
+        /// For each list u at each query.
+        #[schema(value_type = Vec<Vec<f64>>)]
+        values: Array,
+        /// For each list ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        gradients: Option<Array>,
+        /// For each list D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<Vec<f64>>>>>)]
+        hessians: Option<Array>,
+        /// Standard deviation of any of the functions at each query given its values, under the kernel as covariance and alpha as variance of the
+        /// noise; with `deviations`.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        value_deviations: Option<Array>,
+        /// The same for the components of ∇u.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradient_deviations: Option<Array>,
+        /// The same for the entries of D²u.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        hessian_deviations: Option<Array>,
+        /// For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        mean_coefficients: Option<Array>,
+        /// How the answer came about; `relative_residual` is the greatest of all lists.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Interpolate many lists of values
+///
+/// As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
+/// solver.
+#[utoipa::path(
+    post,
+    path = "/v1/interpolation/batch",
+    operation_id = "compute_interpolation_batch",
+    tag = "values",
+    request_body = InterpolationBatchRequest,
+    responses((status = 200, description = "The functions at the queries", body = InterpolationBatchResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_interpolation_batch(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<InterpolationBatchRequest>(app, owner, request).await
+}
+
+impl Operation for InterpolationBatchRequest {
+    type Work = Work;
+    type Answer = InterpolationBatchResponse;
+    const HAS_SURFACE: bool = false;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let derivatives = checked_order(self.derivatives)?;
+        let (values, k) = value_lists(std::mem::take(&mut self.values))?;
+        let fit = Fit { values: Some(values.clone()), n_lists: k, mean: self.mean, ..self.take_fit() };
+        let has_deviations = has_deviations(self.include);
+        let of_batch = DenseOnly { name: "batches", pointer: "/solver" };
+        let mut main = planner.values_fit(fit, Some(of_batch))?;
+        let queries = planner.queries(self.queries, &mut [&mut main])?;
+        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+        let per_query = numbers_per_query(d, derivatives);
+        let mut work = work_price(Asked::Function, n, m, d).and(many_price(n, m, k, per_query - 1));
+        if has_deviations {
+            work = work.and(price_of_deviations(n, m, d, derivatives));
+        }
+        let of_means = k.checked_mul(1 + d);
+        let n_numbers = k
+            .checked_add(usize::from(has_deviations))
+            .and_then(|lists| lists.checked_mul(m)?.checked_mul(per_query)?.checked_add(of_means?));
+        let cost = Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: values.len() + m * d };
+        Ok(Plan { main, surface: None, work: Work { values, queries, derivatives, has_deviations }, cost })
+    }
+
+    fn compute(
+        work: Work,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<InterpolationBatchResponse, Problem> {
+        let Work { values, queries, derivatives, has_deviations } = work;
+        let asked = ValuesRequest {
+            values: &values,
+            queries: &queries,
+            order: order_of(derivatives),
+            has_variances: false,
+        };
+        let EachAt { jets, diagnostics, batch, .. } = fits.each_at(asked, observer)?;
+        let (k, m, d) = (batch.solutions.len(), queries.n_points(), queries.dimension());
+        let deviations = match batch.interpolants().next().filter(|_| has_deviations) {
+            None => None,
+            Some(any) => {
+                let (scale, order) = (fits.main.plan.scale, usize::from(derivatives));
+                let found = JetDeviations::of(&any, scale, &queries, order, observer);
+                Some(found.map_err(|error| fits.main.refused(error))?)
+            }
+        };
+        let [value_deviations, gradient_deviations, hessian_deviations] =
+            arrays(deviations, (m, d), derivatives);
+        Ok(InterpolationBatchResponse {
+            values: Array::new(jets.values, &[k, m]),
+            gradients: (derivatives >= 1).then(|| Array::new(jets.gradients, &[k, m, d])),
+            hessians: (derivatives >= 2).then(|| Array::new(jets.hessians, &[k, m, d, d])),
+            value_deviations,
+            gradient_deviations,
+            hessian_deviations,
+            mean_coefficients: EachAt::mean_coefficients(&batch),
+            diagnostics,
+        })
+    }
+}

@@ -1,0 +1,152 @@
+//! `POST /v1/posterior/batch`.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+
+use super::work::{Asked, Found, Work};
+use super::{PosteriorQuantity, Samples};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::planner::{Planner, value_lists};
+use crate::http::wire::read::members::{
+    present, present_object, present_unless_empty, present_word, present_words,
+};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::store::Owner;
+
+request! {
+    /// Many lists of noisy values at the points of a cloud, and where their posteriors are wanted.
+    pub struct PosteriorBatchRequest {
+        /// Lists of observed values, one per point each, in their order. They have kernel and noise in common.
+        #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
+        pub values: Points,
+        /// The mean of each process; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// What is wanted beside the means; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<PosteriorQuantity>>,
+        /// Draws of each latent function at all queries together; none if absent.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub samples: Option<Samples>,
+        /// Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted; none if absent. An empty list counts as absent.
+        #[serde(default, deserialize_with = "present_unless_empty")]
+        #[schema(nullable = false)]
+        pub quantiles: Option<Vec<f64>>,
+        /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub threshold: Option<f64>,
+    }
+}
+
+answer! {
+    /// The Gaussian processes given the values. Lists of values have their own rows in what depends on values; the rest they share.
+    pub struct PosteriorBatchResponse {
+        /// For each list the posterior mean at each query.
+        #[schema(value_type = Vec<Vec<f64>>)]
+        means: Array,
+        /// The variance of the latent functions at each query.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        variances: Option<Array>,
+        /// The variance of a new observation at each query.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        observation_variances: Option<Array>,
+        /// The covariance of the latent functions between queries.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        covariance: Option<Array>,
+        /// For each list the gradient of the mean at each query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        gradients: Option<Array>,
+        /// The variances of the components of the latent functions' gradients at each query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradient_variances: Option<Array>,
+        /// For each list draws of the latent function, one row each, a number per query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        samples: Option<Array>,
+        /// For each list quantiles of the latent function, one row for each probability, a number per query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
+        quantiles: Option<Array>,
+        /// For each list the probability that a new observation exceeds `threshold`, at each query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        exceedance_probabilities: Option<Array>,
+        /// For each list −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        #[schema(nullable = false)]
+        log_marginal_likelihoods: Option<Vec<f64>>,
+        /// For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        mean_coefficients: Option<Array>,
+        /// How the answer came about; `relative_residual` is the greatest of all lists.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Compute Gaussian process posteriors of many lists of values
+///
+/// As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
+/// solver.
+#[utoipa::path(
+    post,
+    path = "/v1/posterior/batch",
+    operation_id = "compute_posterior_batch",
+    tag = "values",
+    request_body = PosteriorBatchRequest,
+    responses((status = 200, description = "The posteriors at the queries", body = PosteriorBatchResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_posterior_batch(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<PosteriorBatchRequest>(app, owner, request).await
+}
+
+impl Operation for PosteriorBatchRequest {
+    type Work = Work;
+    type Answer = PosteriorBatchResponse;
+    const HAS_SURFACE: bool = false;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let (values, n_lists) = value_lists(std::mem::take(&mut self.values))?;
+        let fit = Fit { values: Some(values.clone()), n_lists, mean: self.mean, ..self.take_fit() };
+        let Self { include, samples, quantiles, threshold, queries, .. } = self;
+        let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
+        Work::plan(planner, fit, values, queries, asked)
+    }
+
+    fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorBatchResponse, Problem> {
+        let found = Found::each(work, fits, observer)?;
+        Ok(PosteriorBatchResponse {
+            means: found.means,
+            variances: found.variances,
+            observation_variances: found.observation_variances,
+            covariance: found.covariance,
+            gradients: found.gradients,
+            gradient_variances: found.gradient_variances,
+            samples: found.samples,
+            quantiles: found.quantiles,
+            exceedance_probabilities: found.exceedance_probabilities,
+            log_marginal_likelihoods: Some(found.log_marginal_likelihoods).filter(|all| !all.is_empty()),
+            mean_coefficients: found.mean_coefficients,
+            diagnostics: found.diagnostics,
+        })
+    }
+}

@@ -1,0 +1,186 @@
+//! `POST /v1/posterior`.
+
+mod batch;
+mod work;
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::{Request, State};
+use axum::response::Response;
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::{Operation, Plan, serve};
+use crate::http::serve::planner::Planner;
+use crate::http::wire::read::members::{
+    present, present_object, present_unless_empty, present_word, present_words,
+};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::answer::answer;
+use crate::http::wire::write::array::Array;
+use crate::store::Owner;
+pub use batch::*;
+use work::{Asked, Found, Work};
+
+/// What may be asked of a posterior beside its mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PosteriorQuantity {
+    /// The variance of the latent function at each query.
+    Variance,
+    /// The variance of a new observation at each query: the latent one plus alpha.
+    ObservationVariance,
+    /// The covariance of the latent function between queries.
+    Covariance,
+    /// The gradient of the mean at each query.
+    Gradients,
+    /// The variances of the components of the latent function's gradient at each query.
+    GradientVariances,
+    /// The logarithm of the probability density of the values.
+    LogMarginalLikelihood,
+}
+
+/// How many functions to draw from the posterior, and which.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Samples {
+    /// Functions to draw.
+    #[schema(minimum = 1)]
+    pub count: usize,
+    /// Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 9007199254740991u64)]
+    pub seed: u64,
+}
+
+request! {
+    /// Noisy values at the points of a cloud, and where the posterior is wanted.
+    pub struct PosteriorRequest {
+        /// The observed values at the points, in their order.
+        #[schema(min_items = 1)]
+        pub values: Vec<f64>,
+        /// The mean of the process; a constant if absent with the kernel, else 0.
+        #[serde(default, deserialize_with = "present_word")]
+        #[schema(nullable = false)]
+        pub mean: Option<MeanChoice>,
+        /// Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
+        pub queries: Option<Points>,
+        /// What is wanted beside the mean; nothing if absent.
+        #[serde(default, deserialize_with = "present_words")]
+        #[schema(nullable = false)]
+        pub include: Option<Vec<PosteriorQuantity>>,
+        /// Draws of the latent function at all queries together; none if absent.
+        #[serde(default, deserialize_with = "present_object")]
+        #[schema(nullable = false)]
+        pub samples: Option<Samples>,
+        /// Probabilities between 0 and 1 of which the quantiles of the latent function are wanted; none if absent. An empty list counts as absent.
+        #[serde(default, deserialize_with = "present_unless_empty")]
+        #[schema(nullable = false)]
+        pub quantiles: Option<Vec<f64>>,
+        /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false)]
+        pub threshold: Option<f64>,
+    }
+}
+
+answer! {
+    /// The Gaussian process given the values.
+    pub struct PosteriorResponse {
+        /// The posterior mean at each query, unit of the values.
+        #[schema(value_type = Vec<f64>)]
+        means: Array,
+        /// The variance of the latent function at each query, no noise added, unit of the values squared.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        variances: Option<Array>,
+        /// The variance of a new observation at each query.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        observation_variances: Option<Array>,
+        /// The covariance of the latent function between queries.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        covariance: Option<Array>,
+        /// The gradient of the mean at each query, unit of the values per length.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradients: Option<Array>,
+        /// The variances of the components of the latent function's gradient at each query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        gradient_variances: Option<Array>,
+        /// Draws of the latent function, one row each, a number per query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        samples: Option<Array>,
+        /// Quantiles of the latent function, one row for each probability, a number per query.
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
+        quantiles: Option<Array>,
+        /// The probability that a new observation exceeds `threshold`, at each query.
+        #[schema(nullable = false, value_type = Option<Vec<f64>>)]
+        exceedance_probabilities: Option<Array>,
+        /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        #[schema(nullable = false)]
+        log_marginal_likelihood: Option<f64>,
+        /// How the answer came about.
+        diagnostics: Diagnostics,
+    }
+}
+
+/// Compute the Gaussian process posterior
+///
+/// With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
+/// queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
+/// log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
+/// it, without what takes all points or queries together: covariance, samples, gradient_variances and likelihood.
+#[utoipa::path(
+    post,
+    path = "/v1/posterior",
+    operation_id = "compute_posterior",
+    tag = "values",
+    request_body = PosteriorRequest,
+    responses((status = 200, description = "The posterior at the queries", body = PosteriorResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn compute_posterior(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Response, Problem> {
+    serve::<PosteriorRequest>(app, owner, request).await
+}
+
+impl Operation for PosteriorRequest {
+    type Work = Work;
+    type Answer = PosteriorResponse;
+    const HAS_SURFACE: bool = false;
+
+    fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
+        let values = Arc::new(std::mem::take(&mut self.values));
+        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let Self { include, samples, quantiles, threshold, queries, .. } = self;
+        let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
+        Work::plan(planner, fit, values, queries, asked)
+    }
+
+    fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {
+        let found = Found::one(work, fits, observer)?;
+        Ok(PosteriorResponse {
+            means: found.means,
+            variances: found.variances,
+            observation_variances: found.observation_variances,
+            covariance: found.covariance,
+            gradients: found.gradients,
+            gradient_variances: found.gradient_variances,
+            samples: found.samples,
+            quantiles: found.quantiles,
+            exceedance_probabilities: found.exceedance_probabilities,
+            log_marginal_likelihood: found.log_marginal_likelihoods.first().copied(),
+            diagnostics: found.diagnostics,
+        })
+    }
+}

@@ -1,0 +1,355 @@
+//! What posteriors of one list of values and of many have in common.
+
+use std::sync::Arc;
+
+use super::{PosteriorQuantity as Q, Samples};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{Diagnostics, Fit, Warning, WarningCode};
+use crate::http::problem::Problem;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::Plan;
+use crate::http::serve::plan::{Cost, PlannedFit};
+use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::serve::values::{EachAt, ValuesAt, ValuesRequest};
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::array::Array;
+use crate::numerics::function::batch::BatchJets;
+use crate::numerics::function::deviations::JetDeviations;
+use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::function::posterior::{
+    Covariance, Variances, covariance_with_mean, log_marginal_likelihood,
+};
+use crate::numerics::function::samples::Root;
+use crate::numerics::machine::normal::{cumulative, quantile};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::choose::{
+    Asked as AskedOfSolver, Price, deviations_price, many_price, samples_price, work_price,
+};
+use crate::numerics::sums::jets::JetOrder;
+
+/// What is wanted beside the means.
+pub struct Asked {
+    pub include: Vec<Q>,
+    pub samples: Option<Samples>,
+    pub quantiles: Option<Vec<f64>>,
+    pub threshold: Option<f64>,
+}
+
+impl Asked {
+    fn wants(&self, quantity: Q) -> bool {
+        self.include.contains(&quantity)
+    }
+
+    /// Whether the variance at each query is needed.
+    fn needs_variances(&self) -> bool {
+        let has_bands = self.quantiles.is_some() || self.threshold.is_some();
+        has_bands || self.wants(Q::Variance) || self.wants(Q::ObservationVariance)
+    }
+
+    fn needs_covariance(&self) -> bool {
+        self.samples.is_some() || self.wants(Q::Covariance)
+    }
+
+    fn n_quantiles(&self) -> usize {
+        self.quantiles.as_ref().map_or(0, Vec::len)
+    }
+
+    fn n_samples(&self) -> usize {
+        self.samples.map_or(0, |samples| samples.count)
+    }
+
+    /// What only a dense factorization has.
+    fn dense_only(&self) -> Option<DenseOnly> {
+        let name = self.include.iter().find_map(|quantity| match quantity {
+            Q::Covariance => Some("covariance"),
+            Q::LogMarginalLikelihood => Some("log_marginal_likelihood"),
+            Q::GradientVariances => Some("gradient_variances"),
+            Q::Variance | Q::ObservationVariance | Q::Gradients => None,
+        });
+        match (name, self.samples) {
+            (Some(name), _) => Some(DenseOnly { name, pointer: "/include" }),
+            (None, Some(_)) => Some(DenseOnly { name: "samples", pointer: "/samples" }),
+            (None, None) => None,
+        }
+    }
+
+    fn check(&self) -> Result<(), Problem> {
+        if self.samples.is_some_and(|samples| samples.count == 0) {
+            return Err(Problem::invalid_request("/samples/count", "count must be at least 1"));
+        }
+        let quantiles = self.quantiles.iter().flatten();
+        match quantiles.enumerate().find(|(_, p)| !(**p > 0.0 && **p < 1.0)) {
+            None => Ok(()),
+            Some((at, p)) => {
+                let detail = format!("a quantile is that of a probability between 0 and 1, found {p}");
+                Err(Problem::invalid_request(format!("/quantiles/{at}"), detail))
+            }
+        }
+    }
+
+    /// A new observation's noise is only known if it is the same everywhere.
+    fn check_noise(&self, plan: &PlannedFit) -> Result<(), Problem> {
+        let asked = if self.wants(Q::ObservationVariance) {
+            ("observation_variance", "/include")
+        } else if self.threshold.is_some() {
+            ("threshold", "/threshold")
+        } else {
+            return Ok(());
+        };
+        if !plan.has_noise_variances() {
+            return Ok(());
+        }
+        let (name, pointer) = asked;
+        let detail = format!("{name} needs alpha: with noise_variances the noise at queries is unknown");
+        Err(Problem::invalid_request(pointer, detail))
+    }
+
+    /// Numbers of the answer for k lists of values and m queries in d dimensions.
+    fn n_numbers(&self, k: usize, m: usize, d: usize) -> Option<usize> {
+        let per_list = 2 + self.n_quantiles() + if self.wants(Q::Gradients) { d } else { 0 };
+        let of_lists = m.checked_mul(per_list.checked_add(self.n_samples())?)?.checked_mul(k)?;
+        let of_pairs = if self.needs_covariance() { m } else { 0 };
+        of_lists.checked_add(m.checked_mul(of_pairs + 2 + d)?)?.checked_add(k * (2 + d))
+    }
+
+    fn price(&self, n: usize, m: usize, d: usize, k: usize) -> Price {
+        let (variances, covariance) = (self.needs_variances(), self.needs_covariance());
+        let mut price = work_price(AskedOfSolver::Posterior { variances, covariance }, n, m, d);
+        if k > 1 {
+            price = price.and(many_price(n, m, k, if self.wants(Q::Gradients) { d } else { 0 }));
+        }
+        if self.wants(Q::GradientVariances) {
+            price = price.and(deviations_price(n, m.saturating_mul(1 + d)));
+        }
+        if self.samples.is_some() {
+            price = price.and(samples_price(m, self.n_samples().saturating_mul(k)));
+        }
+        price
+    }
+}
+
+/// A checked request.
+pub struct Work {
+    /// `[k, n]`
+    values: Arc<Vec<f64>>,
+    queries: Arc<Cloud>,
+    asked: Asked,
+}
+
+impl Work {
+    /// Checks a request for posteriors of the values of a fit.
+    ///
+    /// # Errors
+    /// The [`Problem`] that the client is told.
+    pub fn plan(
+        planner: &Planner<'_>,
+        fit: Fit,
+        values: Arc<Vec<f64>>,
+        queries: Option<Points>,
+        asked: Asked,
+    ) -> Result<Plan<Self>, Problem> {
+        asked.check()?;
+        let (k, of_batch) = (fit.n_lists.max(1), DenseOnly { name: "batches", pointer: "/solver" });
+        let is_batch = fit.n_lists > 0;
+        let dense_only = asked.dense_only().or(is_batch.then_some(of_batch));
+        let mut main = planner.values_fit(fit, dense_only)?;
+        let queries = planner.queries(queries, &mut [&mut main])?;
+        asked.check_noise(&main)?;
+        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+        let work = match main.is_moving() {
+            true => work_price(AskedOfSolver::Moving, n, m, d),
+            false => asked.price(n, m, d, k),
+        };
+        let n_numbers = planner.check_answer(asked.n_numbers(k, m, d))?;
+        let n_held = values.len() + m * d;
+        let work = (Cost { work, n_numbers, n_held }, Self { values, queries, asked });
+        Ok(Plan { main, surface: None, work: work.1, cost: work.0 })
+    }
+
+    fn order(&self) -> JetOrder {
+        if self.asked.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value }
+    }
+}
+
+/// What was found, as it is answered.
+pub struct Found {
+    pub means: Array,
+    pub variances: Option<Array>,
+    pub observation_variances: Option<Array>,
+    pub covariance: Option<Array>,
+    pub gradients: Option<Array>,
+    pub gradient_variances: Option<Array>,
+    pub samples: Option<Array>,
+    pub quantiles: Option<Array>,
+    pub exceedance_probabilities: Option<Array>,
+    /// One per list of values, if they are asked for.
+    pub log_marginal_likelihoods: Vec<f64>,
+    pub mean_coefficients: Option<Array>,
+    pub diagnostics: Diagnostics,
+}
+
+/// Means of k lists, with what else is known of them.
+struct Means {
+    jets: BatchJets,
+    variances: Option<Variances>,
+    diagnostics: Diagnostics,
+    /// The functions themselves; none where each query has its own.
+    functions: Vec<Interpolant>,
+    mean_coefficients: Option<Array>,
+    /// The dimensions that answers for k lists have before their own.
+    leading: Vec<usize>,
+}
+
+impl Found {
+    /// Of one list of values.
+    ///
+    /// # Errors
+    /// What the numerics refuses as a [`Problem`].
+    pub fn one(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
+        let Work { values, queries, asked } = &work;
+        let (order, has_variances) = (work.order(), asked.needs_variances());
+        let request = ValuesRequest { values, queries, order, has_variances };
+        let ValuesAt { jets, variances, diagnostics, interpolant } = fits.values_at(request, observer)?;
+        let gradients = if order == JetOrder::Value { Vec::new() } else { jets.gradients() };
+        let jets = BatchJets { values: jets.values(), gradients, hessians: Vec::new() };
+        let functions = interpolant.into_iter().collect();
+        let (leading, mean_coefficients) = (Vec::new(), None);
+        let means = Means { jets, variances, diagnostics, functions, mean_coefficients, leading };
+        Self::of(&work, means, fits, observer)
+    }
+
+    /// Of each of many lists of values.
+    ///
+    /// # Errors
+    /// What the numerics refuses as a [`Problem`].
+    pub fn each(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
+        let Work { values, queries, asked } = &work;
+        let (order, has_variances) = (work.order(), asked.needs_variances());
+        let request = ValuesRequest { values, queries, order, has_variances };
+        let EachAt { jets, variances, diagnostics, batch } = fits.each_at(request, observer)?;
+        let leading = vec![batch.solutions.len()];
+        let mean_coefficients = EachAt::mean_coefficients(&batch);
+        let functions = batch.interpolants().collect();
+        let means = Means { jets, variances, diagnostics, functions, mean_coefficients, leading };
+        Self::of(&work, means, fits, observer)
+    }
+
+    fn of(work: &Work, means: Means, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
+        let (asked, queries, scale) = (&work.asked, &*work.queries, fits.main.plan.scale);
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let Means { jets, variances, mut diagnostics, functions, mean_coefficients, leading } = means;
+        let refused = |error| fits.main.refused(error);
+        let function = || functions.first().ok_or_else(Problem::internal);
+        let covariance = match asked.needs_covariance() {
+            false => None,
+            true => {
+                let Interpolant { solver, solution } = function()?;
+                let found = covariance_with_mean(solver, solution.trend.as_ref(), queries, observer);
+                Some(found.map_err(refused)?.scaled(scale))
+            }
+        };
+        let clamped = variances.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
+        warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
+        let shape = |of_each: &[usize]| [&leading, of_each].concat();
+        let samples = match (asked.samples, &covariance) {
+            (Some(samples), Some(covariance)) => {
+                let prior_variance = function()?.solver.kernel().at_zero() * scale;
+                let root = Root::of(covariance, prior_variance, observer).map_err(refused)?;
+                Some(Array::new(draws(&root, &jets.values, m, samples), &shape(&[samples.count, m])))
+            }
+            (None, _) | (_, None) => None,
+        };
+        let gradient_variances = match asked.wants(Q::GradientVariances) {
+            false => None,
+            true => {
+                let found = JetDeviations::of(function()?, scale, queries, 1, observer).map_err(refused)?;
+                Some(Array::new(found.gradients.iter().map(|s| s * s).collect(), &[m, d]))
+            }
+        };
+        let mut log_marginal_likelihoods = Vec::new();
+        if asked.wants(Q::LogMarginalLikelihood) {
+            function()?;
+            for Interpolant { solver, solution } in &functions {
+                log_marginal_likelihoods
+                    .push(log_marginal_likelihood(solver, solution, scale).map_err(refused)?);
+            }
+        }
+        // With noise per point it is not asked for.
+        let bands = Bands { asked, means: &jets.values, variances: variances.as_ref(), m };
+        let alpha = diagnostics.alpha.unwrap_or_default();
+        Ok(Self {
+            variances: bands.variances(Q::Variance, 0.0),
+            observation_variances: bands.variances(Q::ObservationVariance, alpha),
+            quantiles: bands.quantiles().map(|found| Array::new(found, &shape(&[asked.n_quantiles(), m]))),
+            exceedance_probabilities: bands.exceedances(alpha).map(|found| Array::new(found, &shape(&[m]))),
+            means: Array::new(jets.values, &shape(&[m])),
+            covariance: covariance
+                .filter(|_| asked.wants(Q::Covariance))
+                .map(|Covariance { latent, .. }| Array::new(latent, &[m, m])),
+            gradients: asked.wants(Q::Gradients).then(|| Array::new(jets.gradients, &shape(&[m, d]))),
+            gradient_variances,
+            samples,
+            log_marginal_likelihoods,
+            mean_coefficients,
+            diagnostics,
+        })
+    }
+}
+
+/// Draws `[k, count, m]`, each list with numbers of its own.
+fn draws(root: &Root, means: &[f64], m: usize, Samples { count, seed }: Samples) -> Vec<f64> {
+    let lists = means.chunks_exact(m).enumerate();
+    lists.flat_map(|(list, means)| root.draw(means, count, (seed, list as u64))).collect()
+}
+
+/// What follows from means `[k, m]` and variances `[m]` of normal distributions.
+struct Bands<'a> {
+    asked: &'a Asked,
+    means: &'a [f64],
+    variances: Option<&'a Variances>,
+    m: usize,
+}
+
+impl Bands<'_> {
+    fn variances(&self, quantity: Q, noise: f64) -> Option<Array> {
+        let variances = self.variances.filter(|_| self.asked.wants(quantity))?;
+        Some(Array::new(variances.latent.iter().map(|v| v + noise).collect(), &[self.m]))
+    }
+
+    /// `μ + Φ⁻¹(p)σ`, `[k, q, m]`.
+    fn quantiles(&self) -> Option<Vec<f64>> {
+        let (variances, levels) = (self.variances?, self.asked.quantiles.as_ref()?);
+        let deviations: Vec<f64> = variances.latent.iter().map(|v| v.sqrt()).collect();
+        let levels: Vec<f64> = levels.iter().map(|&p| quantile(p)).collect();
+        let of_list = |means: &[f64]| {
+            let rows =
+                levels.iter().map(|z| means.iter().zip(&deviations).map(move |(mean, s)| mean + z * s));
+            rows.flatten().collect::<Vec<f64>>()
+        };
+        Some(self.means.chunks_exact(self.m).flat_map(of_list).collect())
+    }
+
+    /// `Φ((μ − t)/√(σ² + α))`, `[k, m]`; where nothing varies, 1 above the threshold and else 0.
+    fn exceedances(&self, alpha: f64) -> Option<Vec<f64>> {
+        let (variances, threshold) = (self.variances?, self.asked.threshold?);
+        let of_one = |(mean, variance): (&f64, &f64)| {
+            let deviation = (variance + alpha).sqrt();
+            match deviation > 0.0 {
+                true => cumulative((mean - threshold) / deviation),
+                false => f64::from(u8::from(*mean > threshold)),
+            }
+        };
+        Some(self.means.iter().zip(variances.latent.iter().cycle()).map(of_one).collect())
+    }
+}
+
+fn warn_of_clamping(clamped: &[usize], diagnostics: &mut Diagnostics) {
+    let Some(first) = clamped.first() else { return };
+    let count = clamped.len();
+    diagnostics.warnings.push(Warning {
+        code: WarningCode::VarianceClamped,
+        detail: format!(
+            "{count} variances came out negative within rounding, first at query {first}; served as 0"
+        ),
+    });
+}

@@ -1,0 +1,131 @@
+//! Joint draws from a posterior.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt_pivoting::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef};
+
+use super::posterior::Covariance;
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::random::Random;
+use crate::numerics::observer::{Observer, Stage};
+use crate::numerics::solver::parallelism;
+
+/// Variances below this multiple of ε, the queries and the prior variance are rounding of the covariance.
+const ROUNDING: f64 = 64.0;
+
+/// `C ≈ LLᵀ` of a covariance `[m, m]`, which has whatever rank float64 leaves it.
+pub struct Root {
+    /// `[r, m]` row by row: r independent directions.
+    directions: Vec<f64>,
+    n_queries: usize,
+}
+
+impl Root {
+    /// Factorizes a covariance by Cholesky with complete pivoting (Higham 2002, sec. 10.3), up to where what is left is rounding: variances of
+    /// `64 ε m k₀`, k₀ the prior variance in the unit of the covariance.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`], [`NumericsError::WeightsOverflow`] of numbers that are not finite.
+    pub fn of(
+        covariance: &Covariance,
+        prior_variance: f64,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        observer.enter(Stage::Solve);
+        observer.checkpoint()?;
+        let m = covariance.latent.len().isqrt();
+        let mut factor = covariance.latent.clone();
+        let (mut order, mut inverse) = (vec![0usize; m], vec![0usize; m]);
+        let par = parallelism((m * m * m) as f64 / 3.0);
+        let requirement = cholesky_in_place_scratch::<usize, f64>(m, par, Default::default());
+        let mut scratch = MemBuffer::new(requirement);
+        let (info, _) = cholesky_in_place(
+            MatMut::from_column_major_slice_mut(&mut factor, m, m),
+            &mut order,
+            &mut inverse,
+            par,
+            MemStack::new(&mut scratch),
+            Default::default(),
+        )
+        .map_err(|_| NumericsError::WeightsOverflow)?;
+        let rounding = ROUNDING * f64::EPSILON * m as f64 * prior_variance;
+        let is_signal = |column: &usize| factor[column * (m + 1)].powi(2) > rounding;
+        let rank = (0..info.rank).take_while(is_signal).count();
+        let mut directions = vec![0.0; rank * m];
+        for (column, direction) in directions.chunks_exact_mut(m).enumerate() {
+            (column..m).for_each(|row| direction[order[row]] = factor[column * m + row]);
+        }
+        Ok(Self { directions, n_queries: m })
+    }
+
+    /// Draws `[count, m]` about means `[m]`. What a draw is depends on the seed, the list and its place in it, not on how many others there are.
+    pub fn draw(&self, means: &[f64], count: usize, (seed, list): (u64, u64)) -> Vec<f64> {
+        let m = self.n_queries;
+        let rank = self.directions.len().checked_div(m).unwrap_or(0);
+        let mut normals = vec![0.0; rank * count];
+        for (draw, numbers) in normals.chunks_exact_mut(rank.max(1)).enumerate() {
+            Random::of(seed, (list << 32) ^ draw as u64).fill_normal(numbers);
+        }
+        let mut draws: Vec<f64> = means.iter().copied().cycle().take(m * count).collect();
+        let out = MatMut::from_column_major_slice_mut(&mut draws, m, count);
+        let directions = MatRef::from_column_major_slice(&self.directions, m, rank);
+        let normals = MatRef::from_column_major_slice(&normals, rank, count);
+        matmul(out, Accum::Add, directions, normals, 1.0, parallelism((2 * m * rank * count) as f64));
+        draws
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::numerics::function::posterior::covariance;
+    use crate::numerics::kernel::Kernel;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::cloud::Cloud;
+    use crate::numerics::solver::{Solver, System};
+    use crate::numerics::sums::regularization::Regularization;
+    use crate::numerics::testing::{all_families, fibonacci_sphere};
+
+    #[test]
+    fn draws_have_the_mean_and_the_covariance_of_the_posterior() {
+        // Queries at points of the cloud, between them, twice the same, and far away.
+        let mut queries = fibonacci_sphere(12).coordinates().to_vec();
+        queries.extend([0.0, 0.6, 0.8, 0.0, 0.6, 0.8, 50.0, 0.0, 0.0]);
+        queries.extend_from_slice(&fibonacci_sphere(40).coordinates()[..9]);
+        let queries = Cloud::new(queries, 3).unwrap();
+        let (m, count) = (queries.n_points(), 20_000);
+        for family in all_families() {
+            let kernel = Kernel::new(family, 0.9, 2.0).unwrap();
+            let alpha = Regularization::uniform(1e-8).unwrap();
+            let system = System::new(Arc::new(fibonacci_sphere(40)), kernel, alpha).unwrap();
+            let solver = Solver::dense(system, &Unobserved).unwrap();
+            let covariance = covariance(&solver, &queries, &Unobserved).unwrap();
+            let root = Root::of(&covariance, kernel.at_zero(), &Unobserved).unwrap();
+            let means: Vec<f64> = (0..m).map(|i| i as f64).collect();
+            let draws = root.draw(&means, count, (3, 0));
+            assert_eq!(root.draw(&means, 5, (3, 0)), draws[..5 * m], "a draw does not depend on the others");
+            let at = |draw: usize, query: usize| draws[draw * m + query] - means[query];
+            for i in 0..m {
+                for j in 0..=i {
+                    let sum: f64 = (0..count).map(|draw| at(draw, i) * at(draw, j)).sum();
+                    let variances = covariance.latent[i * (m + 1)] * covariance.latent[j * (m + 1)];
+                    // Five standard errors of a product, and what the factorization leaves.
+                    let allowed = 5.0 * (2.0 * variances / count as f64).sqrt() + 1e-12;
+                    let off = (sum / count as f64 - covariance.latent[i * m + j]).abs();
+                    assert!(off <= allowed, "{family:?} {i} {j}: {off} > {allowed}");
+                }
+            }
+            assert!((0..count).all(|draw| (at(draw, 12) - at(draw, 13)).abs() < 1e-5), "{family:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_known_exactly_does_not_vary() {
+        let covariance = Covariance { latent: vec![0.0, 0.0, 0.0, 1e-17], clamped: vec![0] };
+        let root = Root::of(&covariance, 1.0, &Unobserved).unwrap();
+        assert_eq!(root.draw(&[1.0, 2.0], 2, (0, 0)), [1.0, 2.0, 1.0, 2.0]);
+    }
+}

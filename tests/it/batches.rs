@@ -1,0 +1,223 @@
+//! Many lists of values on one cloud, and what a posterior has beside means and variances.
+
+use serde_json::{Value, json};
+
+use crate::common::random::Random;
+use crate::support::{Server, fibonacci_sphere, numbers};
+
+/// Lists of noisy values on the unit sphere, each with a mean of its own.
+fn lists(n: usize, k: usize) -> (Vec<[f64; 3]>, Vec<Vec<f64>>) {
+    let (points, mut random) = (fibonacci_sphere(n), Random(11));
+    let mut list = |at: usize| {
+        let shift = at as f64;
+        points.iter().map(|x| 5.0 * shift + (2.0 * x[0] + shift).sin() + 0.05 * random.normal()).collect()
+    };
+    let values = (0..k).map(&mut list).collect();
+    (points, values)
+}
+
+const QUERIES: [[f64; 3]; 3] = [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [3.0, 0.0, 0.0]];
+
+fn assert_close(found: &Value, expected: &Value, tolerance: f64) {
+    let (found, expected) = (numbers(found), numbers(expected));
+    assert_eq!(found.len(), expected.len());
+    let scale = expected.iter().fold(1.0f64, |a, x| a.max(x.abs()));
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() <= tolerance * scale, "{a} {b}");
+    }
+}
+
+#[tokio::test]
+async fn lists_share_a_fit_and_are_answered_as_each_alone() {
+    let server = Server::start().await;
+    let (points, values) = lists(120, 4);
+    let posterior = [
+        "variance",
+        "observation_variance",
+        "covariance",
+        "gradients",
+        "gradient_variances",
+        "log_marginal_likelihood",
+    ];
+    for mean in ["constant", "linear", "zero"] {
+        for (route, extra) in [
+            ("/v1/interpolation", json!({"derivatives": 2, "include": ["deviations"]})),
+            ("/v1/posterior", json!({"include": posterior, "quantiles": [0.1, 0.5], "threshold": 3.0})),
+        ] {
+            let mut body =
+                json!({"cloud": {"points": points}, "values": values, "queries": QUERIES, "mean": mean});
+            body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+            let batch = server.post(&format!("{route}/batch"), &body).await.expect_ok();
+            body["kernel"] = batch["diagnostics"]["kernel"].clone();
+            body["alpha"] = batch["diagnostics"]["alpha"].clone();
+            for (at, list) in values.iter().enumerate() {
+                body["values"] = json!(list);
+                let alone = server.post(route, &body).await.expect_ok();
+                for (name, found) in batch.as_object().unwrap() {
+                    let of_alone = match name.as_str() {
+                        "diagnostics" => continue,
+                        "log_marginal_likelihoods" => &alone["log_marginal_likelihood"],
+                        "mean_coefficients" => &alone["diagnostics"][name],
+                        name => &alone[name],
+                    };
+                    let is_shared = name.contains("varianc") || name.contains("deviations");
+                    let found = if is_shared { found } else { &found[at] };
+                    // Solves and sums in another order.
+                    assert_close(found, of_alone, 1e-9);
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_kernel_that_is_not_given_is_learned_from_all_lists() {
+    let server = Server::start().await;
+    let (points, values) = lists(200, 40);
+    let mut body = json!({"cloud": {"points": points}, "values": values});
+    let answer = server.post("/v1/interpolation/batch", &body).await.expect_ok();
+    let noise = answer["diagnostics"]["alpha"].as_f64().unwrap().sqrt();
+    // Sixteen lists of 200 say it to 2 %; steps of the grid are 15 %.
+    assert!((0.042..0.058).contains(&noise), "{noise}");
+    assert!(answer["mean_coefficients"].as_array().unwrap().len() == 40);
+    body["values"] = json!(values[..1]);
+    let of_one = server.post("/v1/interpolation/batch", &body).await.expect_ok();
+    body["values"] = json!(values[0]);
+    let alone = server.post("/v1/interpolation", &body).await.expect_ok();
+    assert_eq!(of_one["diagnostics"]["kernel"], alone["diagnostics"]["kernel"]);
+    assert_close(&of_one["values"][0], &alone["values"], 1e-9);
+}
+
+#[tokio::test]
+async fn samples_are_those_of_the_seed_and_of_the_posterior() {
+    let server = Server::start().await;
+    let (points, values) = lists(60, 2);
+    let kernel = json!({"family": "matern", "length_scale": 1.0, "variance": 2.0});
+    let mut body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.01,
+        "include": ["covariance"], "samples": {"count": 4000, "seed": 5}});
+    let answer = server.post("/v1/posterior", &body).await.expect_ok();
+    assert_eq!(server.post("/v1/posterior", &body).await.expect_ok(), answer);
+    let (samples, means) = (numbers(&answer["samples"]), numbers(&answer["means"]));
+    let covariance = numbers(&answer["covariance"]);
+    for i in 0..3 {
+        for j in 0..3 {
+            let of_draw = |draw: &[f64]| (draw[i] - means[i]) * (draw[j] - means[j]);
+            let found = samples.chunks_exact(3).map(of_draw).sum::<f64>() / 4000.0;
+            let spread = (covariance[4 * i] * covariance[4 * j]).sqrt();
+            // Five standard errors.
+            assert!((found - covariance[3 * i + j]).abs() < 5.0 * spread * (2.0f64 / 4000.0).sqrt());
+        }
+    }
+    body["samples"]["count"] = json!(2);
+    let fewer = server.post("/v1/posterior", &body).await.expect_ok();
+    // Products of other shapes may differ in the last bit.
+    assert_close(&fewer["samples"], &json!(answer["samples"].as_array().unwrap()[..2]), 1e-13);
+    body["samples"]["seed"] = json!(6);
+    let other = server.post("/v1/posterior", &body).await.expect_ok();
+    assert_ne!(other["samples"], fewer["samples"]);
+    body["values"] = json!([values[0], values[0]]);
+    let batch = server.post("/v1/posterior/batch", &body).await.expect_ok();
+    assert_ne!(batch["samples"][0], batch["samples"][1], "lists are drawn for independently");
+    assert_close(&batch["samples"][0], &other["samples"], 1e-9);
+}
+
+#[tokio::test]
+async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
+    let server = Server::start().await;
+    let (points, values) = lists(60, 1);
+    let kernel = json!({"family": "gauss", "length_scale": 0.8});
+    let mut body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.04,
+        "include": ["variance", "observation_variance", "gradient_variances"], "quantiles": [0.025, 0.5, 0.975], "threshold": 0.25});
+    let answer = server.post("/v1/posterior", &body).await.expect_ok();
+    let (means, variances) = (numbers(&answer["means"]), numbers(&answer["variances"]));
+    for (query, (mean, variance)) in means.iter().zip(&variances).enumerate() {
+        for (row, z) in [-1.959963984540054, 0.0, 1.959963984540054].into_iter().enumerate() {
+            let expected = mean + z * variance.sqrt();
+            assert!((answer["quantiles"][row][query].as_f64().unwrap() - expected).abs() < 1e-13);
+        }
+    }
+    // Far away the observation is normal with variance 1.04 about 0: Φ(−0.25/√1.04), by scipy.stats.norm.
+    let probabilities = numbers(&answer["exceedance_probabilities"]);
+    assert!((probabilities[2] - 0.40317086).abs() < 1e-3, "{probabilities:?}");
+    assert!(probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
+    let deviations = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "kernel": kernel, "alpha": 0.04,
+        "derivatives": 1, "include": ["deviations"]});
+    let deviations = server.post("/v1/interpolation", &deviations).await.expect_ok();
+    let squares: Vec<f64> = numbers(&deviations["gradient_deviations"]).iter().map(|s| s * s).collect();
+    assert_close(&answer["gradient_variances"], &json!(squares), 1e-14);
+    // Nothing varies at a point that is met exactly.
+    body["alpha"] = json!(0.0);
+    body["queries"] = json!([points[0]]);
+    for (threshold, expected) in [(values[0][0] - 1e-3, 1.0), (values[0][0] + 1e-3, 0.0)] {
+        body["threshold"] = json!(threshold);
+        let answer = server.post("/v1/posterior", &body).await.expect_ok();
+        assert!((numbers(&answer["exceedance_probabilities"])[0] - expected).abs() < 1e-9);
+    }
+}
+
+#[tokio::test]
+async fn the_local_solver_has_quantiles_and_exceedances_but_nothing_joint() {
+    let server = Server::start().await;
+    let (points, values) = lists(300, 1);
+    let mut body = json!({"cloud": {"points": points}, "values": values[0], "queries": QUERIES, "solver": "local",
+        "include": ["variance"], "quantiles": [0.5], "threshold": 0.0});
+    let answer = server.post("/v1/posterior", &body).await.expect_ok();
+    assert_close(&answer["quantiles"][0], &answer["means"], 1e-15);
+    assert_eq!(answer["exceedance_probabilities"].as_array().unwrap().len(), 3);
+    body["samples"] = json!({"count": 1});
+    let problem = server.post("/v1/posterior", &body).await.expect_problem(422, "unsupported-by-solver");
+    assert_eq!(problem["errors"][0]["pointer"], "/samples");
+    body["values"] = json!(values);
+    for route in ["/v1/posterior/batch", "/v1/interpolation/batch"] {
+        let mut body = json!({"cloud": {"points": points}, "values": values, "solver": "local"});
+        server.post(route, &body).await.expect_problem(422, "unsupported-by-solver");
+        body["solver"] = json!("dense");
+        server.post(route, &body).await.expect_ok();
+    }
+}
+
+#[tokio::test]
+async fn what_is_no_batch_or_no_probability_is_refused() {
+    let server = Server::start().await;
+    let (points, values) = lists(20, 2);
+    let batch = json!({"cloud": {"points": points}, "values": values});
+    let short = vec![1.0; 19];
+    for (values, slug, pointer) in [
+        (json!([values[0], short]), "length-mismatch", "/values/1"),
+        (json!([short, short]), "length-mismatch", "/values/0"),
+        (json!([]), "invalid-request", "/values"),
+        (json!(values[0]), "invalid-request", "/values/0"),
+        (json!([values[0], [null]]), "invalid-request", "/values/1/0"),
+    ] {
+        let mut body = batch.clone();
+        body["values"] = values;
+        for route in ["/v1/posterior/batch", "/v1/interpolation/batch"] {
+            let problem = server.post(route, &body).await.expect_problem(422, slug);
+            assert_eq!(problem["errors"][0]["pointer"], pointer, "{route} {problem}");
+        }
+    }
+    let posterior = json!({"cloud": {"points": points}, "values": values[0]});
+    let noisy = json!(vec![0.1; 20]);
+    for (member, value, pointer) in [
+        ("quantiles", json!([0.5, 1.0]), "/quantiles/1"),
+        ("quantiles", json!([0.0]), "/quantiles/0"),
+        ("samples", json!({"count": 0}), "/samples/count"),
+        ("samples", json!({"count": 1, "seed": -1}), "/samples/seed"),
+        ("samples", json!({"seed": 1}), "/samples"),
+        ("threshold", json!(null), "/threshold"),
+    ] {
+        let mut body = posterior.clone();
+        body[member] = value;
+        let problem = server.post("/v1/posterior", &body).await.expect_problem(422, "invalid-request");
+        assert_eq!(problem["errors"][0]["pointer"], pointer, "{problem}");
+    }
+    let mut body = posterior.clone();
+    body["threshold"] = json!(1.0);
+    body["noise_variances"] = noisy;
+    let problem = server.post("/v1/posterior", &body).await.expect_problem(422, "invalid-request");
+    assert_eq!(problem["errors"][0]["pointer"], "/threshold");
+    // More draws than an answer may hold are refused before any is made.
+    let mut body = posterior;
+    body["samples"] = json!({"count": 1_000_000_000u64});
+    server.post("/v1/posterior", &body).await.expect_problem(413, "problem-too-large");
+}
