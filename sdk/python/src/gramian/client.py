@@ -104,6 +104,9 @@ class Client:
     ) -> None:
         self.close()
 
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        return self  # as threads share it, so do the clones of an estimator
+
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Client cannot be pickled, since it has connections: every process makes its own")
 

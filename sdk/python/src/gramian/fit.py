@@ -225,24 +225,31 @@ class OperatorFit(ValuesFit, total=False):
 
 
 def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
-    """Returns the fit that an answer says was used, with what only the request says."""
+    """Returns the fit of a surface that an answer says was used, with what only the request says."""
+    fit = _numbers_used(diagnostics, request)
+    if diagnostics.solver is SolverUsed.LOCAL:  # regressions that choose these by their likelihood, and take none
+        fit.pop("kernel", None)
+        fit.pop("alpha", None)
+        fit.pop("noise_variances", None)
+    return fit
+
+
+def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
+    """Returns that of values, with the mean if there is one; their local solver takes a kernel as the other does."""
+    fit, mean = cast("ValuesFit", _numbers_used(diagnostics, request)), diagnostics.mean_coefficients
+    if not isinstance(mean, Unset):
+        fit["mean"] = MeanChoice.CONSTANT if len(mean) == 1 else MeanChoice.LINEAR
+    return fit
+
+
+def _numbers_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
     fit = Fit(kernel=diagnostics.kernel, solver=diagnostics.solver)
-    if diagnostics.solver is SolverUsed.LOCAL:
-        del fit["kernel"]  # local regressions choose it, and alpha, by their likelihood: they take none
-    elif isinstance(diagnostics.alpha, Unset):
+    if isinstance(diagnostics.alpha, Unset):
         fit["noise_variances"] = _own_copy(request.get("noise_variances"))
     else:
         fit["alpha"] = diagnostics.alpha
     if "duplicates" in request:
         fit["duplicates"] = DuplicatePolicy(request["duplicates"])
-    return fit
-
-
-def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
-    """Returns the same with the mean, if there is one."""
-    fit, mean = cast("ValuesFit", fit_used(diagnostics, request)), diagnostics.mean_coefficients
-    if not isinstance(mean, Unset):
-        fit["mean"] = MeanChoice.CONSTANT if len(mean) == 1 else MeanChoice.LINEAR
     return fit
 
 

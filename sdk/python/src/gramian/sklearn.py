@@ -1,0 +1,281 @@
+"""A regressor with the interface of scikit-learn, for which that is needed: the extra `gramian[sklearn]`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, Literal, Self, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from .answers import Posterior
+from .client import Client
+from .cloud import Cloud
+from .fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
+from .problems import Problem
+from .rest.models import KernelUsed, SolverUsed
+from .rest.types import Unset
+from .tensors import Array
+
+try:
+    from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+    from sklearn.utils import check_random_state
+    from sklearn.utils.validation import check_is_fitted, validate_data
+except ImportError as error:
+    message = "gramian.sklearn needs scikit-learn, 1.6 or later: pip install 'gramian[sklearn]'"
+    raise ImportError(message, name="sklearn") from error
+
+
+class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]  # sklearn has no types
+    """Gaussian-process regression by the service, which learns kernel, noise and mean from the values.
+
+    Predictions have the shapes and the meaning of scikit-learn's `GaussianProcessRegressor`. Each column of a `y` of
+    the shape `[n, k]` is fitted by itself. Kernels depend on distances in X: scale features of different units.
+
+    Parameters
+    ----------
+    kernel : str, dict or Kernel, optional
+        A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or
+        `kernel_` of another regressor. If absent, learned from the values by their likelihood; with one that is given
+        nothing is learned.
+    alpha : float or array_like, `[n]`, optional
+        The variance of the noise, of all samples or of each, in the unit of `y` squared. If absent, learned where the
+        kernel is, else 1e-10.
+    mean : str, optional
+        What the function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. A
+        constant if absent with `kernel`, else zero.
+    solver : str, optional
+        `"dense"`, `"local"` for each prediction from the samples nearest to it, or `"auto"` as if absent: dense as far
+        as the service factorizes, local beyond.
+    duplicates : str, optional
+        What to do with samples at the same place when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+    client : Client or str, optional
+        The service, or its address; as `gramian.Client()` finds it if absent. Clones share a `Client`; a pickle has
+        its address only, and the key is that of `GRAMIAN_API_KEY` where it is loaded.
+
+    Attributes
+    ----------
+    kernel_ : KernelUsed, or k of them
+        The kernel, learned or given, with all its numbers.
+    alpha_ : float, or array of `[n]` or `[k]`
+        The variance of the noise: of each sample if it was given so, else of each column of `y`.
+    mean_coefficients_ : array of `[p]` or `[k, p]`
+        The constant, then a slope per feature; p is 0, 1 or 1 + d.
+    log_marginal_likelihood_value_ : float or None
+        Of the values, in the sum over columns; None by the local solver.
+    cloud_id_ : str
+        The id of the samples in the service.
+    X_train_, y_train_ : arrays
+        What was fitted, as float64. Where the service has forgotten it, predictions send it again.
+    n_features_in_, feature_names_in_
+        As of all estimators.
+
+    Examples
+    --------
+    >>> from gramian.sklearn import KernelRegressor
+    >>> x = np.linspace(0, 6, 60)[:, None]
+    >>> y = np.sin(x[:, 0]) + np.random.default_rng(0).normal(scale=0.1, size=60)
+    >>> model = KernelRegressor().fit(x, y)
+    >>> mean, std = model.predict([[1.5], [9.0]], return_std=True)
+    >>> mean[0].round(1), std[0] < 0.1 < std[1], np.sqrt(model.alpha_).round(1)
+    (np.float64(1.0), np.True_, np.float64(0.1))
+    """
+
+    def __init__(
+        self,
+        kernel: KernelLike | None = None,
+        *,
+        alpha: Number | npt.ArrayLike | None = None,
+        mean: Mean | None = None,
+        solver: Solver | None = None,
+        duplicates: Duplicates | None = None,
+        client: Client | str | None = None,
+    ) -> None:
+        """Keeps the parameters; `fit` looks at them."""
+        self.kernel = kernel
+        self.alpha = alpha
+        self.mean = mean
+        self.solver = solver
+        self.duplicates = duplicates
+        self.client = client
+
+    def __getstate__(self) -> dict[str, Any]:
+        client = self.client
+        address = str(client._connection.http.base_url) if isinstance(client, Client) else client
+        return {**super().__getstate__(), "client": address}
+
+    def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
+        """Registers the samples, learns what is not given, and pins it: predictions repeat to the last bit.
+
+        Parameters
+        ----------
+        X : array_like, `[n, d]`
+            A row of features for each sample; 16 at most, unless the service is configured otherwise.
+        y : array_like, `[n]` or `[n, k]`
+            The values.
+
+        Raises
+        ------
+        ValueError
+            If there are more features than the service takes.
+        Problem
+            If it refuses something else.
+        """
+        points, values = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True)
+        choices = self._choices(len(points))
+        cloud = _registered(self._service(), points)
+        self.X_train_, self.y_train_ = cloud.points, np.array(values, dtype=np.float64)
+        self.cloud_id_, self._description = cloud.id, cloud.description
+        self._keep([_pinned(cloud, column, choices) for column in self._columns()])
+        return self
+
+    @overload
+    def predict(self, X: npt.ArrayLike) -> Array: ...
+
+    @overload
+    def predict(self, X: npt.ArrayLike, *, return_std: Literal[True]) -> tuple[Array, Array]: ...
+
+    @overload
+    def predict(self, X: npt.ArrayLike, *, return_cov: Literal[True]) -> tuple[Array, Array]: ...
+
+    @overload
+    def predict(
+        self, X: npt.ArrayLike, return_std: bool = False, return_cov: bool = False
+    ) -> Array | tuple[Array, Array]: ...
+
+    def predict(
+        self, X: npt.ArrayLike, return_std: bool = False, return_cov: bool = False
+    ) -> Array | tuple[Array, Array]:
+        """Returns the posterior mean, and how certain it is.
+
+        Parameters
+        ----------
+        X : array_like, `[m, d]`
+            Where to predict.
+        return_std : bool, optional
+            Whether to return standard deviations too. They are those of the function, without noise: a new observation
+            has `np.sqrt(std**2 + alpha_)`.
+        return_cov : bool, optional
+            Whether to return covariances of the function too; not by the local solver.
+
+        Returns
+        -------
+        mean : array of `[m]`, or `[m, k]` if y has several columns
+        std : array of `[m]` or `[m, k]`
+        cov : array of `[m, m]` or `[m, m, k]`
+        """
+        if return_std and return_cov:
+            raise RuntimeError("At most one of return_std or return_cov can be requested.")
+        if return_std:
+            answers = self._posteriors(X, "variance")
+            return _stacked(answers, "means"), np.sqrt(_stacked(answers, "variances"))
+        if return_cov:
+            answers = self._posteriors(X, "covariance")
+            return _stacked(answers, "means"), _stacked(answers, "covariance")
+        return _stacked(self._posteriors(X), "means")
+
+    def sample_y(
+        self, X: npt.ArrayLike, n_samples: int = 1, random_state: int | np.random.RandomState | None = 0
+    ) -> Array:
+        """Draws functions from the posterior, and returns their values, without noise.
+
+        Parameters
+        ----------
+        X : array_like, `[m, d]`
+            Where to evaluate them.
+        n_samples : int, optional
+            How many.
+        random_state : int, RandomState or None, optional
+            Where randomness comes from; None for other functions at every call.
+
+        Returns
+        -------
+        array of `[m, n_samples]`, or `[m, k, n_samples]` if y has several columns
+        """
+        random = check_random_state(random_state)
+        answers = self._posteriors(X, "covariance")
+        draws = [random.multivariate_normal(answer.means, answer.covariance, n_samples).T for answer in answers]
+        return np.asarray(draws[0]) if len(draws) == 1 else np.stack(draws, axis=1)
+
+    def _service(self) -> Client:
+        if isinstance(self.client, Client):
+            return self.client
+        address = self.client or os.environ.get("GRAMIAN_URL")
+        return _shared_client(address, os.environ.get("GRAMIAN_API_KEY"), os.getpid())
+
+    def _choices(self, n: int) -> dict[str, Any]:
+        """Returns the parameters as keywords of `Cloud.posterior`."""
+        choices = {name: getattr(self, name) for name in ("kernel", "mean", "solver", "duplicates")}
+        alpha: Any = self.alpha
+        shape = np.shape(alpha)
+        if shape not in ((), (n,)):
+            raise ValueError(f"alpha is to be a number, or one for each of the {n} samples, not of the shape {shape}")
+        return {**choices, "noise_variances" if shape else "alpha": alpha}
+
+    def _columns(self) -> Iterator[Array]:
+        yield from self.y_train_.reshape(len(self.y_train_), -1).T
+
+    def _keep(self, answers: list[Posterior]) -> None:
+        """Keeps what was fitted to each column."""
+        self._fits = [answer.fit for answer in answers]
+        used = [answer.diagnostics for answer in answers]
+        kernels = [each.kernel for each in used]
+        noise = [fit.get("noise_variances", fit.get("alpha")) for fit in self._fits]
+        means = [[] if isinstance(each.mean_coefficients, Unset) else each.mean_coefficients for each in used]
+        likelihoods = [each.log_marginal_likelihood for each in answers if each.log_marginal_likelihood is not None]
+        is_single = len(answers) == 1
+        self.kernel_: KernelUsed | list[KernelUsed] = kernels[0] if is_single else kernels
+        self.alpha_: Any = noise[0] if is_single or "noise_variances" in self._fits[0] else np.array(noise)
+        self.mean_coefficients_ = np.array(means[0] if is_single else means, dtype=np.float64)
+        self.log_marginal_likelihood_value_ = sum(likelihoods) if likelihoods else None
+
+    def _posteriors(self, X: npt.ArrayLike, include: Quantity | None = None) -> list[Posterior]:
+        """Asks for the posterior of each column, of a cloud that belongs to whichever process this is."""
+        check_is_fitted(self)
+        queries = validate_data(self, X, dtype=np.float64, reset=False)
+        cloud = Cloud(self._service()._connection, self._description, self.X_train_)
+        fits = zip(self._columns(), self._fits, strict=True)
+        return [cloud.posterior(values, queries, include=include, **fit) for values, fit in fits]
+
+
+@cache
+def _shared_client(address: str | None, key: str | None, process: int) -> Client:  # noqa: ARG001
+    """Returns the one client of this process for an address, which keeps its connections from fit to fit."""
+    return Client(address, api_key=key)
+
+
+def _registered(client: Client, points: Array) -> Cloud:
+    """Registers samples.
+
+    Raises
+    ------
+    ValueError
+        If there are too many features.
+    """
+    try:
+        return client.cloud(points)
+    except Problem as problem:
+        if problem.slug != "problem-too-large" or problem.required != points.shape[1]:
+            raise
+        raise ValueError(
+            f"X has {problem.required} features, and the service takes {problem.limit} at most: select features, put "
+            f"sklearn.decomposition.PCA({problem.limit}) before this in a pipeline, or raise the limit of the service, "
+            "GRAMIAN_MAX_DIMENSION"
+        ) from problem
+
+
+def _pinned(cloud: Cloud, values: Array, choices: dict[str, Any]) -> Posterior:
+    """Fits values and returns the answer at one point: with the likelihood, where the solver has it."""
+    somewhere = None if cloud.points is None else cloud.points[:1]
+    answer = cloud.posterior(values, somewhere, **choices)
+    if answer.diagnostics.solver is SolverUsed.LOCAL:
+        return answer
+    return cloud.posterior(values, somewhere, include="log_marginal_likelihood", **answer.fit)
+
+
+def _stacked(answers: list[Posterior], member: str) -> Array:
+    """Returns a member of the answers as an array of its own, with a last axis for columns if there are several."""
+    arrays: list[Array] = [getattr(answer, member) for answer in answers]
+    return np.array(arrays[0]) if len(arrays) == 1 else np.stack(arrays, axis=-1)
