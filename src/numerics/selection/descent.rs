@@ -16,8 +16,11 @@ const LEAST_GAIN: f64 = 1e-7;
 /// Slopes of a log likelihood in logarithms up to here count as none: what is left to gain is of the order of their square.
 const FLAT: f64 = 1e-2;
 
+/// Slopes up to here are not followed.
+const LEAST_SLOPE: f64 = 1e-6;
+
 /// Descents from where the last one ended, each without what that had learned of the curvature.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 5;
 
 /// A number this near to its bound is at it.
 const AT_BOUND: f64 = 1e-9;
@@ -48,27 +51,28 @@ pub(super) fn descend(
     let mut walk =
         Walk { evaluator, space, observer, scale: 1.0, at: None, best: None, evaluations: 0, error: None };
     let Some(first) = walk.merit(start)? else { return Ok((None, walk.evaluations)) };
-    let slopes = walk.slopes(start)?;
     let bounds = space.bounds();
-    let steepest = free_slopes(start, &slopes, &bounds).map(|slope| slope * slope).sum::<f64>().sqrt();
-    // The first step is as long as the slope that the optimizer sees: a factor of e at most.
-    walk.scale = 1.0 / steepest.max(1.0);
-    let (mut merit, mut round) = (first, 0);
+    let mut merit = first;
     let walk = RefCell::new(walk);
-    while round < ROUNDS {
+    for _ in 0..ROUNDS {
         let from = walk.borrow().best_logarithms(start);
         let left = max_evaluations.saturating_sub(walk.borrow().evaluations);
-        if space.n_free() == 0 || left == 0 {
+        let slopes = walk.borrow_mut().slopes(&from)?;
+        let steepest = free_slopes(&from, &slopes, &bounds).map(|slope| slope * slope).sum::<f64>().sqrt();
+        if left == 0 || steepest <= LEAST_SLOPE {
             break;
         }
+        // The first step is as long as the slope that the optimizer sees: a factor of e. With less, scales that tend to infinity, whose slopes
+        // fall with their square, would seem to have arrived.
+        walk.borrow_mut().scale = 1.0 / steepest;
         run(&walk, &from, &bounds, left);
         if let Some(error) = walk.borrow_mut().error.take() {
             return Err(error);
         }
         let best = walk.borrow().best.as_ref().map_or(merit, |best| best.1);
-        let at = walk.borrow().best_logarithms(start);
-        let slopes = walk.borrow_mut().slopes(&at)?;
-        round = if is_flat(&at, &slopes, &bounds) || best - merit <= LEAST_GAIN { ROUNDS } else { round + 1 };
+        if best - merit <= LEAST_GAIN {
+            break;
+        }
         merit = best;
     }
     walk.into_inner().end(start, &bounds)
