@@ -26,8 +26,8 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::config::Origins;
 use around::{authentication, middleware};
 use routes::{
-    clouds, curvatures, interpolation, kernels, laplace_beltrami, normals, pages, posterior, process,
-    surface_gradient,
+    clouds, curvatures, interpolation, kernels, laplace_beltrami, model_selection, normals, pages, posterior,
+    process, surface_gradient,
 };
 use serve::app::App;
 
@@ -83,6 +83,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(interpolation::compute_interpolation_batch))
         .routes(routes!(posterior::compute_posterior))
         .routes(routes!(posterior::compute_posterior_batch))
+        .routes(routes!(model_selection::select_model))
         .routes(routes!(normals::compute_normals))
         .routes(routes!(curvatures::compute_curvatures))
         .routes(routes!(surface_gradient::compute_surface_gradient))

@@ -25,6 +25,8 @@ pub enum NumericsError {
     InvalidKernelParameter { parameter: &'static str, requirement: &'static str },
     #[error("{parameter} {requirement}")]
     InvalidRegularization { parameter: &'static str, requirement: &'static str, point: Option<usize> },
+    #[error("vary[{entry}] {requirement}")]
+    InvalidVariation { entry: usize, requirement: &'static str },
     #[error(
         "the Wendland kernel is positive definite up to dimension {max_dimension}, the cloud has {dimension}"
     )]
@@ -67,6 +69,8 @@ pub enum NotDefinite {
     BackwardError { backward_error: f64 },
     #[error("Cholesky fails at point {point}, and what was asked for needs its factor")]
     NeedsCholesky { point: usize },
+    #[error("Cholesky fails, and what was asked for needs its factor")]
+    Unfactorable,
     #[error("the reciprocal condition {reciprocal_condition:.1e} leaves no digit of what was asked for")]
     Singular { reciprocal_condition: f64 },
     #[error("the variance at query {query} is {variance:.1e}, beyond rounding")]

@@ -26,6 +26,7 @@ mod load;
 mod local;
 mod log;
 mod memory;
+mod model_selection;
 mod openapi;
 mod pages;
 mod problems;

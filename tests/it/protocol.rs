@@ -91,6 +91,15 @@ async fn what_generated_clients_accept_is_acceptable() {
     ] {
         bodies.insert(sparse, bodies[dense].clone());
     }
+    for path in ["/v1/interpolation", "/v1/posterior"] {
+        let mut batch = bodies[path].clone();
+        batch["values"] = json!([batch["values"]]);
+        bodies.insert(
+            if path == "/v1/posterior" { "/v1/posterior/batch" } else { "/v1/interpolation/batch" },
+            batch,
+        );
+    }
+    bodies.insert("/v1/model-selection", bodies["/v1/posterior"].clone());
     for (name, document) in
         [("3.1", gramian::http::openapi_json()), ("3.0", gramian::http::openapi_3_0_json())]
     {

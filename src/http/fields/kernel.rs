@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::{present, word};
+use crate::http::wire::write::answer::{Member, Parts};
 use crate::numerics::defaults::Purpose;
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use crate::numerics::patches::PatchKernel;
@@ -165,6 +166,12 @@ impl Kernel {
                 Ok(Family::Wendland { smoothness })
             }
         }
+    }
+}
+
+impl Member for KernelUsed {
+    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.add_json(name, &self)
     }
 }
 

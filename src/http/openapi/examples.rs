@@ -20,7 +20,7 @@ macro_rules! example_file {
 
 /// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
 /// sends the ones and compares the others.
-pub const EXAMPLES: [(&str, &str); 22] = [
+pub const EXAMPLES: [(&str, &str); 23] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
     example_file!("list_clouds"),
@@ -29,6 +29,7 @@ pub const EXAMPLES: [(&str, &str); 22] = [
     example_file!("compute_interpolation_batch"),
     example_file!("compute_posterior"),
     example_file!("compute_posterior_batch"),
+    example_file!("select_model"),
     example_file!("compute_normals"),
     example_file!("compute_curvatures"),
     example_file!("compute_surface_gradient"),

@@ -208,6 +208,7 @@ impl Problem {
             E::InvalidRegularization { point: Some(point), .. } => {
                 at(Slug::InvalidRequest, &Pointers::entry(pointers.regularization, point))
             }
+            E::InvalidVariation { entry, .. } => at(Slug::InvalidRequest, &Pointers::entry("/vary", entry)),
             E::KernelNotPositiveDefinite { .. } => {
                 let remedy = format!("{detail}; choose another family");
                 Self::of_field(Slug::KernelNotPositiveDefinite, format!("{}/family", pointers.kernel), remedy)

@@ -5,6 +5,7 @@ pub mod curvatures;
 pub mod interpolation;
 pub mod kernels;
 pub mod laplace_beltrami;
+pub mod model_selection;
 pub mod normals;
 pub mod pages;
 pub mod posterior;

@@ -75,7 +75,7 @@ pub(super) fn score(
 }
 
 /// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt); says `ln det FᵀF` of the first.
-fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
+pub(super) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
     let mut log_determinant = 0.0;
     for a in 0..p {
         let (done, rest) = columns.split_at_mut((a + 1) * n);

@@ -5,9 +5,18 @@
 //! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
 //! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
 
+mod alpha_path;
+mod contraction;
+mod criterion;
+mod descent;
+mod evaluation;
+mod leave_one_out;
 mod likelihood;
+mod parameters;
+mod price;
 mod sample;
 mod search;
+mod select;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::{Family, Kernel};
@@ -18,7 +27,14 @@ use crate::numerics::solver::trend::{Mean, Trend};
 use sample::Sample;
 use search::{Grid, Search};
 
+pub use alpha_path::{alpha_path, default_alphas};
+pub use criterion::Criterion;
+pub use descent::Side;
+pub use leave_one_out::{LeaveOneOut, leave_one_out, leave_one_out_with};
+pub use parameters::{Hyperparameters, Parameter, Variation};
+pub use price::{alpha_path_price, expected_evaluations, leave_one_out_price, selection_price};
 pub use sample::MAX_SAMPLE;
+pub use select::{MAX_EVALUATIONS, Selected, Selection, select};
 
 /// What is known of the noise of values beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -107,6 +107,11 @@ pub struct Trend {
 }
 
 impl Trend {
+    /// With coefficients that are known, one for each function.
+    pub(crate) fn new(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Self { basis, coefficients }
+    }
+
     /// The mean of values `[n]` under a solver; `None` for [`Mean::Zero`].
     ///
     /// # Errors

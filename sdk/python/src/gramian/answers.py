@@ -91,6 +91,14 @@ class Posterior(Answer):
         `[m, m]`, V². Of the latent function between queries.
     gradients
         `[m, d]`, V/L. Of the mean.
+    gradient_variances
+        `[m, d]`, V²/L². Of the components of the latent function's gradient.
+    samples
+        `[count, m]`, V. Joint draws of the latent function.
+    quantiles
+        `[q, m]`, V. Of the latent function.
+    exceedance_probabilities
+        `[m]`. That a new, noisy observation exceeds `threshold`.
     log_marginal_likelihood
         −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
     diagnostics
@@ -104,6 +112,10 @@ class Posterior(Answer):
     observation_variances: Array | None
     covariance: Array | None
     gradients: Array | None
+    gradient_variances: Array | None
+    samples: Array | None
+    quantiles: Array | None
+    exceedance_probabilities: Array | None
     log_marginal_likelihood: float | None
     diagnostics: Diagnostics
     fit: ValuesFit
@@ -118,6 +130,10 @@ class Posterior(Answer):
             observation_variances=members.optional("observation_variances"),
             covariance=members.optional("covariance", diagnostics.n_queries),
             gradients=members.optional("gradients", diagnostics.dimension),
+            gradient_variances=members.optional("gradient_variances", diagnostics.dimension),
+            samples=members.optional("samples", diagnostics.n_queries),
+            quantiles=members.optional("quantiles", diagnostics.n_queries),
+            exceedance_probabilities=members.optional("exceedance_probabilities"),
             log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
             diagnostics=diagnostics,
             fit=values_fit_used(diagnostics, members.request),

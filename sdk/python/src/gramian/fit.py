@@ -48,7 +48,14 @@ Mean: TypeAlias = MeanChoice | Literal["zero", "constant", "linear"]
 Orientation: TypeAlias = OrientationChoice | Literal["outward", "gradient"]
 Quantity: TypeAlias = (
     PosteriorQuantity
-    | Literal["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"]
+    | Literal[
+        "variance",
+        "observation_variance",
+        "covariance",
+        "gradients",
+        "gradient_variances",
+        "log_marginal_likelihood",
+    ]
 )
 
 

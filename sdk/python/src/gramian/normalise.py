@@ -127,6 +127,13 @@ def with_deviations(include: object, deviations: object) -> object:
     return list(dict.fromkeys([*wanted, GeometryInclude.DEVIATIONS.value]))
 
 
+def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+    """The rule for draws: how many, or a mapping with `count` and `seed`."""
+    if not isinstance(value, Mapping):
+        value = {"count": value}
+    return normalise(value, {"count": whole, "seed": whole}, sizes, f"{name}.")
+
+
 def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """The rule for kernels."""
     value = unwrapped(name, value)
@@ -214,6 +221,9 @@ REQUEST: Mapping[str, Rule] = {
     "derivatives": whole,
     "mean": word(*MeanChoice),
     "include": words(*PosteriorQuantity),
+    "samples": samples,
+    "quantiles": array("quantiles"),
+    "threshold": number,
     "surface": word(*SurfaceChoice),
     "orientation": word(*OrientationChoice),
     "geometry": geometry,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy.typing as npt
 
@@ -103,6 +103,9 @@ class ValuesOfCloud(RegisteredCloud):
         queries: npt.ArrayLike | None = None,
         *,
         include: Quantity | Iterable[Quantity] | None = None,
+        samples: Whole | Mapping[str, Whole] | None = None,
+        quantiles: npt.ArrayLike | None = None,
+        threshold: Number | None = None,
         kernel: KernelLike | None = None,
         alpha: Number | None = None,
         mean: Mean | None = None,
@@ -120,7 +123,13 @@ class ValuesOfCloud(RegisteredCloud):
             Where the posterior is wanted, a row of coordinates each; the points if absent.
         include : str or several, optional
             What is wanted beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
-            `"log_marginal_likelihood"`; nothing if absent.
+            `"gradient_variances"`, `"log_marginal_likelihood"`; nothing if absent.
+        samples : int or dict, optional
+            How many functions to draw from the posterior, jointly at all queries; `{"count": 10, "seed": 1}` for others.
+        quantiles : array_like, `[q]`, optional
+            Probabilities between 0 and 1 of which the quantiles of the latent function are wanted.
+        threshold : float, optional
+            What a new observation is to exceed, V, for `exceedance_probabilities`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
             `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
@@ -150,6 +159,10 @@ class ValuesOfCloud(RegisteredCloud):
         >>> answer = line.posterior([0, 1, 0, 1], [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
         >>> answer.means.round(2) + 0.0, answer.variances.round(2)
         (array([0.98, 0.  ]), array([0.01, 1.  ]))
+        >>> answer = line.posterior([0, 1, 0, 1], [[1]], kernel=kernel, alpha=0.01, samples=3, quantiles=[0.05, 0.95])
+        >>> answer.samples.shape, answer.quantiles.round(2)
+        ((3, 1), array([[0.82],
+               [1.14]]))
         """
         return self._compute(
             Posterior.read,
@@ -157,6 +170,9 @@ class ValuesOfCloud(RegisteredCloud):
             values=values,
             queries=queries,
             include=include,
+            samples=samples,
+            quantiles=quantiles,
+            threshold=threshold,
             kernel=kernel,
             alpha=alpha,
             mean=mean,

@@ -81,6 +81,18 @@ impl Member for f64 {
     }
 }
 
+impl Member for bool {
+    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.add_json(name, &self)
+    }
+}
+
+impl Member for usize {
+    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.add_json(name, &self)
+    }
+}
+
 /// Absent, not null.
 impl<M: Member> Member for Option<M> {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {

@@ -223,6 +223,7 @@ impl Dense {
             NotDefinite::Residual { .. } => (self.system.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),
             NotDefinite::BackwardError { .. }
             | NotDefinite::NeedsCholesky { .. }
+            | NotDefinite::Unfactorable
             | NotDefinite::Singular { .. }
             | NotDefinite::NegativeVariance { .. } => self.system.n_points() as f64,
         };

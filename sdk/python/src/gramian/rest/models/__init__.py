@@ -12,10 +12,14 @@ from .degenerate_reason import DegenerateReason
 from .diagnostics import Diagnostics
 from .duplicate_policy import DuplicatePolicy
 from .factorization_used import FactorizationUsed
+from .family_score import FamilyScore
 from .field_error import FieldError
+from .free_parameter import FreeParameter
 from .geometry import Geometry
 from .geometry_include import GeometryInclude
 from .health import Health
+from .interpolation_batch_request import InterpolationBatchRequest
+from .interpolation_batch_response import InterpolationBatchResponse
 from .interpolation_request import InterpolationRequest
 from .interpolation_response import InterpolationResponse
 from .kernel import Kernel
@@ -30,15 +34,24 @@ from .laplace_beltrami_request import LaplaceBeltramiRequest
 from .laplace_beltrami_response import LaplaceBeltramiResponse
 from .laplace_beltrami_sparse_matrix_request import LaplaceBeltramiSparseMatrixRequest
 from .laplace_beltrami_sparse_matrix_response import LaplaceBeltramiSparseMatrixResponse
+from .left_out import LeftOut
 from .matrix_format import MatrixFormat
 from .mean_choice import MeanChoice
+from .model_selection_request import ModelSelectionRequest
+from .model_selection_response import ModelSelectionResponse
 from .normals_request import NormalsRequest
 from .normals_response import NormalsResponse
 from .orientation_choice import OrientationChoice
+from .path_entry import PathEntry
+from .posterior_batch_request import PosteriorBatchRequest
+from .posterior_batch_response import PosteriorBatchResponse
 from .posterior_quantity import PosteriorQuantity
 from .posterior_request import PosteriorRequest
 from .posterior_response import PosteriorResponse
 from .problem import Problem
+from .samples import Samples
+from .selection_criterion import SelectionCriterion
+from .selection_parameter import SelectionParameter
 from .smoothness import Smoothness
 from .solver_choice import SolverChoice
 from .solver_used import SolverUsed
@@ -69,10 +82,14 @@ __all__ = (
     "Diagnostics",
     "DuplicatePolicy",
     "FactorizationUsed",
+    "FamilyScore",
     "FieldError",
+    "FreeParameter",
     "Geometry",
     "GeometryInclude",
     "Health",
+    "InterpolationBatchRequest",
+    "InterpolationBatchResponse",
     "InterpolationRequest",
     "InterpolationResponse",
     "Kernel",
@@ -87,15 +104,24 @@ __all__ = (
     "LaplaceBeltramiResponse",
     "LaplaceBeltramiSparseMatrixRequest",
     "LaplaceBeltramiSparseMatrixResponse",
+    "LeftOut",
     "MatrixFormat",
     "MeanChoice",
+    "ModelSelectionRequest",
+    "ModelSelectionResponse",
     "NormalsRequest",
     "NormalsResponse",
     "OrientationChoice",
+    "PathEntry",
+    "PosteriorBatchRequest",
+    "PosteriorBatchResponse",
     "PosteriorQuantity",
     "PosteriorRequest",
     "PosteriorResponse",
     "Problem",
+    "Samples",
+    "SelectionCriterion",
+    "SelectionParameter",
     "Smoothness",
     "SolverChoice",
     "SolverUsed",

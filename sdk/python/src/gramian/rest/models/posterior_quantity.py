@@ -4,6 +4,7 @@ from enum import StrEnum
 class PosteriorQuantity(StrEnum):
     COVARIANCE = "covariance"
     GRADIENTS = "gradients"
+    GRADIENT_VARIANCES = "gradient_variances"
     LOG_MARGINAL_LIKELIHOOD = "log_marginal_likelihood"
     OBSERVATION_VARIANCE = "observation_variance"
     VARIANCE = "variance"

@@ -14,6 +14,7 @@ from ..types import UNSET, Unset, without_unset
 if TYPE_CHECKING:
     from ..models.cloud_ref import CloudRef
     from ..models.kernel import Kernel
+    from ..models.samples import Samples
 
 
 T = TypeVar("T", bound="PosteriorRequest")
@@ -41,6 +42,11 @@ class PosteriorRequest:
             the points.
         queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.
         include (list[PosteriorQuantity] | Unset): What is wanted beside the mean; nothing if absent.
+        samples (Samples | Unset): How many functions to draw from the posterior, and which.
+        quantiles (list[float] | Unset): Probabilities between 0 and 1 of which the quantiles of the latent function are
+            wanted; none if absent. An empty list counts as absent.
+        threshold (float | Unset): What a new observation is to exceed, unit of the values, for
+            `exceedance_probabilities`.
     """
 
     cloud: CloudRef
@@ -53,6 +59,9 @@ class PosteriorRequest:
     mean: MeanChoice | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     include: list[PosteriorQuantity] | Unset = UNSET
+    samples: Samples | Unset = UNSET
+    quantiles: list[float] | Unset = UNSET
+    threshold: float | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -98,6 +107,16 @@ class PosteriorRequest:
                 include_item = include_item_data.value
                 include.append(include_item)
 
+        samples: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.samples, Unset):
+            samples = self.samples.to_dict()
+
+        quantiles: list[float] | Unset = UNSET
+        if not isinstance(self.quantiles, Unset):
+            quantiles = self.quantiles
+
+        threshold = self.threshold
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -122,6 +141,12 @@ class PosteriorRequest:
             field_dict["queries"] = queries
         if include is not UNSET:
             field_dict["include"] = include
+        if samples is not UNSET:
+            field_dict["samples"] = samples
+        if quantiles is not UNSET:
+            field_dict["quantiles"] = quantiles
+        if threshold is not UNSET:
+            field_dict["threshold"] = threshold
 
         return field_dict
 
@@ -129,6 +154,7 @@ class PosteriorRequest:
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.cloud_ref import CloudRef
         from ..models.kernel import Kernel
+        from ..models.samples import Samples
 
         d = dict(src_dict)
         cloud = CloudRef.from_dict(d.pop("cloud"))
@@ -185,6 +211,17 @@ class PosteriorRequest:
 
                 include.append(include_item)
 
+        _samples = d.pop("samples", UNSET)
+        samples: Samples | Unset
+        if isinstance(_samples, Unset):
+            samples = UNSET
+        else:
+            samples = Samples.from_dict(_samples)
+
+        quantiles = cast(list[float], d.pop("quantiles", UNSET))
+
+        threshold = d.pop("threshold", UNSET)
+
         posterior_request = cls(
             cloud=cloud,
             values=values,
@@ -196,6 +233,9 @@ class PosteriorRequest:
             mean=mean,
             queries=queries,
             include=include,
+            samples=samples,
+            quantiles=quantiles,
+            threshold=threshold,
         )
 
         return posterior_request

@@ -28,6 +28,13 @@ class PosteriorResponse:
         observation_variances (list[float] | Unset): The variance of a new observation at each query.
         covariance (list[list[float]] | Unset): The covariance of the latent function between queries.
         gradients (list[list[float]] | Unset): The gradient of the mean at each query, unit of the values per length.
+        gradient_variances (list[list[float]] | Unset): The variances of the components of the latent function's
+            gradient at each query.
+        samples (list[list[float]] | Unset): Draws of the latent function, one row each, a number per query.
+        quantiles (list[list[float]] | Unset): Quantiles of the latent function, one row for each probability, a number
+            per query.
+        exceedance_probabilities (list[float] | Unset): The probability that a new observation exceeds `threshold`, at
+            each query.
         log_marginal_likelihood (float | Unset): −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
     """
 
@@ -37,6 +44,10 @@ class PosteriorResponse:
     observation_variances: list[float] | Unset = UNSET
     covariance: list[list[float]] | Unset = UNSET
     gradients: list[list[float]] | Unset = UNSET
+    gradient_variances: list[list[float]] | Unset = UNSET
+    samples: list[list[float]] | Unset = UNSET
+    quantiles: list[list[float]] | Unset = UNSET
+    exceedance_probabilities: list[float] | Unset = UNSET
     log_marginal_likelihood: float | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -71,6 +82,34 @@ class PosteriorResponse:
 
                 gradients.append(gradients_item)
 
+        gradient_variances: list[list[float]] | Unset = UNSET
+        if not isinstance(self.gradient_variances, Unset):
+            gradient_variances = []
+            for gradient_variances_item_data in self.gradient_variances:
+                gradient_variances_item = gradient_variances_item_data
+
+                gradient_variances.append(gradient_variances_item)
+
+        samples: list[list[float]] | Unset = UNSET
+        if not isinstance(self.samples, Unset):
+            samples = []
+            for samples_item_data in self.samples:
+                samples_item = samples_item_data
+
+                samples.append(samples_item)
+
+        quantiles: list[list[float]] | Unset = UNSET
+        if not isinstance(self.quantiles, Unset):
+            quantiles = []
+            for quantiles_item_data in self.quantiles:
+                quantiles_item = quantiles_item_data
+
+                quantiles.append(quantiles_item)
+
+        exceedance_probabilities: list[float] | Unset = UNSET
+        if not isinstance(self.exceedance_probabilities, Unset):
+            exceedance_probabilities = self.exceedance_probabilities
+
         log_marginal_likelihood = self.log_marginal_likelihood
 
         field_dict: dict[str, Any] = {}
@@ -89,6 +128,14 @@ class PosteriorResponse:
             field_dict["covariance"] = covariance
         if gradients is not UNSET:
             field_dict["gradients"] = gradients
+        if gradient_variances is not UNSET:
+            field_dict["gradient_variances"] = gradient_variances
+        if samples is not UNSET:
+            field_dict["samples"] = samples
+        if quantiles is not UNSET:
+            field_dict["quantiles"] = quantiles
+        if exceedance_probabilities is not UNSET:
+            field_dict["exceedance_probabilities"] = exceedance_probabilities
         if log_marginal_likelihood is not UNSET:
             field_dict["log_marginal_likelihood"] = log_marginal_likelihood
 
@@ -125,6 +172,35 @@ class PosteriorResponse:
 
                 gradients.append(gradients_item)
 
+        _gradient_variances = d.pop("gradient_variances", UNSET)
+        gradient_variances: list[list[float]] | Unset = UNSET
+        if _gradient_variances is not UNSET:
+            gradient_variances = []
+            for gradient_variances_item_data in _gradient_variances:
+                gradient_variances_item = cast(list[float], gradient_variances_item_data)
+
+                gradient_variances.append(gradient_variances_item)
+
+        _samples = d.pop("samples", UNSET)
+        samples: list[list[float]] | Unset = UNSET
+        if _samples is not UNSET:
+            samples = []
+            for samples_item_data in _samples:
+                samples_item = cast(list[float], samples_item_data)
+
+                samples.append(samples_item)
+
+        _quantiles = d.pop("quantiles", UNSET)
+        quantiles: list[list[float]] | Unset = UNSET
+        if _quantiles is not UNSET:
+            quantiles = []
+            for quantiles_item_data in _quantiles:
+                quantiles_item = cast(list[float], quantiles_item_data)
+
+                quantiles.append(quantiles_item)
+
+        exceedance_probabilities = cast(list[float], d.pop("exceedance_probabilities", UNSET))
+
         log_marginal_likelihood = d.pop("log_marginal_likelihood", UNSET)
 
         posterior_response = cls(
@@ -134,6 +210,10 @@ class PosteriorResponse:
             observation_variances=observation_variances,
             covariance=covariance,
             gradients=gradients,
+            gradient_variances=gradient_variances,
+            samples=samples,
+            quantiles=quantiles,
+            exceedance_probabilities=exceedance_probabilities,
             log_marginal_likelihood=log_marginal_likelihood,
         )
 

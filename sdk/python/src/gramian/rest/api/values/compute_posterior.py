@@ -123,9 +123,11 @@ def sync_detailed(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
-    `"solver": "local"`, and beyond the points
-    that are factorized, each query is answered from the points nearest to it, without covariance and
+    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
+    probabilities of exceedance, joint samples and the
+    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
+    query is answered from the points nearest to
+    it, without what takes all points or queries together: covariance, samples, gradient_variances and
     likelihood.
 
     Args:
@@ -163,9 +165,11 @@ def sync(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
-    `"solver": "local"`, and beyond the points
-    that are factorized, each query is answered from the points nearest to it, without covariance and
+    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
+    probabilities of exceedance, joint samples and the
+    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
+    query is answered from the points nearest to
+    it, without what takes all points or queries together: covariance, samples, gradient_variances and
     likelihood.
 
     Args:
@@ -198,9 +202,11 @@ async def asyncio_detailed(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
-    `"solver": "local"`, and beyond the points
-    that are factorized, each query is answered from the points nearest to it, without covariance and
+    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
+    probabilities of exceedance, joint samples and the
+    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
+    query is answered from the points nearest to
+    it, without what takes all points or queries together: covariance, samples, gradient_variances and
     likelihood.
 
     Args:
@@ -236,9 +242,11 @@ async def asyncio(
 
      With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
     posterior mean at the
-    queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With
-    `"solver": "local"`, and beyond the points
-    that are factorized, each query is answered from the points nearest to it, without covariance and
+    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
+    probabilities of exceedance, joint samples and the
+    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
+    query is answered from the points nearest to
+    it, without what takes all points or queries together: covariance, samples, gradient_variances and
     likelihood.
 
     Args:

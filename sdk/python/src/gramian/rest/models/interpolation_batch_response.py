@@ -1,0 +1,252 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+from attrs import field as _attrs_field
+
+from ..types import UNSET, Unset, without_unset
+
+if TYPE_CHECKING:
+    from ..models.diagnostics import Diagnostics
+
+
+T = TypeVar("T", bound="InterpolationBatchResponse")
+
+
+@_attrs_define
+class InterpolationBatchResponse:
+    """The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+
+    Attributes:
+        values (list[list[float]]): For each list u at each query.
+        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
+            well.
+        gradients (list[list[list[float]]] | Unset): For each list ∇u at each query, unit of the values per length; with
+            `derivatives` of 1 or 2.
+        hessians (list[list[list[list[float]]]] | Unset): For each list D²u at each query, unit of the values per length
+            squared; with `derivatives` of 2.
+        value_deviations (list[float] | Unset): Standard deviation of any of the functions at each query given its
+            values, under the kernel as covariance and alpha as variance of the
+            noise; with `deviations`.
+        gradient_deviations (list[list[float]] | Unset): The same for the components of ∇u.
+        hessian_deviations (list[list[list[float]]] | Unset): The same for the entries of D²u.
+        mean_coefficients (list[list[float]] | Unset): For each list the mean of the function: the constant, then a
+            slope for each coordinate if it is linear; absent where it is 0.
+    """
+
+    values: list[list[float]]
+    diagnostics: Diagnostics
+    gradients: list[list[list[float]]] | Unset = UNSET
+    hessians: list[list[list[list[float]]]] | Unset = UNSET
+    value_deviations: list[float] | Unset = UNSET
+    gradient_deviations: list[list[float]] | Unset = UNSET
+    hessian_deviations: list[list[list[float]]] | Unset = UNSET
+    mean_coefficients: list[list[float]] | Unset = UNSET
+    additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        values = []
+        for values_item_data in self.values:
+            values_item = values_item_data
+
+            values.append(values_item)
+
+        diagnostics = self.diagnostics.to_dict()
+
+        gradients: list[list[list[float]]] | Unset = UNSET
+        if not isinstance(self.gradients, Unset):
+            gradients = []
+            for gradients_item_data in self.gradients:
+                gradients_item = []
+                for gradients_item_item_data in gradients_item_data:
+                    gradients_item_item = gradients_item_item_data
+
+                    gradients_item.append(gradients_item_item)
+
+                gradients.append(gradients_item)
+
+        hessians: list[list[list[list[float]]]] | Unset = UNSET
+        if not isinstance(self.hessians, Unset):
+            hessians = []
+            for hessians_item_data in self.hessians:
+                hessians_item = []
+                for hessians_item_item_data in hessians_item_data:
+                    hessians_item_item = []
+                    for hessians_item_item_item_data in hessians_item_item_data:
+                        hessians_item_item_item = hessians_item_item_item_data
+
+                        hessians_item_item.append(hessians_item_item_item)
+
+                    hessians_item.append(hessians_item_item)
+
+                hessians.append(hessians_item)
+
+        value_deviations: list[float] | Unset = UNSET
+        if not isinstance(self.value_deviations, Unset):
+            value_deviations = self.value_deviations
+
+        gradient_deviations: list[list[float]] | Unset = UNSET
+        if not isinstance(self.gradient_deviations, Unset):
+            gradient_deviations = []
+            for gradient_deviations_item_data in self.gradient_deviations:
+                gradient_deviations_item = gradient_deviations_item_data
+
+                gradient_deviations.append(gradient_deviations_item)
+
+        hessian_deviations: list[list[list[float]]] | Unset = UNSET
+        if not isinstance(self.hessian_deviations, Unset):
+            hessian_deviations = []
+            for hessian_deviations_item_data in self.hessian_deviations:
+                hessian_deviations_item = []
+                for hessian_deviations_item_item_data in hessian_deviations_item_data:
+                    hessian_deviations_item_item = hessian_deviations_item_item_data
+
+                    hessian_deviations_item.append(hessian_deviations_item_item)
+
+                hessian_deviations.append(hessian_deviations_item)
+
+        mean_coefficients: list[list[float]] | Unset = UNSET
+        if not isinstance(self.mean_coefficients, Unset):
+            mean_coefficients = []
+            for mean_coefficients_item_data in self.mean_coefficients:
+                mean_coefficients_item = mean_coefficients_item_data
+
+                mean_coefficients.append(mean_coefficients_item)
+
+        field_dict: dict[str, Any] = {}
+        field_dict.update(self.additional_properties)
+        field_dict.update(
+            {
+                "values": values,
+                "diagnostics": diagnostics,
+            }
+        )
+        if gradients is not UNSET:
+            field_dict["gradients"] = gradients
+        if hessians is not UNSET:
+            field_dict["hessians"] = hessians
+        if value_deviations is not UNSET:
+            field_dict["value_deviations"] = value_deviations
+        if gradient_deviations is not UNSET:
+            field_dict["gradient_deviations"] = gradient_deviations
+        if hessian_deviations is not UNSET:
+            field_dict["hessian_deviations"] = hessian_deviations
+        if mean_coefficients is not UNSET:
+            field_dict["mean_coefficients"] = mean_coefficients
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.diagnostics import Diagnostics
+
+        d = dict(src_dict)
+        values = []
+        _values = d.pop("values")
+        for values_item_data in _values:
+            values_item = cast(list[float], values_item_data)
+
+            values.append(values_item)
+
+        diagnostics = Diagnostics.from_dict(d.pop("diagnostics"))
+
+        _gradients = d.pop("gradients", UNSET)
+        gradients: list[list[list[float]]] | Unset = UNSET
+        if _gradients is not UNSET:
+            gradients = []
+            for gradients_item_data in _gradients:
+                gradients_item = []
+                _gradients_item = gradients_item_data
+                for gradients_item_item_data in _gradients_item:
+                    gradients_item_item = cast(list[float], gradients_item_item_data)
+
+                    gradients_item.append(gradients_item_item)
+
+                gradients.append(gradients_item)
+
+        _hessians = d.pop("hessians", UNSET)
+        hessians: list[list[list[list[float]]]] | Unset = UNSET
+        if _hessians is not UNSET:
+            hessians = []
+            for hessians_item_data in _hessians:
+                hessians_item = []
+                _hessians_item = hessians_item_data
+                for hessians_item_item_data in _hessians_item:
+                    hessians_item_item = []
+                    _hessians_item_item = hessians_item_item_data
+                    for hessians_item_item_item_data in _hessians_item_item:
+                        hessians_item_item_item = cast(list[float], hessians_item_item_item_data)
+
+                        hessians_item_item.append(hessians_item_item_item)
+
+                    hessians_item.append(hessians_item_item)
+
+                hessians.append(hessians_item)
+
+        value_deviations = cast(list[float], d.pop("value_deviations", UNSET))
+
+        _gradient_deviations = d.pop("gradient_deviations", UNSET)
+        gradient_deviations: list[list[float]] | Unset = UNSET
+        if _gradient_deviations is not UNSET:
+            gradient_deviations = []
+            for gradient_deviations_item_data in _gradient_deviations:
+                gradient_deviations_item = cast(list[float], gradient_deviations_item_data)
+
+                gradient_deviations.append(gradient_deviations_item)
+
+        _hessian_deviations = d.pop("hessian_deviations", UNSET)
+        hessian_deviations: list[list[list[float]]] | Unset = UNSET
+        if _hessian_deviations is not UNSET:
+            hessian_deviations = []
+            for hessian_deviations_item_data in _hessian_deviations:
+                hessian_deviations_item = []
+                _hessian_deviations_item = hessian_deviations_item_data
+                for hessian_deviations_item_item_data in _hessian_deviations_item:
+                    hessian_deviations_item_item = cast(list[float], hessian_deviations_item_item_data)
+
+                    hessian_deviations_item.append(hessian_deviations_item_item)
+
+                hessian_deviations.append(hessian_deviations_item)
+
+        _mean_coefficients = d.pop("mean_coefficients", UNSET)
+        mean_coefficients: list[list[float]] | Unset = UNSET
+        if _mean_coefficients is not UNSET:
+            mean_coefficients = []
+            for mean_coefficients_item_data in _mean_coefficients:
+                mean_coefficients_item = cast(list[float], mean_coefficients_item_data)
+
+                mean_coefficients.append(mean_coefficients_item)
+
+        interpolation_batch_response = cls(
+            values=values,
+            diagnostics=diagnostics,
+            gradients=gradients,
+            hessians=hessians,
+            value_deviations=value_deviations,
+            gradient_deviations=gradient_deviations,
+            hessian_deviations=hessian_deviations,
+            mean_coefficients=mean_coefficients,
+        )
+
+        interpolation_batch_response.additional_properties = d
+        return interpolation_batch_response
+
+    @property
+    def additional_keys(self) -> list[str]:
+        return list(self.additional_properties.keys())
+
+    def __getitem__(self, key: str) -> Any:
+        return self.additional_properties[key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.additional_properties[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        del self.additional_properties[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.additional_properties

@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+from attrs import define as _attrs_define
+
+from ..models.duplicate_policy import DuplicatePolicy
+from ..models.kernel_family import KernelFamily
+from ..models.mean_choice import MeanChoice
+from ..models.selection_criterion import SelectionCriterion
+from ..models.solver_choice import SolverChoice
+from ..types import UNSET, Unset, without_unset
+
+if TYPE_CHECKING:
+    from ..models.cloud_ref import CloudRef
+    from ..models.free_parameter import FreeParameter
+    from ..models.kernel import Kernel
+
+
+T = TypeVar("T", bound="ModelSelectionRequest")
+
+
+@_attrs_define
+class ModelSelectionRequest:
+    """Values at the points of a cloud, and what may be chosen to explain them. The search begins with `kernel` and
+    `alpha`.
+
+        Attributes:
+            cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+            values (list[float]): The values at the points, in their order.
+            kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
+                another family is refused.
+            alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
+                interpolates, the variance
+                of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
+                likelihood, or
+                chosen by the noise of the points of a surface, 1e-3 at least.
+            noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
+                list counts as absent.
+            solver (SolverChoice | Unset): How the linear system is solved.
+            duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
+            mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
+                the points.
+            criterion (SelectionCriterion | Unset): What is made as great as possible.
+            vary (list[FreeParameter] | Unset): What is free, and its bounds. Absent: length scale, variance and, unless
+                noise is given for each point, alpha, from a hundredth (a millionth for
+                alpha) to a hundred times of where the search begins.
+            families (list[KernelFamily] | Unset): Families to try, with the parameters of `kernel` where it is of that
+                family; that of the start alone if absent.
+            restarts (int | Unset): Further starts for each family, spread over the bounds; 2 if absent.
+            seed (int | Unset): Where the further starts are; 0 if absent.
+    """
+
+    cloud: CloudRef
+    values: list[float]
+    kernel: Kernel | Unset = UNSET
+    alpha: float | Unset = UNSET
+    noise_variances: list[float] | Unset = UNSET
+    solver: SolverChoice | Unset = UNSET
+    duplicates: DuplicatePolicy | Unset = UNSET
+    mean: MeanChoice | Unset = UNSET
+    criterion: SelectionCriterion | Unset = UNSET
+    vary: list[FreeParameter] | Unset = UNSET
+    families: list[KernelFamily] | Unset = UNSET
+    restarts: int | Unset = UNSET
+    seed: int | Unset = UNSET
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        cloud = self.cloud.to_dict()
+
+        values = self.values
+
+        kernel: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.kernel, Unset):
+            kernel = self.kernel.to_dict()
+
+        alpha = self.alpha
+
+        noise_variances: list[float] | Unset = UNSET
+        if not isinstance(self.noise_variances, Unset):
+            noise_variances = self.noise_variances
+
+        solver: str | Unset = UNSET
+        if not isinstance(self.solver, Unset):
+            solver = self.solver.value
+
+        duplicates: str | Unset = UNSET
+        if not isinstance(self.duplicates, Unset):
+            duplicates = self.duplicates.value
+
+        mean: str | Unset = UNSET
+        if not isinstance(self.mean, Unset):
+            mean = self.mean.value
+
+        criterion: str | Unset = UNSET
+        if not isinstance(self.criterion, Unset):
+            criterion = self.criterion.value
+
+        vary: list[dict[str, Any]] | Unset = UNSET
+        if not isinstance(self.vary, Unset):
+            vary = []
+            for vary_item_data in self.vary:
+                vary_item = vary_item_data.to_dict()
+                vary.append(vary_item)
+
+        families: list[str] | Unset = UNSET
+        if not isinstance(self.families, Unset):
+            families = []
+            for families_item_data in self.families:
+                families_item = families_item_data.value
+                families.append(families_item)
+
+        restarts = self.restarts
+
+        seed = self.seed
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "cloud": cloud,
+                "values": values,
+            }
+        )
+        if kernel is not UNSET:
+            field_dict["kernel"] = kernel
+        if alpha is not UNSET:
+            field_dict["alpha"] = alpha
+        if noise_variances is not UNSET:
+            field_dict["noise_variances"] = noise_variances
+        if solver is not UNSET:
+            field_dict["solver"] = solver
+        if duplicates is not UNSET:
+            field_dict["duplicates"] = duplicates
+        if mean is not UNSET:
+            field_dict["mean"] = mean
+        if criterion is not UNSET:
+            field_dict["criterion"] = criterion
+        if vary is not UNSET:
+            field_dict["vary"] = vary
+        if families is not UNSET:
+            field_dict["families"] = families
+        if restarts is not UNSET:
+            field_dict["restarts"] = restarts
+        if seed is not UNSET:
+            field_dict["seed"] = seed
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        from ..models.cloud_ref import CloudRef
+        from ..models.free_parameter import FreeParameter
+        from ..models.kernel import Kernel
+
+        d = dict(src_dict)
+        cloud = CloudRef.from_dict(d.pop("cloud"))
+
+        values = cast(list[float], d.pop("values"))
+
+        _kernel = d.pop("kernel", UNSET)
+        kernel: Kernel | Unset
+        if isinstance(_kernel, Unset):
+            kernel = UNSET
+        else:
+            kernel = Kernel.from_dict(_kernel)
+
+        alpha = d.pop("alpha", UNSET)
+
+        noise_variances = cast(list[float], d.pop("noise_variances", UNSET))
+
+        _solver = d.pop("solver", UNSET)
+        solver: SolverChoice | Unset
+        if isinstance(_solver, Unset):
+            solver = UNSET
+        else:
+            solver = SolverChoice(_solver)
+
+        _duplicates = d.pop("duplicates", UNSET)
+        duplicates: DuplicatePolicy | Unset
+        if isinstance(_duplicates, Unset):
+            duplicates = UNSET
+        else:
+            duplicates = DuplicatePolicy(_duplicates)
+
+        _mean = d.pop("mean", UNSET)
+        mean: MeanChoice | Unset
+        if isinstance(_mean, Unset):
+            mean = UNSET
+        else:
+            mean = MeanChoice(_mean)
+
+        _criterion = d.pop("criterion", UNSET)
+        criterion: SelectionCriterion | Unset
+        if isinstance(_criterion, Unset):
+            criterion = UNSET
+        else:
+            criterion = SelectionCriterion(_criterion)
+
+        _vary = d.pop("vary", UNSET)
+        vary: list[FreeParameter] | Unset = UNSET
+        if _vary is not UNSET:
+            vary = []
+            for vary_item_data in _vary:
+                vary_item = FreeParameter.from_dict(vary_item_data)
+
+                vary.append(vary_item)
+
+        _families = d.pop("families", UNSET)
+        families: list[KernelFamily] | Unset = UNSET
+        if _families is not UNSET:
+            families = []
+            for families_item_data in _families:
+                families_item = KernelFamily(families_item_data)
+
+                families.append(families_item)
+
+        restarts = d.pop("restarts", UNSET)
+
+        seed = d.pop("seed", UNSET)
+
+        model_selection_request = cls(
+            cloud=cloud,
+            values=values,
+            kernel=kernel,
+            alpha=alpha,
+            noise_variances=noise_variances,
+            solver=solver,
+            duplicates=duplicates,
+            mean=mean,
+            criterion=criterion,
+            vary=vary,
+            families=families,
+            restarts=restarts,
+            seed=seed,
+        )
+
+        return model_selection_request

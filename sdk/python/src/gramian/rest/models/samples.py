@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self, TypeVar
+
+from attrs import define as _attrs_define
+
+from ..types import UNSET, Unset, without_unset
+
+T = TypeVar("T", bound="Samples")
+
+
+@_attrs_define
+class Samples:
+    """How many functions to draw from the posterior, and which.
+
+    Attributes:
+        count (int): Functions to draw.
+        seed (int | Unset): Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+    """
+
+    count: int
+    seed: int | Unset = UNSET
+
+    __repr__ = without_unset
+
+    def to_dict(self) -> dict[str, Any]:
+        count = self.count
+
+        seed = self.seed
+
+        field_dict: dict[str, Any] = {}
+
+        field_dict.update(
+            {
+                "count": count,
+            }
+        )
+        if seed is not UNSET:
+            field_dict["seed"] = seed
+
+        return field_dict
+
+    @classmethod
+    def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
+        d = dict(src_dict)
+        count = d.pop("count")
+
+        seed = d.pop("seed", UNSET)
+
+        samples = cls(
+            count=count,
+            seed=seed,
+        )
+
+        return samples

@@ -1,0 +1,289 @@
+//! From what a request leaves free to the search of the numerics, and its outcome.
+
+use std::sync::Arc;
+
+use super::{
+    FamilyScore, FreeParameter, LeftOut, ModelSelectionRequest, ModelSelectionResponse, N_ALPHAS, PathEntry,
+    SelectionCriterion, SelectionParameter,
+};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{KernelFamily, KernelUsed};
+use crate::http::problem::Problem;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::plan::FitModel;
+use crate::http::wire::write::array::Array;
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
+use crate::numerics::selection::{
+    Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Parameter, Selected, Selection, Variation,
+    alpha_path, alpha_path_price, default_alphas, expected_evaluations, leave_one_out_price,
+    leave_one_out_with, select, selection_price,
+};
+use crate::numerics::solver::choose::Price;
+use crate::numerics::solver::trend::Trend;
+use crate::numerics::sums::regularization::Regularization;
+
+/// Further starts where nothing is said of them.
+const RESTARTS: u8 = 2;
+const MAX_RESTARTS: u8 = 100;
+
+/// Without `vary`: how far from the start length scale and variance may go, and alpha downwards.
+const RANGE: f64 = 100.0;
+const RANGE_OF_ALPHA: f64 = 1e6;
+
+/// What is searched, as far as the request says.
+pub struct Search {
+    criterion: Criterion,
+    vary: Option<Vec<FreeParameter>>,
+    /// ν at most and at least, as orders.
+    orders: Option<(u8, u8)>,
+    families: Vec<KernelFamily>,
+    restarts: usize,
+    seed: u64,
+}
+
+/// A checked request.
+pub struct Work {
+    pub(super) values: Arc<Vec<f64>>,
+    pub(super) search: Search,
+}
+
+impl Search {
+    /// # Errors
+    /// 422 for bounds and restarts that are none.
+    pub(super) fn of(request: &ModelSelectionRequest) -> Result<Self, Problem> {
+        let restarts = request.restarts.unwrap_or(RESTARTS);
+        if restarts > MAX_RESTARTS {
+            let detail = format!("restarts must be at most {MAX_RESTARTS}");
+            return Err(Problem::invalid_request("/restarts", detail));
+        }
+        let families = request.families.clone().unwrap_or_default();
+        if let Some(at) = (1..families.len()).find(|&at| families[..at].contains(&families[at])) {
+            return Err(Problem::invalid_request(format!("/families/{at}"), "a family is tried once"));
+        }
+        Ok(Self {
+            criterion: match request.criterion.unwrap_or_default() {
+                SelectionCriterion::MarginalLikelihood => Criterion::MarginalLikelihood,
+                SelectionCriterion::LeaveOneOut => Criterion::LeaveOneOut,
+                SelectionCriterion::GeneralizedCrossValidation => Criterion::GeneralizedCrossValidation,
+            },
+            orders: orders(request.vary.as_deref().unwrap_or_default())?,
+            vary: request.vary.clone(),
+            families,
+            restarts: usize::from(restarts),
+            seed: request.seed.unwrap_or_default(),
+        })
+    }
+
+    /// What the search takes, where it takes as long as it mostly does.
+    pub(super) fn price(&self, n: usize, d: usize) -> Price {
+        let n_free = self.vary.as_ref().map_or(3, Vec::len);
+        let n_families = self.families.len().max(1) + self.orders.map_or(0, |(a, b)| usize::from(b - a));
+        let n_descents = n_families * (1 + self.restarts);
+        let n_evaluations = n_descents * expected_evaluations(n_free);
+        let threads = (n_descents, rayon::current_num_threads());
+        selection_price((n, d), self.criterion, n_free, n_evaluations, threads)
+            .and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS))
+            .and(leave_one_out_price(n, 1 + d))
+    }
+
+    /// The families that are tried, from that of the start.
+    fn families(&self, start: Family) -> Vec<Family> {
+        let given = |family: &KernelFamily| match (family, start) {
+            (KernelFamily::Gauss, _) => vec![Family::Gauss],
+            (KernelFamily::InverseMultiquadric, _) => vec![Family::InverseMultiquadric],
+            (KernelFamily::Laplace, Family::Laplace { .. })
+            | (KernelFamily::Wendland, Family::Wendland { .. }) => {
+                vec![start]
+            }
+            (KernelFamily::Laplace, _) => vec![Family::Laplace { epsilon: 0.0 }],
+            (KernelFamily::Wendland, _) => vec![Family::Wendland { smoothness: WendlandSmoothness::C4 }],
+            (KernelFamily::Matern, _) => self.matern(start),
+        };
+        match self.families.is_empty() {
+            true if matches!(start, Family::Matern { .. }) => self.matern(start),
+            true => vec![start],
+            false => self.families.iter().flat_map(given).collect(),
+        }
+    }
+
+    fn matern(&self, start: Family) -> Vec<Family> {
+        match (self.orders, start) {
+            (Some((least, most)), _) => (least..=most).map(|order| Family::Matern { order }).collect(),
+            (None, Family::Matern { .. }) => vec![start],
+            (None, _) => vec![Family::Matern { order: 2 }],
+        }
+    }
+
+    /// What is free, with the place that each has in the request.
+    fn variations(&self, start: &Hyperparameters) -> Vec<(usize, Variation)> {
+        let Some(vary) = &self.vary else { return default_variations(start) };
+        let variation = |(at, free): (usize, &FreeParameter)| {
+            let parameter = match free.parameter {
+                SelectionParameter::LengthScale => Parameter::LengthScale,
+                SelectionParameter::Variance => Parameter::Variance,
+                SelectionParameter::Alpha => Parameter::Alpha,
+                SelectionParameter::Epsilon => Parameter::Epsilon,
+                SelectionParameter::Nu => return None,
+            };
+            Some((at, Variation { parameter, min: free.min, max: free.max }))
+        };
+        vary.iter().enumerate().filter_map(variation).collect()
+    }
+}
+
+/// Length scale, variance and noise about the start.
+fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
+    let about = |parameter, x: f64, below: f64| Variation { parameter, min: x / below, max: x * RANGE };
+    let length_scale = start.length_scales.first().copied().unwrap_or(1.0);
+    let mut variations = vec![
+        about(Parameter::LengthScale, length_scale, RANGE),
+        about(Parameter::Variance, start.variance, RANGE),
+    ];
+    if let Regularization::Uniform(alpha) = start.noise {
+        // A start without noise says nothing of how much there may be.
+        let alpha = alpha.max(start.variance / RANGE_OF_ALPHA);
+        variations.push(about(Parameter::Alpha, alpha, RANGE_OF_ALPHA));
+    }
+    variations.into_iter().enumerate().collect()
+}
+
+/// The orders ν − ½ within bounds on ν.
+fn orders(vary: &[FreeParameter]) -> Result<Option<(u8, u8)>, Problem> {
+    let is_nu = |free: &FreeParameter| free.parameter == SelectionParameter::Nu;
+    let Some(at) = vary.iter().position(is_nu) else { return Ok(None) };
+    let FreeParameter { min, max, .. } = vary[at];
+    let (least, most) = ((min - 0.5).ceil(), (max - 0.5).floor());
+    let is_twice = vary[at + 1..].iter().any(is_nu);
+    if is_twice || !(0.0 <= least && least <= most && most <= f64::from(MAX_MATERN_ORDER)) {
+        let detail = "nu varies once, between 0.5 and 8.5, over at least one of 0.5, 1.5, ..., 8.5";
+        return Err(Problem::invalid_request(format!("/vary/{at}"), detail));
+    }
+    Ok(Some((least as u8, most as u8)))
+}
+
+impl Work {
+    /// # Errors
+    /// What the numerics refuses as a [`Problem`].
+    pub(super) fn run(self, fits: &Fits, observer: &JobObserver) -> Result<ModelSelectionResponse, Problem> {
+        let Self { values, search } = self;
+        let plan = &fits.main.plan;
+        let FitModel::Dense { kernel, regularization } = &plan.model else { return Err(Problem::internal()) };
+        let interpolant = fits.interpolant(&values, observer)?;
+        let diagnostics = fits.main.diagnostics(&interpolant.solution, plan.stored.cloud.n_points())?;
+        let start = scaled(kernel, regularization, plan.scale).map_err(|error| plan.refused(error))?;
+        let variations = search.variations(&start);
+        let vary: Vec<Variation> = variations.iter().map(|(_, variation)| *variation).collect();
+        let merged = fits.main.merged(&values);
+        let (cloud, mean) = (&*plan.fitted, plan.mean);
+        let selection = Selection {
+            cloud,
+            values: &merged,
+            mean,
+            criterion: search.criterion,
+            start: &start,
+            vary: &vary,
+            families: &search.families(start.family),
+            restarts: search.restarts,
+            seed: search.seed,
+            max_evaluations: MAX_EVALUATIONS,
+        };
+        // The numerics counts what it was given; the request may have nu in between.
+        let refused = |error| match error {
+            NumericsError::InvalidVariation { entry, requirement } => {
+                let entry = variations.get(entry).map_or(entry, |(at, _)| *at);
+                plan.refused(NumericsError::InvalidVariation { entry, requirement })
+            }
+            other => plan.refused(other),
+        };
+        let selected = select(&selection, observer).map_err(refused)?;
+        let left_out = leave_one_out_with((cloud, &merged, mean), &selected.hyperparameters, observer);
+        let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
+        let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
+        let mut gradient = vec![None; n_given];
+        for ((at, _), slope) in variations.iter().zip(&selected.gradient) {
+            gradient[*at] = Some(*slope);
+        }
+        let Hyperparameters { family, length_scales, variance, noise } = &selected.hyperparameters;
+        let length_scale = length_scales.first().copied().unwrap_or(1.0);
+        let kernel = Kernel::new(*family, length_scale, *variance).map_err(refused)?;
+        Ok(ModelSelectionResponse {
+            kernel: KernelUsed::from(&kernel),
+            alpha: match noise {
+                Regularization::Uniform(alpha) => Some(*alpha),
+                Regularization::PerPoint(_) => None,
+            },
+            mean_coefficients: selected.trend.as_ref().map(Trend::of_coordinates).map(|coefficients| {
+                let p = coefficients.len();
+                Array::new(coefficients, &[p])
+            }),
+            score: selected.score,
+            gradient,
+            converged: selected.converged,
+            evaluations: selected.evaluations,
+            families: family_scores(&selected),
+            path,
+            leave_one_out: left_out.map_err(refused)?.into(),
+            diagnostics,
+        })
+    }
+}
+
+/// Where the search begins: kernel and noise in the unit of the values.
+fn scaled(
+    kernel: &Kernel,
+    regularization: &Regularization,
+    scale: f64,
+) -> Result<Hyperparameters, NumericsError> {
+    let kernel = Kernel::new(kernel.family(), kernel.length_scale(), kernel.variance() * scale)?;
+    let noise = match regularization {
+        Regularization::Uniform(alpha) => Regularization::uniform(alpha * scale)?,
+        // Noise per point is never scaled.
+        per_point @ Regularization::PerPoint(_) => per_point.clone(),
+    };
+    Ok(Hyperparameters::of(&kernel, noise))
+}
+
+/// The criterion over α at what was selected; none with noise per point.
+fn path(
+    selection: &Selection<'_>,
+    at: &Hyperparameters,
+    observer: &JobObserver,
+) -> Result<Vec<PathEntry>, NumericsError> {
+    if !matches!(at.noise, Regularization::Uniform(_)) {
+        return Ok(Vec::new());
+    }
+    let Selection { cloud, values, mean, criterion, .. } = *selection;
+    let (_, kernel) = at.stretched(cloud)?;
+    let alphas = default_alphas(cloud.n_points(), &kernel, N_ALPHAS);
+    let scores = alpha_path((cloud, values, mean), at, &alphas, criterion, observer)?;
+    let entry = |(&alpha, score): (&f64, f64)| PathEntry {
+        alpha,
+        score: Some(score).filter(|score| score.is_finite()),
+    };
+    Ok(alphas.iter().zip(scores).map(entry).collect())
+}
+
+fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
+    let one = |&(family, score): &(Family, Option<f64>)| {
+        let (family, nu) = match family {
+            Family::Gauss => (KernelFamily::Gauss, None),
+            Family::Laplace { .. } => (KernelFamily::Laplace, None),
+            Family::Matern { order } => (KernelFamily::Matern, Some(f64::from(order) + 0.5)),
+            Family::Wendland { .. } => (KernelFamily::Wendland, None),
+            Family::InverseMultiquadric => (KernelFamily::InverseMultiquadric, None),
+        };
+        FamilyScore { family, nu, score }
+    };
+    selected.families.iter().map(one).collect()
+}
+
+impl From<LeaveOneOut> for LeftOut {
+    fn from(found: LeaveOneOut) -> Self {
+        Self {
+            means: found.means,
+            variances: found.observation_variances,
+            log_predictive_densities: found.log_predictive_densities,
+        }
+    }
+}
