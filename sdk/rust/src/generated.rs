@@ -569,6 +569,23 @@ answer has them yet.*/
             value.parse()
         }
     }
+    ///The best score of a family.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct FamilyScore {
+        ///The kernel family, with ν where it is Matérn.
+        pub family: KernelFamily,
+        ///matern: the smoothness ν.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub nu: ::std::option::Option<f64>,
+        ///Its best score; null where the matrix was not positive definite from any start.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub score: ::std::option::Option<f64>,
+    }
+    impl FamilyScore {
+        pub fn builder() -> builder::FamilyScore {
+            Default::default()
+        }
+    }
     ///One field of the request that was refused.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct FieldError {
@@ -579,6 +596,22 @@ answer has them yet.*/
     }
     impl FieldError {
         pub fn builder() -> builder::FieldError {
+            Default::default()
+        }
+    }
+    ///A parameter that is free between bounds.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct FreeParameter {
+        ///The greatest that it may be.
+        pub max: f64,
+        ///The least that it may be.
+        pub min: f64,
+        ///Which.
+        pub parameter: SelectionParameter,
+    }
+    impl FreeParameter {
+        pub fn builder() -> builder::FreeParameter {
             Default::default()
         }
     }
@@ -670,6 +703,84 @@ the request.*/
     }
     impl Health {
         pub fn builder() -> builder::Health {
+            Default::default()
+        }
+    }
+    ///Many lists of values at the points of a cloud, and where the functions through them are wanted.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct InterpolationBatchRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub derivatives: ::std::option::Option<i32>,
+        ///What to do with points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///What is wanted beside what was asked for; nothing if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<ValuesInclude>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of each function; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the linear system is solved.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+        ///Lists of values, one per point each, in their order. They have kernel and noise in common.
+        pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
+    }
+    impl InterpolationBatchRequest {
+        pub fn builder() -> builder::InterpolationBatchRequest {
+            Default::default()
+        }
+    }
+    ///The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct InterpolationBatchResponse {
+        ///How the answer came about; `relative_residual` is the greatest of all lists.
+        pub diagnostics: Diagnostics,
+        ///The same for the components of ∇u.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradient_deviations: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///For each list ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradients: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        ///The same for the entries of D²u.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub hessian_deviations: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        ///For each list D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub hessians: ::std::vec::Vec<
+            ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        >,
+        ///For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_coefficients: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        /**Standard deviation of any of the functions at each query given its values, under the kernel as covariance and alpha as variance of the
+noise; with `deviations`.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub value_deviations: ::std::vec::Vec<f64>,
+        ///For each list u at each query.
+        pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
+    }
+    impl InterpolationBatchResponse {
+        pub fn builder() -> builder::InterpolationBatchResponse {
             Default::default()
         }
     }
@@ -1090,6 +1201,21 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
+    ///What each value is predicted to be from all others.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct LeftOut {
+        ///The logarithms of the densities of the values under their predictions.
+        pub log_predictive_densities: ::std::vec::Vec<f64>,
+        ///The predictions, in the order of the points.
+        pub means: ::std::vec::Vec<f64>,
+        ///The variances of the values predicted, their noise included.
+        pub variances: ::std::vec::Vec<f64>,
+    }
+    impl LeftOut {
+        pub fn builder() -> builder::LeftOut {
+            Default::default()
+        }
+    }
     ///How a matrix is written.
     #[derive(
         ::serde::Deserialize,
@@ -1198,6 +1324,90 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value: ::std::string::String,
         ) -> ::std::result::Result<Self, self::error::ConversionError> {
             value.parse()
+        }
+    }
+    ///Values at the points of a cloud, and what may be chosen to explain them. The search begins with `kernel` and `alpha`.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct ModelSelectionRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///What is made as great as possible; the marginal likelihood if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub criterion: ::std::option::Option<SelectionCriterion>,
+        ///What to do with points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub families: ::std::vec::Vec<KernelFamily>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of the function; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///Further starts for each family, spread over the bounds; 2 if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub restarts: ::std::option::Option<i32>,
+        ///Where the further starts are; 0 if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub seed: ::std::option::Option<i64>,
+        ///How the linear system is solved.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+        ///The values at the points, in their order.
+        pub values: ::std::vec::Vec<f64>,
+        /**What is free, and its bounds. Absent: length scale, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
+alpha) to a hundred times of where the search begins.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub vary: ::std::vec::Vec<FreeParameter>,
+    }
+    impl ModelSelectionRequest {
+        pub fn builder() -> builder::ModelSelectionRequest {
+            Default::default()
+        }
+    }
+    ///What explains the values best.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct ModelSelectionResponse {
+        ///The variance of the noise that was selected; absent with `noise_variances`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///Whether no slope is left to follow within the bounds.
+        pub converged: bool,
+        ///Of the fit that the search began with.
+        pub diagnostics: Diagnostics,
+        ///How often the criterion was evaluated.
+        pub evaluations: u64,
+        ///The families that were tried.
+        pub families: ::std::vec::Vec<FamilyScore>,
+        ///Derivatives of the score in the logarithms of what is free, in the order of `vary`; null for nu, which takes steps.
+        pub gradient: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///The kernel that was selected: sent as `kernel` it is used.
+        pub kernel: KernelUsed,
+        ///Each value predicted from all others, in closed form.
+        pub leave_one_out: LeftOut,
+        ///The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_coefficients: ::std::vec::Vec<f64>,
+        ///The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`.
+        pub path: ::std::vec::Vec<PathEntry>,
+        ///The criterion there; greater is better.
+        pub score: f64,
+    }
+    impl ModelSelectionResponse {
+        pub fn builder() -> builder::ModelSelectionResponse {
+            Default::default()
         }
     }
     ///A cloud that samples a hypersurface, and where its normals are wanted.
@@ -1322,6 +1532,113 @@ there is no answer or none is known.*/
             value.parse()
         }
     }
+    ///The criterion at one alpha, all else being as it was selected.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct PathEntry {
+        ///α.
+        pub alpha: f64,
+        ///The score; null where the matrix is not positive definite.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub score: ::std::option::Option<f64>,
+    }
+    impl PathEntry {
+        pub fn builder() -> builder::PathEntry {
+            Default::default()
+        }
+    }
+    ///Many lists of noisy values at the points of a cloud, and where their posteriors are wanted.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct PosteriorBatchRequest {
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
+of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
+chosen by the noise of the points of a surface, 1e-3 at least.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub alpha: ::std::option::Option<f64>,
+        ///The points where values are known, or that sample the surface.
+        pub cloud: CloudRef,
+        ///What to do with points that coincide when alpha is 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub duplicates: ::std::option::Option<DuplicatePolicy>,
+        ///What is wanted beside the means; nothing if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub include: ::std::vec::Vec<PosteriorQuantity>,
+        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
+they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub kernel: ::std::option::Option<Kernel>,
+        ///The mean of each process; a constant if absent with the kernel, else 0.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub mean: ::std::option::Option<MeanChoice>,
+        ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub noise_variances: ::std::vec::Vec<f64>,
+        ///Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted; none if absent. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub quantiles: ::std::vec::Vec<f64>,
+        ///Where answers are wanted; the points of the cloud if absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///Draws of each latent function at all queries together; none if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub samples: ::std::option::Option<Samples>,
+        ///How the linear system is solved.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub solver: ::std::option::Option<SolverChoice>,
+        ///What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub threshold: ::std::option::Option<f64>,
+        ///Lists of observed values, one per point each, in their order. They have kernel and noise in common.
+        pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
+    }
+    impl PosteriorBatchRequest {
+        pub fn builder() -> builder::PosteriorBatchRequest {
+            Default::default()
+        }
+    }
+    ///The Gaussian processes given the values. Lists of values have their own rows in what depends on values; the rest they share.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct PosteriorBatchResponse {
+        ///The covariance of the latent functions between queries.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub covariance: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///How the answer came about; `relative_residual` is the greatest of all lists.
+        pub diagnostics: Diagnostics,
+        ///For each list the probability that a new observation exceeds `threshold`, at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub exceedance_probabilities: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///The variances of the components of the latent functions' gradients at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradient_variances: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///For each list the gradient of the mean at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradients: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        ///For each list −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub log_marginal_likelihoods: ::std::vec::Vec<f64>,
+        ///For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub mean_coefficients: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///For each list the posterior mean at each query.
+        pub means: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///The variance of a new observation at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub observation_variances: ::std::vec::Vec<f64>,
+        ///For each list quantiles of the latent function, one row for each probability, a number per query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub quantiles: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        ///For each list draws of the latent function, one row each, a number per query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub samples: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+        ///The variance of the latent functions at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub variances: ::std::vec::Vec<f64>,
+    }
+    impl PosteriorBatchResponse {
+        pub fn builder() -> builder::PosteriorBatchResponse {
+            Default::default()
+        }
+    }
     ///What may be asked of a posterior beside its mean.
     #[derive(
         ::serde::Deserialize,
@@ -1344,6 +1661,8 @@ there is no answer or none is known.*/
         Covariance,
         #[serde(rename = "gradients")]
         Gradients,
+        #[serde(rename = "gradient_variances")]
+        GradientVariances,
         #[serde(rename = "log_marginal_likelihood")]
         LogMarginalLikelihood,
     }
@@ -1354,6 +1673,7 @@ there is no answer or none is known.*/
                 Self::ObservationVariance => f.write_str("observation_variance"),
                 Self::Covariance => f.write_str("covariance"),
                 Self::Gradients => f.write_str("gradients"),
+                Self::GradientVariances => f.write_str("gradient_variances"),
                 Self::LogMarginalLikelihood => f.write_str("log_marginal_likelihood"),
             }
         }
@@ -1368,6 +1688,7 @@ there is no answer or none is known.*/
                 "observation_variance" => Ok(Self::ObservationVariance),
                 "covariance" => Ok(Self::Covariance),
                 "gradients" => Ok(Self::Gradients),
+                "gradient_variances" => Ok(Self::GradientVariances),
                 "log_marginal_likelihood" => Ok(Self::LogMarginalLikelihood),
                 _ => Err("invalid value".into()),
             }
@@ -1416,12 +1737,21 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
+        ///Probabilities between 0 and 1 of which the quantiles of the latent function are wanted; none if absent. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub quantiles: ::std::vec::Vec<f64>,
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///Draws of the latent function at all queries together; none if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub samples: ::std::option::Option<Samples>,
         ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
+        ///What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub threshold: ::std::option::Option<f64>,
         ///The observed values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
     }
@@ -1438,6 +1768,12 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         pub covariance: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///How the answer came about.
         pub diagnostics: Diagnostics,
+        ///The probability that a new observation exceeds `threshold`, at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub exceedance_probabilities: ::std::vec::Vec<f64>,
+        ///The variances of the components of the latent function's gradient at each query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub gradient_variances: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The gradient of the mean at each query, unit of the values per length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<f64>>,
@@ -1449,6 +1785,12 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The variance of a new observation at each query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub observation_variances: ::std::vec::Vec<f64>,
+        ///Quantiles of the latent function, one row for each probability, a number per query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub quantiles: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        ///Draws of the latent function, one row each, a number per query.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub samples: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The variance of the latent function at each query, no noise added, unit of the values squared.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub variances: ::std::vec::Vec<f64>,
@@ -1491,6 +1833,149 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     impl Problem {
         pub fn builder() -> builder::Problem {
             Default::default()
+        }
+    }
+    ///How many functions to draw from the posterior, and which.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    #[serde(deny_unknown_fields)]
+    pub struct Samples {
+        ///Functions to draw.
+        pub count: ::std::num::NonZeroU64,
+        ///Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub seed: ::std::option::Option<i64>,
+    }
+    impl Samples {
+        pub fn builder() -> builder::Samples {
+            Default::default()
+        }
+    }
+    ///What is made as great as possible.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum SelectionCriterion {
+        #[serde(rename = "marginal_likelihood")]
+        MarginalLikelihood,
+        #[serde(rename = "leave_one_out")]
+        LeaveOneOut,
+        #[serde(rename = "generalized_cross_validation")]
+        GeneralizedCrossValidation,
+    }
+    impl ::std::fmt::Display for SelectionCriterion {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::MarginalLikelihood => f.write_str("marginal_likelihood"),
+                Self::LeaveOneOut => f.write_str("leave_one_out"),
+                Self::GeneralizedCrossValidation => {
+                    f.write_str("generalized_cross_validation")
+                }
+            }
+        }
+    }
+    impl ::std::str::FromStr for SelectionCriterion {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "marginal_likelihood" => Ok(Self::MarginalLikelihood),
+                "leave_one_out" => Ok(Self::LeaveOneOut),
+                "generalized_cross_validation" => Ok(Self::GeneralizedCrossValidation),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for SelectionCriterion {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for SelectionCriterion {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    ///What may be free.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum SelectionParameter {
+        #[serde(rename = "length_scale")]
+        LengthScale,
+        #[serde(rename = "variance")]
+        Variance,
+        #[serde(rename = "alpha")]
+        Alpha,
+        #[serde(rename = "epsilon")]
+        Epsilon,
+        #[serde(rename = "nu")]
+        Nu,
+    }
+    impl ::std::fmt::Display for SelectionParameter {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::LengthScale => f.write_str("length_scale"),
+                Self::Variance => f.write_str("variance"),
+                Self::Alpha => f.write_str("alpha"),
+                Self::Epsilon => f.write_str("epsilon"),
+                Self::Nu => f.write_str("nu"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for SelectionParameter {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "length_scale" => Ok(Self::LengthScale),
+                "variance" => Ok(Self::Variance),
+                "alpha" => Ok(Self::Alpha),
+                "epsilon" => Ok(Self::Epsilon),
+                "nu" => Ok(Self::Nu),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for SelectionParameter {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for SelectionParameter {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
         }
     }
     ///How often a Wendland kernel is continuously differentiable.
@@ -3570,6 +4055,81 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         #[derive(Clone, Debug)]
+        pub struct FamilyScore {
+            family: ::std::result::Result<super::KernelFamily, ::std::string::String>,
+            nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
+            score: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for FamilyScore {
+            fn default() -> Self {
+                Self {
+                    family: Err("no value supplied for family".to_string()),
+                    nu: Ok(Default::default()),
+                    score: Ok(Default::default()),
+                }
+            }
+        }
+        impl FamilyScore {
+            pub fn family<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::KernelFamily>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.family = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for family: {e}")
+                    });
+                self
+            }
+            pub fn nu<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.nu = value
+                    .try_into()
+                    .map_err(|e| format!("error converting supplied value for nu: {e}"));
+                self
+            }
+            pub fn score<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.score = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for score: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<FamilyScore> for super::FamilyScore {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: FamilyScore,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    family: value.family?,
+                    nu: value.nu?,
+                    score: value.score?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::FamilyScore> for FamilyScore {
+            fn from(value: super::FamilyScore) -> Self {
+                Self {
+                    family: Ok(value.family),
+                    nu: Ok(value.nu),
+                    score: Ok(value.score),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct FieldError {
             detail: ::std::result::Result<::std::string::String, ::std::string::String>,
             pointer: ::std::result::Result<::std::string::String, ::std::string::String>,
@@ -3624,6 +4184,83 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self {
                     detail: Ok(value.detail),
                     pointer: Ok(value.pointer),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct FreeParameter {
+            max: ::std::result::Result<f64, ::std::string::String>,
+            min: ::std::result::Result<f64, ::std::string::String>,
+            parameter: ::std::result::Result<
+                super::SelectionParameter,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for FreeParameter {
+            fn default() -> Self {
+                Self {
+                    max: Err("no value supplied for max".to_string()),
+                    min: Err("no value supplied for min".to_string()),
+                    parameter: Err("no value supplied for parameter".to_string()),
+                }
+            }
+        }
+        impl FreeParameter {
+            pub fn max<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.max = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for max: {e}")
+                    });
+                self
+            }
+            pub fn min<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.min = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for min: {e}")
+                    });
+                self
+            }
+            pub fn parameter<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::SelectionParameter>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.parameter = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for parameter: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<FreeParameter> for super::FreeParameter {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: FreeParameter,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    max: value.max?,
+                    min: value.min?,
+                    parameter: value.parameter?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::FreeParameter> for FreeParameter {
+            fn from(value: super::FreeParameter) -> Self {
+                Self {
+                    max: Ok(value.max),
+                    min: Ok(value.min),
+                    parameter: Ok(value.parameter),
                 }
             }
         }
@@ -3805,6 +4442,440 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         impl ::std::convert::From<super::Health> for Health {
             fn from(value: super::Health) -> Self {
                 Self { status: Ok(value.status) }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct InterpolationBatchRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            derivatives: ::std::result::Result<
+                ::std::option::Option<i32>,
+                ::std::string::String,
+            >,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::ValuesInclude>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            queries: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+            values: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for InterpolationBatchRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    derivatives: Ok(Default::default()),
+                    duplicates: Ok(Default::default()),
+                    include: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    queries: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                    values: Err("no value supplied for values".to_string()),
+                }
+            }
+        }
+        impl InterpolationBatchRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn derivatives<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<i32>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.derivatives = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for derivatives: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::ValuesInclude>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn queries<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.queries = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for queries: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn values<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.values = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for values: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<InterpolationBatchRequest>
+        for super::InterpolationBatchRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: InterpolationBatchRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    derivatives: value.derivatives?,
+                    duplicates: value.duplicates?,
+                    include: value.include?,
+                    kernel: value.kernel?,
+                    mean: value.mean?,
+                    noise_variances: value.noise_variances?,
+                    queries: value.queries?,
+                    solver: value.solver?,
+                    values: value.values?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::InterpolationBatchRequest>
+        for InterpolationBatchRequest {
+            fn from(value: super::InterpolationBatchRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    derivatives: Ok(value.derivatives),
+                    duplicates: Ok(value.duplicates),
+                    include: Ok(value.include),
+                    kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
+                    noise_variances: Ok(value.noise_variances),
+                    queries: Ok(value.queries),
+                    solver: Ok(value.solver),
+                    values: Ok(value.values),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct InterpolationBatchResponse {
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            gradient_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            gradients: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            hessian_deviations: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            hessians: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>>,
+                ::std::string::String,
+            >,
+            mean_coefficients: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            value_deviations: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            values: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for InterpolationBatchResponse {
+            fn default() -> Self {
+                Self {
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    gradient_deviations: Ok(Default::default()),
+                    gradients: Ok(Default::default()),
+                    hessian_deviations: Ok(Default::default()),
+                    hessians: Ok(Default::default()),
+                    mean_coefficients: Ok(Default::default()),
+                    value_deviations: Ok(Default::default()),
+                    values: Err("no value supplied for values".to_string()),
+                }
+            }
+        }
+        impl InterpolationBatchResponse {
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn gradient_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gradient_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn gradients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for gradients: {e}")
+                    });
+                self
+            }
+            pub fn hessian_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hessian_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for hessian_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn hessians<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<
+                        ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                    >,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.hessians = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for hessians: {e}")
+                    });
+                self
+            }
+            pub fn mean_coefficients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_coefficients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_coefficients: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn value_deviations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.value_deviations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for value_deviations: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn values<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.values = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for values: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<InterpolationBatchResponse>
+        for super::InterpolationBatchResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: InterpolationBatchResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    diagnostics: value.diagnostics?,
+                    gradient_deviations: value.gradient_deviations?,
+                    gradients: value.gradients?,
+                    hessian_deviations: value.hessian_deviations?,
+                    hessians: value.hessians?,
+                    mean_coefficients: value.mean_coefficients?,
+                    value_deviations: value.value_deviations?,
+                    values: value.values?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::InterpolationBatchResponse>
+        for InterpolationBatchResponse {
+            fn from(value: super::InterpolationBatchResponse) -> Self {
+                Self {
+                    diagnostics: Ok(value.diagnostics),
+                    gradient_deviations: Ok(value.gradient_deviations),
+                    gradients: Ok(value.gradients),
+                    hessian_deviations: Ok(value.hessian_deviations),
+                    hessians: Ok(value.hessians),
+                    mean_coefficients: Ok(value.mean_coefficients),
+                    value_deviations: Ok(value.value_deviations),
+                    values: Ok(value.values),
+                }
             }
         }
         #[derive(Clone, Debug)]
@@ -5679,6 +6750,591 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         #[derive(Clone, Debug)]
+        pub struct LeftOut {
+            log_predictive_densities: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            means: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for LeftOut {
+            fn default() -> Self {
+                Self {
+                    log_predictive_densities: Err(
+                        "no value supplied for log_predictive_densities".to_string(),
+                    ),
+                    means: Err("no value supplied for means".to_string()),
+                    variances: Err("no value supplied for variances".to_string()),
+                }
+            }
+        }
+        impl LeftOut {
+            pub fn log_predictive_densities<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.log_predictive_densities = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for log_predictive_densities: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn means<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.means = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for means: {e}")
+                    });
+                self
+            }
+            pub fn variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for variances: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<LeftOut> for super::LeftOut {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: LeftOut,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    log_predictive_densities: value.log_predictive_densities?,
+                    means: value.means?,
+                    variances: value.variances?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::LeftOut> for LeftOut {
+            fn from(value: super::LeftOut) -> Self {
+                Self {
+                    log_predictive_densities: Ok(value.log_predictive_densities),
+                    means: Ok(value.means),
+                    variances: Ok(value.variances),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct ModelSelectionRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            criterion: ::std::result::Result<
+                ::std::option::Option<super::SelectionCriterion>,
+                ::std::string::String,
+            >,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            families: ::std::result::Result<
+                ::std::vec::Vec<super::KernelFamily>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            restarts: ::std::result::Result<
+                ::std::option::Option<i32>,
+                ::std::string::String,
+            >,
+            seed: ::std::result::Result<
+                ::std::option::Option<i64>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+            values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            vary: ::std::result::Result<
+                ::std::vec::Vec<super::FreeParameter>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for ModelSelectionRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    criterion: Ok(Default::default()),
+                    duplicates: Ok(Default::default()),
+                    families: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    restarts: Ok(Default::default()),
+                    seed: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                    values: Err("no value supplied for values".to_string()),
+                    vary: Ok(Default::default()),
+                }
+            }
+        }
+        impl ModelSelectionRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn criterion<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::SelectionCriterion>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.criterion = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for criterion: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn families<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::KernelFamily>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.families = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for families: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn restarts<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<i32>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.restarts = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for restarts: {e}")
+                    });
+                self
+            }
+            pub fn seed<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.seed = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for seed: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn values<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.values = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for values: {e}")
+                    });
+                self
+            }
+            pub fn vary<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::FreeParameter>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.vary = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for vary: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<ModelSelectionRequest>
+        for super::ModelSelectionRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: ModelSelectionRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    criterion: value.criterion?,
+                    duplicates: value.duplicates?,
+                    families: value.families?,
+                    kernel: value.kernel?,
+                    mean: value.mean?,
+                    noise_variances: value.noise_variances?,
+                    restarts: value.restarts?,
+                    seed: value.seed?,
+                    solver: value.solver?,
+                    values: value.values?,
+                    vary: value.vary?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::ModelSelectionRequest>
+        for ModelSelectionRequest {
+            fn from(value: super::ModelSelectionRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    criterion: Ok(value.criterion),
+                    duplicates: Ok(value.duplicates),
+                    families: Ok(value.families),
+                    kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
+                    noise_variances: Ok(value.noise_variances),
+                    restarts: Ok(value.restarts),
+                    seed: Ok(value.seed),
+                    solver: Ok(value.solver),
+                    values: Ok(value.values),
+                    vary: Ok(value.vary),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct ModelSelectionResponse {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            converged: ::std::result::Result<bool, ::std::string::String>,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            evaluations: ::std::result::Result<u64, ::std::string::String>,
+            families: ::std::result::Result<
+                ::std::vec::Vec<super::FamilyScore>,
+                ::std::string::String,
+            >,
+            gradient: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<super::KernelUsed, ::std::string::String>,
+            leave_one_out: ::std::result::Result<super::LeftOut, ::std::string::String>,
+            mean_coefficients: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            path: ::std::result::Result<
+                ::std::vec::Vec<super::PathEntry>,
+                ::std::string::String,
+            >,
+            score: ::std::result::Result<f64, ::std::string::String>,
+        }
+        impl ::std::default::Default for ModelSelectionResponse {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    converged: Err("no value supplied for converged".to_string()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    evaluations: Err("no value supplied for evaluations".to_string()),
+                    families: Err("no value supplied for families".to_string()),
+                    gradient: Err("no value supplied for gradient".to_string()),
+                    kernel: Err("no value supplied for kernel".to_string()),
+                    leave_one_out: Err(
+                        "no value supplied for leave_one_out".to_string(),
+                    ),
+                    mean_coefficients: Ok(Default::default()),
+                    path: Err("no value supplied for path".to_string()),
+                    score: Err("no value supplied for score".to_string()),
+                }
+            }
+        }
+        impl ModelSelectionResponse {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn converged<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<bool>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.converged = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for converged: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn evaluations<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.evaluations = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for evaluations: {e}")
+                    });
+                self
+            }
+            pub fn families<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::FamilyScore>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.families = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for families: {e}")
+                    });
+                self
+            }
+            pub fn gradient<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for gradient: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::KernelUsed>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn leave_one_out<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::LeftOut>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.leave_one_out = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for leave_one_out: {e}")
+                    });
+                self
+            }
+            pub fn mean_coefficients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_coefficients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_coefficients: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn path<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::PathEntry>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.path = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for path: {e}")
+                    });
+                self
+            }
+            pub fn score<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.score = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for score: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<ModelSelectionResponse>
+        for super::ModelSelectionResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: ModelSelectionResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    converged: value.converged?,
+                    diagnostics: value.diagnostics?,
+                    evaluations: value.evaluations?,
+                    families: value.families?,
+                    gradient: value.gradient?,
+                    kernel: value.kernel?,
+                    leave_one_out: value.leave_one_out?,
+                    mean_coefficients: value.mean_coefficients?,
+                    path: value.path?,
+                    score: value.score?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::ModelSelectionResponse>
+        for ModelSelectionResponse {
+            fn from(value: super::ModelSelectionResponse) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    converged: Ok(value.converged),
+                    diagnostics: Ok(value.diagnostics),
+                    evaluations: Ok(value.evaluations),
+                    families: Ok(value.families),
+                    gradient: Ok(value.gradient),
+                    kernel: Ok(value.kernel),
+                    leave_one_out: Ok(value.leave_one_out),
+                    mean_coefficients: Ok(value.mean_coefficients),
+                    path: Ok(value.path),
+                    score: Ok(value.score),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct NormalsRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -6062,6 +7718,615 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         #[derive(Clone, Debug)]
+        pub struct PathEntry {
+            alpha: ::std::result::Result<f64, ::std::string::String>,
+            score: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for PathEntry {
+            fn default() -> Self {
+                Self {
+                    alpha: Err("no value supplied for alpha".to_string()),
+                    score: Ok(Default::default()),
+                }
+            }
+        }
+        impl PathEntry {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn score<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.score = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for score: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<PathEntry> for super::PathEntry {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: PathEntry,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    score: value.score?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::PathEntry> for PathEntry {
+            fn from(value: super::PathEntry) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    score: Ok(value.score),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct PosteriorBatchRequest {
+            alpha: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            cloud: ::std::result::Result<super::CloudRef, ::std::string::String>,
+            duplicates: ::std::result::Result<
+                ::std::option::Option<super::DuplicatePolicy>,
+                ::std::string::String,
+            >,
+            include: ::std::result::Result<
+                ::std::vec::Vec<super::PosteriorQuantity>,
+                ::std::string::String,
+            >,
+            kernel: ::std::result::Result<
+                ::std::option::Option<super::Kernel>,
+                ::std::string::String,
+            >,
+            mean: ::std::result::Result<
+                ::std::option::Option<super::MeanChoice>,
+                ::std::string::String,
+            >,
+            noise_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            quantiles: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            queries: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            samples: ::std::result::Result<
+                ::std::option::Option<super::Samples>,
+                ::std::string::String,
+            >,
+            solver: ::std::result::Result<
+                ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+            threshold: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            values: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for PosteriorBatchRequest {
+            fn default() -> Self {
+                Self {
+                    alpha: Ok(Default::default()),
+                    cloud: Err("no value supplied for cloud".to_string()),
+                    duplicates: Ok(Default::default()),
+                    include: Ok(Default::default()),
+                    kernel: Ok(Default::default()),
+                    mean: Ok(Default::default()),
+                    noise_variances: Ok(Default::default()),
+                    quantiles: Ok(Default::default()),
+                    queries: Ok(Default::default()),
+                    samples: Ok(Default::default()),
+                    solver: Ok(Default::default()),
+                    threshold: Ok(Default::default()),
+                    values: Err("no value supplied for values".to_string()),
+                }
+            }
+        }
+        impl PosteriorBatchRequest {
+            pub fn alpha<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.alpha = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for alpha: {e}")
+                    });
+                self
+            }
+            pub fn cloud<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::CloudRef>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cloud = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cloud: {e}")
+                    });
+                self
+            }
+            pub fn duplicates<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<super::DuplicatePolicy>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.duplicates = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for duplicates: {e}")
+                    });
+                self
+            }
+            pub fn include<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<super::PosteriorQuantity>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.include = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for include: {e}")
+                    });
+                self
+            }
+            pub fn kernel<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Kernel>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.kernel = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for kernel: {e}")
+                    });
+                self
+            }
+            pub fn mean<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::MeanChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for mean: {e}")
+                    });
+                self
+            }
+            pub fn noise_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.noise_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for noise_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn quantiles<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quantiles = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for quantiles: {e}")
+                    });
+                self
+            }
+            pub fn queries<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.queries = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for queries: {e}")
+                    });
+                self
+            }
+            pub fn samples<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Samples>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.samples = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for samples: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn threshold<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.threshold = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for threshold: {e}")
+                    });
+                self
+            }
+            pub fn values<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.values = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for values: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<PosteriorBatchRequest>
+        for super::PosteriorBatchRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: PosteriorBatchRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    alpha: value.alpha?,
+                    cloud: value.cloud?,
+                    duplicates: value.duplicates?,
+                    include: value.include?,
+                    kernel: value.kernel?,
+                    mean: value.mean?,
+                    noise_variances: value.noise_variances?,
+                    quantiles: value.quantiles?,
+                    queries: value.queries?,
+                    samples: value.samples?,
+                    solver: value.solver?,
+                    threshold: value.threshold?,
+                    values: value.values?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::PosteriorBatchRequest>
+        for PosteriorBatchRequest {
+            fn from(value: super::PosteriorBatchRequest) -> Self {
+                Self {
+                    alpha: Ok(value.alpha),
+                    cloud: Ok(value.cloud),
+                    duplicates: Ok(value.duplicates),
+                    include: Ok(value.include),
+                    kernel: Ok(value.kernel),
+                    mean: Ok(value.mean),
+                    noise_variances: Ok(value.noise_variances),
+                    quantiles: Ok(value.quantiles),
+                    queries: Ok(value.queries),
+                    samples: Ok(value.samples),
+                    solver: Ok(value.solver),
+                    threshold: Ok(value.threshold),
+                    values: Ok(value.values),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct PosteriorBatchResponse {
+            covariance: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            diagnostics: ::std::result::Result<
+                super::Diagnostics,
+                ::std::string::String,
+            >,
+            exceedance_probabilities: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            gradient_variances: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            gradients: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            log_marginal_likelihoods: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            mean_coefficients: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            means: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            observation_variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            quantiles: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            samples: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                ::std::string::String,
+            >,
+            variances: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for PosteriorBatchResponse {
+            fn default() -> Self {
+                Self {
+                    covariance: Ok(Default::default()),
+                    diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    exceedance_probabilities: Ok(Default::default()),
+                    gradient_variances: Ok(Default::default()),
+                    gradients: Ok(Default::default()),
+                    log_marginal_likelihoods: Ok(Default::default()),
+                    mean_coefficients: Ok(Default::default()),
+                    means: Err("no value supplied for means".to_string()),
+                    observation_variances: Ok(Default::default()),
+                    quantiles: Ok(Default::default()),
+                    samples: Ok(Default::default()),
+                    variances: Ok(Default::default()),
+                }
+            }
+        }
+        impl PosteriorBatchResponse {
+            pub fn covariance<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.covariance = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for covariance: {e}")
+                    });
+                self
+            }
+            pub fn diagnostics<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::Diagnostics>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.diagnostics = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn exceedance_probabilities<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.exceedance_probabilities = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for exceedance_probabilities: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn gradient_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gradient_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn gradients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for gradients: {e}")
+                    });
+                self
+            }
+            pub fn log_marginal_likelihoods<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.log_marginal_likelihoods = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for log_marginal_likelihoods: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn mean_coefficients<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.mean_coefficients = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for mean_coefficients: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn means<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.means = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for means: {e}")
+                    });
+                self
+            }
+            pub fn observation_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.observation_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for observation_variances: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn quantiles<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quantiles = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for quantiles: {e}")
+                    });
+                self
+            }
+            pub fn samples<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.samples = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for samples: {e}")
+                    });
+                self
+            }
+            pub fn variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for variances: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<PosteriorBatchResponse>
+        for super::PosteriorBatchResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: PosteriorBatchResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    covariance: value.covariance?,
+                    diagnostics: value.diagnostics?,
+                    exceedance_probabilities: value.exceedance_probabilities?,
+                    gradient_variances: value.gradient_variances?,
+                    gradients: value.gradients?,
+                    log_marginal_likelihoods: value.log_marginal_likelihoods?,
+                    mean_coefficients: value.mean_coefficients?,
+                    means: value.means?,
+                    observation_variances: value.observation_variances?,
+                    quantiles: value.quantiles?,
+                    samples: value.samples?,
+                    variances: value.variances?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::PosteriorBatchResponse>
+        for PosteriorBatchResponse {
+            fn from(value: super::PosteriorBatchResponse) -> Self {
+                Self {
+                    covariance: Ok(value.covariance),
+                    diagnostics: Ok(value.diagnostics),
+                    exceedance_probabilities: Ok(value.exceedance_probabilities),
+                    gradient_variances: Ok(value.gradient_variances),
+                    gradients: Ok(value.gradients),
+                    log_marginal_likelihoods: Ok(value.log_marginal_likelihoods),
+                    mean_coefficients: Ok(value.mean_coefficients),
+                    means: Ok(value.means),
+                    observation_variances: Ok(value.observation_variances),
+                    quantiles: Ok(value.quantiles),
+                    samples: Ok(value.samples),
+                    variances: Ok(value.variances),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct PosteriorRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -6088,12 +8353,24 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
             >,
+            quantiles: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
             queries: ::std::result::Result<
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            samples: ::std::result::Result<
+                ::std::option::Option<super::Samples>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
+                ::std::string::String,
+            >,
+            threshold: ::std::result::Result<
+                ::std::option::Option<f64>,
                 ::std::string::String,
             >,
             values: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
@@ -6108,8 +8385,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(Default::default()),
                     mean: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
+                    quantiles: Ok(Default::default()),
                     queries: Ok(Default::default()),
+                    samples: Ok(Default::default()),
                     solver: Ok(Default::default()),
+                    threshold: Ok(Default::default()),
                     values: Err("no value supplied for values".to_string()),
                 }
             }
@@ -6203,6 +8483,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn quantiles<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quantiles = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for quantiles: {e}")
+                    });
+                self
+            }
             pub fn queries<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
@@ -6215,6 +8507,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn samples<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Samples>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.samples = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for samples: {e}")
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -6224,6 +8528,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+            pub fn threshold<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.threshold = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for threshold: {e}")
                     });
                 self
             }
@@ -6253,8 +8569,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: value.kernel?,
                     mean: value.mean?,
                     noise_variances: value.noise_variances?,
+                    quantiles: value.quantiles?,
                     queries: value.queries?,
+                    samples: value.samples?,
                     solver: value.solver?,
+                    threshold: value.threshold?,
                     values: value.values?,
                 })
             }
@@ -6269,8 +8588,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(value.kernel),
                     mean: Ok(value.mean),
                     noise_variances: Ok(value.noise_variances),
+                    quantiles: Ok(value.quantiles),
                     queries: Ok(value.queries),
+                    samples: Ok(value.samples),
                     solver: Ok(value.solver),
+                    threshold: Ok(value.threshold),
                     values: Ok(value.values),
                 }
             }
@@ -6283,6 +8605,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             >,
             diagnostics: ::std::result::Result<
                 super::Diagnostics,
+                ::std::string::String,
+            >,
+            exceedance_probabilities: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
+            gradient_variances: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
             gradients: ::std::result::Result<
@@ -6298,6 +8628,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
             >,
+            quantiles: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
+            samples: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             variances: ::std::result::Result<
                 ::std::vec::Vec<f64>,
                 ::std::string::String,
@@ -6308,10 +8646,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self {
                     covariance: Ok(Default::default()),
                     diagnostics: Err("no value supplied for diagnostics".to_string()),
+                    exceedance_probabilities: Ok(Default::default()),
+                    gradient_variances: Ok(Default::default()),
                     gradients: Ok(Default::default()),
                     log_marginal_likelihood: Ok(Default::default()),
                     means: Err("no value supplied for means".to_string()),
                     observation_variances: Ok(Default::default()),
+                    quantiles: Ok(Default::default()),
+                    samples: Ok(Default::default()),
                     variances: Ok(Default::default()),
                 }
             }
@@ -6338,6 +8680,34 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for diagnostics: {e}")
+                    });
+                self
+            }
+            pub fn exceedance_probabilities<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.exceedance_probabilities = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for exceedance_probabilities: {e}"
+                        )
+                    });
+                self
+            }
+            pub fn gradient_variances<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.gradient_variances = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!(
+                            "error converting supplied value for gradient_variances: {e}"
+                        )
                     });
                 self
             }
@@ -6393,6 +8763,30 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn quantiles<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.quantiles = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for quantiles: {e}")
+                    });
+                self
+            }
+            pub fn samples<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.samples = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for samples: {e}")
+                    });
+                self
+            }
             pub fn variances<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
@@ -6414,10 +8808,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Ok(Self {
                     covariance: value.covariance?,
                     diagnostics: value.diagnostics?,
+                    exceedance_probabilities: value.exceedance_probabilities?,
+                    gradient_variances: value.gradient_variances?,
                     gradients: value.gradients?,
                     log_marginal_likelihood: value.log_marginal_likelihood?,
                     means: value.means?,
                     observation_variances: value.observation_variances?,
+                    quantiles: value.quantiles?,
+                    samples: value.samples?,
                     variances: value.variances?,
                 })
             }
@@ -6427,10 +8825,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self {
                     covariance: Ok(value.covariance),
                     diagnostics: Ok(value.diagnostics),
+                    exceedance_probabilities: Ok(value.exceedance_probabilities),
+                    gradient_variances: Ok(value.gradient_variances),
                     gradients: Ok(value.gradients),
                     log_marginal_likelihood: Ok(value.log_marginal_likelihood),
                     means: Ok(value.means),
                     observation_variances: Ok(value.observation_variances),
+                    quantiles: Ok(value.quantiles),
+                    samples: Ok(value.samples),
                     variances: Ok(value.variances),
                 }
             }
@@ -6636,6 +9038,67 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     status: Ok(value.status),
                     title: Ok(value.title),
                     type_: Ok(value.type_),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct Samples {
+            count: ::std::result::Result<::std::num::NonZeroU64, ::std::string::String>,
+            seed: ::std::result::Result<
+                ::std::option::Option<i64>,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for Samples {
+            fn default() -> Self {
+                Self {
+                    count: Err("no value supplied for count".to_string()),
+                    seed: Ok(Default::default()),
+                }
+            }
+        }
+        impl Samples {
+            pub fn count<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::num::NonZeroU64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.count = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for count: {e}")
+                    });
+                self
+            }
+            pub fn seed<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<i64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.seed = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for seed: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Samples> for super::Samples {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Samples,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    count: value.count?,
+                    seed: value.seed?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Samples> for Samples {
+            fn from(value: super::Samples) -> Self {
+                Self {
+                    count: Ok(value.count),
+                    seed: Ok(value.seed),
                 }
             }
         }
@@ -8041,11 +10504,28 @@ let response = client.compute_interpolation()
     pub fn compute_interpolation(&self) -> builder::ComputeInterpolation<'_> {
         builder::ComputeInterpolation::new(self)
     }
+    /**Interpolate many lists of values
+
+As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
+solver.
+
+Sends a `POST` request to `/v1/interpolation/batch`
+
+```ignore
+let response = client.compute_interpolation_batch()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn compute_interpolation_batch(&self) -> builder::ComputeInterpolationBatch<'_> {
+        builder::ComputeInterpolationBatch::new(self)
+    }
     /**Compute the Gaussian process posterior
 
 With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
-queries and, if asked for, variances, covariance, gradients and the log marginal likelihood. With `"solver": "local"`, and beyond the points
-that are factorized, each query is answered from the points nearest to it, without covariance and likelihood.
+queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
+log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
+it, without what takes all points or queries together: covariance, samples, gradient_variances and likelihood.
 
 Sends a `POST` request to `/v1/posterior`
 
@@ -8057,6 +10537,40 @@ let response = client.compute_posterior()
 ```*/
     pub fn compute_posterior(&self) -> builder::ComputePosterior<'_> {
         builder::ComputePosterior::new(self)
+    }
+    /**Compute Gaussian process posteriors of many lists of values
+
+As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
+solver.
+
+Sends a `POST` request to `/v1/posterior/batch`
+
+```ignore
+let response = client.compute_posterior_batch()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn compute_posterior_batch(&self) -> builder::ComputePosteriorBatch<'_> {
+        builder::ComputePosteriorBatch::new(self)
+    }
+    /**Select a model
+
+Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving one out or by generalized cross-validation: from the
+kernel of the request, or the one that is learned if there is none, and from further starts, by sequential quadratic programming with exact slopes within
+bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value predicted from all others. Every evaluation costs a
+few factorizations.
+
+Sends a `POST` request to `/v1/model-selection`
+
+```ignore
+let response = client.select_model()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn select_model(&self) -> builder::SelectModel<'_> {
+        builder::SelectModel::new(self)
     }
     /**Compute normals
 
@@ -9040,6 +11554,172 @@ pub mod builder {
             }
         }
     }
+    /**Builder for [`Client::compute_interpolation_batch`]
+
+[`Client::compute_interpolation_batch`]: super::Client::compute_interpolation_batch*/
+    #[derive(Debug, Clone)]
+    pub struct ComputeInterpolationBatch<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::InterpolationBatchRequest, String>,
+    }
+    impl<'a> ComputeInterpolationBatch<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::InterpolationBatchRequest>,
+            <V as std::convert::TryInto<
+                types::InterpolationBatchRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!(
+                        "conversion to `InterpolationBatchRequest` for body failed: {}",
+                        s
+                    )
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::InterpolationBatchRequest,
+            ) -> types::builder::InterpolationBatchRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/interpolation/batch`
+        pub async fn send(
+            self,
+        ) -> Result<
+            ResponseValue<types::InterpolationBatchResponse>,
+            Error<types::Problem>,
+        > {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::InterpolationBatchRequest::try_from(v)
+                        .map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/interpolation/batch", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "compute_interpolation_batch",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
     /**Builder for [`Client::compute_posterior`]
 
 [`Client::compute_posterior`]: super::Client::compute_posterior*/
@@ -9111,6 +11791,334 @@ pub mod builder {
                 .build()?;
             let info = OperationInfo {
                 operation_id: "compute_posterior",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::compute_posterior_batch`]
+
+[`Client::compute_posterior_batch`]: super::Client::compute_posterior_batch*/
+    #[derive(Debug, Clone)]
+    pub struct ComputePosteriorBatch<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::PosteriorBatchRequest, String>,
+    }
+    impl<'a> ComputePosteriorBatch<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::PosteriorBatchRequest>,
+            <V as std::convert::TryInto<
+                types::PosteriorBatchRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!(
+                        "conversion to `PosteriorBatchRequest` for body failed: {}", s
+                    )
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::PosteriorBatchRequest,
+            ) -> types::builder::PosteriorBatchRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/posterior/batch`
+        pub async fn send(
+            self,
+        ) -> Result<
+            ResponseValue<types::PosteriorBatchResponse>,
+            Error<types::Problem>,
+        > {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::PosteriorBatchRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/posterior/batch", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "compute_posterior_batch",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::select_model`]
+
+[`Client::select_model`]: super::Client::select_model*/
+    #[derive(Debug, Clone)]
+    pub struct SelectModel<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::ModelSelectionRequest, String>,
+    }
+    impl<'a> SelectModel<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::ModelSelectionRequest>,
+            <V as std::convert::TryInto<
+                types::ModelSelectionRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!(
+                        "conversion to `ModelSelectionRequest` for body failed: {}", s
+                    )
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::ModelSelectionRequest,
+            ) -> types::builder::ModelSelectionRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/model-selection`
+        pub async fn send(
+            self,
+        ) -> Result<
+            ResponseValue<types::ModelSelectionResponse>,
+            Error<types::Problem>,
+        > {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::ModelSelectionRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/model-selection", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "select_model",
             };
             client.pre(&mut request, &info).await?;
             let result = client.exec(request, &info).await;
