@@ -561,7 +561,7 @@ impl Chosen {
 /// 422 for no list, and for one of another length than the first.
 pub fn value_lists(lists: Points) -> Result<(Arc<Vec<f64>>, usize), Problem> {
     if let Some((row, found)) = lists.ragged {
-        return Err(Problem::length_mismatch(&format!("/values/{row}"), lists.dimension, found));
+        return Err(Problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
     }
     match lists.n_rows {
         0 => Err(Problem::invalid_request("/values", "at least one list of values is needed")),

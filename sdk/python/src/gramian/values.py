@@ -125,7 +125,7 @@ class ValuesOfCloud(RegisteredCloud):
             What is wanted beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
             `"gradient_variances"`, `"log_marginal_likelihood"`; nothing if absent.
         samples : int or dict, optional
-            How many functions to draw from the posterior, jointly at all queries; `{"count": 10, "seed": 1}` for others.
+            How many functions to draw from the posterior, at all queries together; or `{"count": 10, "seed": 1}`.
         quantiles : array_like, `[q]`, optional
             Probabilities between 0 and 1 of which the quantiles of the latent function are wanted.
         threshold : float, optional
@@ -162,7 +162,7 @@ class ValuesOfCloud(RegisteredCloud):
         >>> answer = line.posterior([0, 1, 0, 1], [[1]], kernel=kernel, alpha=0.01, samples=3, quantiles=[0.05, 0.95])
         >>> answer.samples.shape, answer.quantiles.round(2)
         ((3, 1), array([[0.82],
-               [1.14]]))
+               [1.15]]))
         """
         return self._compute(
             Posterior.read,
