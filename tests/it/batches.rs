@@ -203,6 +203,7 @@ async fn what_is_no_batch_or_no_probability_is_refused() {
         ("quantiles", json!([0.0]), "/quantiles/0"),
         ("samples", json!({"count": 0}), "/samples/count"),
         ("samples", json!({"count": 1, "seed": -1}), "/samples/seed"),
+        ("samples", json!({"count": 1, "seed": 1u64 << 53}), "/samples/seed"),
         ("samples", json!({"seed": 1}), "/samples"),
         ("threshold", json!(null), "/threshold"),
     ] {

@@ -555,6 +555,20 @@ impl Chosen {
     }
 }
 
+/// The greatest seed: every client has the whole numbers up to it.
+const MAX_SEED: u64 = (1 << 53) - 1;
+
+/// # Errors
+/// 422 for a seed that some clients cannot say.
+pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
+    match seed <= MAX_SEED {
+        true => Ok(()),
+        false => {
+            Err(Problem::invalid_request(pointer, format!("a seed is at most {MAX_SEED}, found {seed}")))
+        }
+    }
+}
+
 /// Lists of values of one length, and how many they are.
 ///
 /// # Errors

@@ -11,6 +11,7 @@ use crate::http::fields::{KernelFamily, KernelUsed};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::plan::FitModel;
+use crate::http::serve::planner::check_seed;
 use crate::http::wire::write::array::Array;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
@@ -57,6 +58,7 @@ impl Search {
             let detail = format!("restarts must be at most {MAX_RESTARTS}");
             return Err(Problem::invalid_request("/restarts", detail));
         }
+        check_seed(request.seed.unwrap_or_default(), "/seed")?;
         let families = request.families.clone().unwrap_or_default();
         if let Some(at) = (1..families.len()).find(|&at| families[..at].contains(&families[at])) {
             return Err(Problem::invalid_request(format!("/families/{at}"), "a family is tried once"));

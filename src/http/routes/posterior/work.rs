@@ -9,7 +9,7 @@ use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::{Cost, PlannedFit};
-use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::serve::planner::{DenseOnly, Planner, check_seed};
 use crate::http::serve::values::{EachAt, ValuesAt, ValuesRequest};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
@@ -76,6 +76,9 @@ impl Asked {
     fn check(&self) -> Result<(), Problem> {
         if self.samples.is_some_and(|samples| samples.count == 0) {
             return Err(Problem::invalid_request("/samples/count", "count must be at least 1"));
+        }
+        if let Some(samples) = self.samples {
+            check_seed(samples.seed, "/samples/seed")?;
         }
         let quantiles = self.quantiles.iter().flatten();
         match quantiles.enumerate().find(|(_, p)| !(**p > 0.0 && **p < 1.0)) {
