@@ -113,6 +113,29 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
     refuses("/v1/clouds", json!({"points": fibonacci_sphere(21)}), "/points", 20, 21).await;
 }
 
+/// A row is counted, not kept: a batch of a million rows would otherwise take four times its body.
+#[tokio::test]
+async fn lists_of_values_and_quantiles_beyond_the_limits_are_refused() {
+    let server = Server::with_flags(&["--max-points", "20"]).await;
+    let batch = json!({
+        "cloud": {"points": fibonacci_sphere(20)}, "kernel": {"family": "laplace", "epsilon": 1},
+        "values": [vec![1.0; 20], vec![2.0; 20]], "queries": fibonacci_sphere(2)
+    });
+    let refuses = async |path: &str, member: &str, value: Value, pointer: &str, limit: u64, required: u64| {
+        let mut body = batch.clone();
+        body[member] = value;
+        let problem = server.post(path, &body).await.expect_problem(413, "problem-too-large");
+        assert_eq!(problem["errors"][0]["pointer"], pointer);
+        assert_eq!((&problem["limit"], &problem["required"]), (&json!(limit), &json!(required)), "{path}");
+    };
+    for path in ["/v1/interpolation/batch", "/v1/posterior/batch"] {
+        server.post(path, &batch).await.expect_ok();
+        refuses(path, "values", json!([vec![1.0; 20], vec![1.0; 1000]]), "/values/1", 20, 1000).await;
+        refuses(path, "values", json!(vec![vec![1.0; 20]; 21]), "/values", 20, 21).await;
+    }
+    refuses("/v1/posterior/batch", "quantiles", json!(vec![0.5; 1001]), "/quantiles", 1000, 1001).await;
+}
+
 #[tokio::test]
 async fn clouds_beyond_the_limit_of_the_dense_solver_are_registered_and_not_factorized() {
     let server = Server::with_flags(&["--max-points", "25", "--max-dense-points", "20"]).await;

@@ -11,7 +11,7 @@ use crate::http::serve::app::App;
 use crate::http::wire::read::limits::{
     too_many_coordinates, too_many_dense_points, too_many_points, too_many_queries, transposed,
 };
-use crate::http::wire::read::points::Points;
+use crate::http::wire::read::points::{Points, ValueLists};
 use crate::numerics::defaults::Purpose;
 use crate::numerics::error::NumericsError;
 use crate::numerics::points::cloud::Cloud;
@@ -573,7 +573,7 @@ pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
 ///
 /// # Errors
 /// 422 for no list, and for one of another length than the first.
-pub fn value_lists(lists: Points) -> Result<(Arc<Vec<f64>>, usize), Problem> {
+pub fn value_lists(ValueLists(lists): ValueLists) -> Result<(Arc<Vec<f64>>, usize), Problem> {
     if let Some((row, found)) = lists.ragged {
         return Err(Problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
     }

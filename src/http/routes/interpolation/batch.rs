@@ -18,7 +18,7 @@ use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
 use crate::http::serve::values::{EachAt, ValuesRequest};
 use crate::http::wire::read::members::{present, present_word, present_words};
-use crate::http::wire::read::points::Points;
+use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::numerics::function::deviations::JetDeviations;
@@ -30,7 +30,7 @@ request! {
     pub struct InterpolationBatchRequest {
         /// Lists of values, one per point each, in their order. They have kernel and noise in common.
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
-        pub values: Points,
+        pub values: ValueLists,
         /// The mean of each function; a constant if absent with the kernel, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]

@@ -19,7 +19,7 @@ use crate::http::serve::planner::{Planner, value_lists};
 use crate::http::wire::read::members::{
     present, present_object, present_unless_empty, present_word, present_words,
 };
-use crate::http::wire::read::points::Points;
+use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::store::Owner;
@@ -29,7 +29,7 @@ request! {
     pub struct PosteriorBatchRequest {
         /// Lists of observed values, one per point each, in their order. They have kernel and noise in common.
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
-        pub values: Points,
+        pub values: ValueLists,
         /// The mean of each process; a constant if absent with the kernel, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
@@ -48,7 +48,7 @@ request! {
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted; none if absent. An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false)]
+        #[schema(nullable = false, max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
         #[serde(default, deserialize_with = "present")]

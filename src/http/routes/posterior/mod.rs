@@ -84,7 +84,7 @@ request! {
         pub samples: Option<Samples>,
         /// Probabilities between 0 and 1 of which the quantiles of the latent function are wanted; none if absent. An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
-        #[schema(nullable = false)]
+        #[schema(nullable = false, max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
         /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
         #[serde(default, deserialize_with = "present")]

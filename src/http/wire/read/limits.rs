@@ -10,6 +10,12 @@ use crate::numerics::observer::{Observer, Unobserved};
 pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
      or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
 
+/// The name by which a type asks to be read as lists of values, whatever the member is called.
+pub(super) const VALUE_LISTS: &str = "ValueLists";
+
+/// Probabilities of which a posterior may be asked for quantiles: more than any plot of a distribution shows.
+const MAX_QUANTILES: usize = 1000;
+
 /// What parsing knows beside the bytes.
 #[derive(Clone, Copy)]
 pub struct ParseContext<'a> {
@@ -40,8 +46,9 @@ impl<'a> ParseContext<'a> {
     /// Entries that a list may have.
     pub(super) fn max_entries(&self, list: List) -> usize {
         match list {
-            List::Points | List::Numbers => self.max_points,
+            List::Points | List::Numbers | List::ValueLists => self.max_points,
             List::Queries => self.max_queries,
+            List::Quantiles => MAX_QUANTILES,
             List::Coordinates => self.max_dimension,
             List::Other => usize::MAX,
         }
@@ -55,6 +62,8 @@ impl<'a> ParseContext<'a> {
             (_, Some(width)) if length <= limit => too_many_coordinates(self.max_dimension, width, length),
             (List::Queries, _) => too_many_queries(limit, length),
             (List::Numbers, _) => too_many_numbers(limit, length),
+            (List::ValueLists, _) => too_many_value_lists(limit, length),
+            (List::Quantiles, _) => too_many_quantiles(limit, length),
             (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
         };
         problem.at(pointer)
@@ -70,6 +79,10 @@ pub(super) enum List {
     Queries,
     /// One number for each point.
     Numbers,
+    /// Rows of one number for each point.
+    ValueLists,
+    /// Probabilities.
+    Quantiles,
     /// One row.
     Coordinates,
     /// Words, or no list at all.
@@ -82,15 +95,22 @@ impl List {
             "points" | "normals" => Self::Points,
             "queries" => Self::Queries,
             "values" | "noise_variances" => Self::Numbers,
+            "quantiles" => Self::Quantiles,
             _ => Self::Other,
         }
+    }
+
+    /// What a type of this name is that asks to be read as a list of its own.
+    pub(super) fn of_type(name: &str) -> Option<Self> {
+        (name == VALUE_LISTS).then_some(Self::ValueLists)
     }
 
     /// What the entries of this list are.
     pub(super) fn of_entries(self) -> Self {
         match self {
             Self::Points | Self::Queries => Self::Coordinates,
-            Self::Numbers | Self::Coordinates | Self::Other => Self::Other,
+            Self::ValueLists => Self::Numbers,
+            Self::Numbers | Self::Quantiles | Self::Coordinates | Self::Other => Self::Other,
         }
     }
 }
@@ -145,6 +165,18 @@ fn too_many_numbers(limit: usize, required: usize) -> Problem {
         .with_remedy("send one per point of the cloud (operators raise the limit by GRAMIAN_MAX_POINTS)")
 }
 
+fn too_many_value_lists(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "lists of values", limit, Some(required)).with_remedy(
+        "split them over several requests: the factorization is kept for the next one, so that this costs nothing (operators \
+         raise the limit by GRAMIAN_MAX_POINTS)",
+    )
+}
+
+fn too_many_quantiles(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required))
+        .with_remedy("ask for fewer: they are those of normal distributions, whose means and variances say everything")
+}
+
 /// What to tell a client whose rows are columns.
 pub fn transposed(n_rows: usize, n_columns: usize) -> String {
     let rows = if n_rows == 1 { "row" } else { "rows" };
@@ -192,11 +224,19 @@ mod tests {
             );
         }
         let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
-        assert_eq!(names, ["noise_variances", "normals", "points", "queries", "values"]);
+        assert_eq!(
+            names,
+            ["noise_variances", "normals", "points", "quantiles", "queries", "values", "values"]
+        );
         for (name, depth) in found {
-            let list = List::named(name);
-            let rows = if depth == 2 { List::Coordinates } else { List::Other };
-            assert!(list != List::Other && list.of_entries() == rows, "{name}");
+            // The rows of batches are named by their type: requests of one list have the same name for it.
+            let list = match (name, depth) {
+                ("values", 2) => List::of_type(VALUE_LISTS),
+                _ => Some(List::named(name)).filter(|list| *list != List::Other),
+            };
+            let entries = list.map(List::of_entries);
+            let is_row = entries.is_some_and(|entries| entries != List::Other);
+            assert!(list.is_some() && is_row == (depth == 2), "{name}");
         }
     }
 }

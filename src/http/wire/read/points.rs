@@ -1,6 +1,8 @@
-//! Lists of points, read into one flat buffer.
+//! Lists of points and of values, read into one flat buffer.
 
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+
+use super::limits::VALUE_LISTS;
 
 /// Points as they come: one flat buffer, whatever their number, with the first row that differs in length.
 #[derive(Debug, Clone, Default)]
@@ -14,17 +16,36 @@ pub struct Points {
 
 impl<'de> Deserialize<'de> for Points {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(PointsVisitor)
+        deserializer.deserialize_seq(PointsVisitor { what: "a list of points", row: "a point: a list of coordinates" })
     }
 }
 
-struct PointsVisitor;
+/// Lists of one value per point of a cloud each: rows as those of points, of another length.
+#[derive(Debug, Clone, Default)]
+pub struct ValueLists(pub Points);
+
+impl<'de> Deserialize<'de> for ValueLists {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let visitor = PointsVisitor { what: "a list of lists of values", row: "a list of values" };
+        deserializer.deserialize_newtype_struct(VALUE_LISTS, visitor).map(Self)
+    }
+}
+
+/// What is expected, as errors say it.
+struct PointsVisitor {
+    what: &'static str,
+    row: &'static str,
+}
 
 impl<'de> Visitor<'de> for PointsVisitor {
     type Value = Points;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a list of points")
+        f.write_str(self.what)
+    }
+
+    fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<Points, D::Error> {
+        deserializer.deserialize_seq(self)
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Points, A::Error> {
@@ -34,7 +55,7 @@ impl<'de> Visitor<'de> for PointsVisitor {
         let n_more = rows.size_hint().unwrap_or(0).saturating_sub(1);
         loop {
             let start = points.coordinates.len();
-            if rows.next_element_seed(Row(&mut points.coordinates))?.is_none() {
+            if rows.next_element_seed(Row(&mut points.coordinates, self.row))?.is_none() {
                 return Ok(points);
             }
             let length = points.coordinates.len() - start;
@@ -52,7 +73,7 @@ impl<'de> Visitor<'de> for PointsVisitor {
 }
 
 /// Appends one row.
-struct Row<'a>(&'a mut Vec<f64>);
+struct Row<'a>(&'a mut Vec<f64>, &'static str);
 
 impl<'de> serde::de::DeserializeSeed<'de> for Row<'_> {
     type Value = ();
@@ -66,7 +87,7 @@ impl<'de> Visitor<'de> for Row<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("a point: a list of coordinates")
+        f.write_str(self.1)
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut coordinates: A) -> Result<(), A::Error> {
