@@ -17,6 +17,7 @@ mod price;
 mod sample;
 mod search;
 mod select;
+mod walk;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::{Family, Kernel};
