@@ -9,7 +9,8 @@ use std::cell::RefCell;
 use slsqp::{Func, StopTols, minimize};
 
 use super::evaluation::Evaluator;
-use super::parameters::{Hyperparameters, Space};
+use super::parameters::Hyperparameters;
+use super::space::Space;
 use super::walk::{Best, Walk};
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;

@@ -12,11 +12,15 @@ mod descent;
 mod evaluation;
 mod leave_one_out;
 mod likelihood;
+mod matrices;
 mod parameters;
 mod price;
 mod sample;
 mod search;
 mod select;
+mod space;
+mod spectrum;
+mod subject;
 mod walk;
 
 use crate::numerics::error::NumericsError;

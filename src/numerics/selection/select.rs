@@ -4,8 +4,10 @@ use rayon::prelude::*;
 
 use super::criterion::Criterion;
 use super::descent::{Found, Side, descend, finish, side};
-use super::evaluation::{Evaluator, Subject, never_definite};
-use super::parameters::{Hyperparameters, Parameter, Space, Variation};
+use super::evaluation::{Evaluator, never_definite};
+use super::parameters::{Hyperparameters, Parameter, Variation};
+use super::space::Space;
+use super::subject::Subject;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Family;
 use crate::numerics::observer::{Observer, Stage};

@@ -1,7 +1,8 @@
 //! What an optimizer sees of a criterion.
 
 use super::evaluation::{Evaluator, State};
-use super::parameters::{Hyperparameters, Space};
+use super::parameters::Hyperparameters;
+use super::space::Space;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 
