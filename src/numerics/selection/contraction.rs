@@ -117,7 +117,7 @@ impl WithSimd for Columns<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
         let n_axes = if self.per_axis { self.cloud.dimension() } else { 0 };
         let mut sums = vec![Block::ZERO; FIXED + n_axes];
-        let (mut squares, mut weights) = (vec![Block::ZERO; n_axes], Block::ZERO);
+        let (mut differences, mut weights) = (vec![Block::ZERO; n_axes], Block::ZERO);
         for j in self.columns.clone() {
             let x = self.cloud.point(j);
             for block in j / BLOCK..self.cloud.n_points().div_ceil(BLOCK) {
@@ -128,7 +128,7 @@ impl WithSimd for Columns<'_> {
                     block,
                     x,
                     weights: &weights,
-                    squares: &mut squares,
+                    differences: &mut differences,
                     sums: &mut sums,
                 });
             }
@@ -144,7 +144,7 @@ struct ColumnPairs<'a, 'b, S> {
     block: usize,
     x: &'a [f64],
     weights: &'a Block,
-    squares: &'a mut [Block],
+    differences: &'a mut [Block],
     sums: &'a mut [Block],
 }
 
@@ -164,12 +164,16 @@ impl<S: Simd> Pairs<S> for ColumnPairs<'_, '_, S> {
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
         let Columns { nodes, kernel, .. } = *self.of;
-        let squares = &mut *self.squares;
-        let q = nodes.scaled_distances(self.simd, (self.block, at), self.x, kernel, |c, difference| {
-            if let Some(square) = squares.get_mut(c) {
-                (difference * difference).at_most(HUGE).store(square, at);
-            }
-        });
+        let at_block = (self.block, at);
+        let q = if self.differences.is_empty() {
+            nodes.scaled_distances(self.simd, at_block, self.x, kernel, |_, _| ())
+        } else {
+            // No more than this: a closure that is larger is not inlined, which makes a call of every instruction.
+            let differences = &mut *self.differences;
+            nodes.scaled_distances(self.simd, at_block, self.x, kernel, |c, difference| {
+                difference.store(&mut differences[c], at);
+            })
+        };
         // A slope of 0 times infinity is no number.
         (q, q.at_most(HUGE))
     }
@@ -181,9 +185,9 @@ impl<S: Simd> Pairs<S> for ColumnPairs<'_, '_, S> {
         self.add(0, at, weight, value);
         self.add(1, at, slope, Pack::splat(self.simd, 1.0));
         self.add(2, at, slope, q);
-        for c in 0..self.squares.len() {
-            let square = Pack::load(self.simd, &self.squares[c], at);
-            self.add(FIXED + c, at, slope, square);
+        for c in 0..self.differences.len() {
+            let difference = Pack::load(self.simd, &self.differences[c], at);
+            self.add(FIXED + c, at, slope, (difference * difference).at_most(HUGE));
         }
     }
 }

@@ -1,17 +1,23 @@
 //! From one start to an optimum: sequential quadratic programming in the box of logarithms (Kraft 1988; the crate slsqp).
+//!
+//! It learns curvatures as it goes, beginning with the same for all numbers. Length scales of axes that do not matter have slopes that fall with
+//! their square, and curvatures a millionth of those of the noise, so that it takes them for arrived. Hence two steps: descents that go as far as
+//! that, and from the best of them one more in which every number is measured by its own curvature.
 
 use std::cell::RefCell;
 
 use slsqp::{Func, StopTols, minimize};
 
-use super::criterion::Criterion;
-use super::evaluation::{Evaluator, State};
-use super::parameters::{Hyperparameters, Space};
+use super::evaluation::Evaluator;
+use super::parameters::Hyperparameters;
+use super::space::Space;
+use super::walk::{Best, Walk};
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 
-/// A descent ends where a step gains less than this in a log likelihood.
-const LEAST_GAIN: f64 = 1e-7;
+/// A first descent ends where a step gains less than this in a log likelihood, the last one where it gains less than that.
+const LEAST_GAIN: f64 = 1e-6;
+const LAST_GAIN: f64 = 1e-8;
 
 /// Slopes of a log likelihood in logarithms up to here count as none: what is left to gain is of the order of their square.
 const FLAT: f64 = 1e-2;
@@ -19,8 +25,14 @@ const FLAT: f64 = 1e-2;
 /// Slopes up to here are not followed.
 const LEAST_SLOPE: f64 = 1e-6;
 
-/// Descents from where the last one ended, each without what that had learned of the curvature.
-const ROUNDS: usize = 5;
+/// Last descents, each with new curvatures, as long as one gains something.
+const ROUNDS: usize = 3;
+
+/// The difference of logarithms that curvatures are taken from.
+const PROBE: f64 = 0.05;
+
+/// The least curvature: a step is as long as a slope over it, and a box is not longer than a few hundred.
+const LEAST_CURVATURE: f64 = 1e-7;
 
 /// A number this near to its bound is at it.
 const AT_BOUND: f64 = 1e-9;
@@ -48,152 +60,112 @@ pub(super) fn descend(
     max_evaluations: usize,
     observer: &dyn Observer,
 ) -> Result<(Option<Found>, usize), NumericsError> {
-    let mut walk =
-        Walk { evaluator, space, observer, scale: 1.0, at: None, best: None, evaluations: 0, error: None };
-    let Some(first) = walk.merit(start)? else { return Ok((None, walk.evaluations)) };
+    let mut walk = Walk::new(evaluator, space, observer);
+    if walk.merit(start)?.is_none() {
+        return Ok((None, walk.evaluations));
+    }
     let bounds = space.bounds();
-    let mut merit = first;
-    let walk = RefCell::new(walk);
+    let slopes = walk.slopes(start)?;
+    let steepest = free_slopes(start, &slopes, &bounds).map(|slope| slope * slope).sum::<f64>().sqrt();
+    // The first step is as long as the slope that the optimizer sees: a factor of e.
+    walk.scale = 1.0 / steepest.max(LEAST_SLOPE);
+    let left = max_evaluations.saturating_sub(walk.evaluations);
+    let walk = run(walk, start, &bounds, left, LEAST_GAIN)?;
+    let evaluations = walk.evaluations;
+    Ok((walk.end(start)?.map(|best| found(best, &bounds)), evaluations))
+}
+
+/// Ascends what is left from where a descent ended, in units of curvatures. The evaluator is left at what is found.
+///
+/// # Errors
+/// Those of [`descend`].
+pub(super) fn finish(
+    evaluator: &mut Evaluator<'_>,
+    space: &Space,
+    from: Found,
+    max_evaluations: usize,
+    observer: &dyn Observer,
+) -> Result<(Found, usize), NumericsError> {
+    let (bounds, start) = (space.bounds(), from.logarithms.clone());
+    let mut walk = Walk::new(evaluator, space, observer);
+    let mut merit = walk.merit(&start)?.unwrap_or(f64::NEG_INFINITY);
+    // The one at the start was counted before.
+    walk.evaluations = 0;
     for _ in 0..ROUNDS {
-        let from = walk.borrow().best_logarithms(start);
-        let left = max_evaluations.saturating_sub(walk.borrow().evaluations);
-        let slopes = walk.borrow_mut().slopes(&from)?;
-        let steepest = free_slopes(&from, &slopes, &bounds).map(|slope| slope * slope).sum::<f64>().sqrt();
-        if left == 0 || steepest <= LEAST_SLOPE {
+        let at = walk.best_logarithms(&start);
+        let slopes = walk.slopes(&at)?;
+        let left = max_evaluations.saturating_sub(walk.evaluations);
+        let is_done = free_slopes(&at, &slopes, &bounds).all(|slope| slope.abs() <= LEAST_SLOPE);
+        if is_done || left <= 2 * space.n_free() {
             break;
         }
-        // The first step is as long as the slope that the optimizer sees: a factor of e. With less, scales that tend to infinity, whose slopes
-        // fall with their square, would seem to have arrived.
-        walk.borrow_mut().scale = 1.0 / steepest;
-        run(&walk, &from, &bounds, left);
-        if let Some(error) = walk.borrow_mut().error.take() {
-            return Err(error);
-        }
-        let best = walk.borrow().best.as_ref().map_or(merit, |best| best.1);
+        walk.units = units(&mut walk, &at, &slopes, &bounds)?;
+        walk.scale = 1.0;
+        walk = run(walk, &at, &bounds, left - space.n_free(), LAST_GAIN)?;
+        let best = walk.best.as_ref().map_or(merit, |best| best.1);
         if best - merit <= LEAST_GAIN {
             break;
         }
         merit = best;
     }
-    walk.into_inner().end(start, &bounds)
+    let evaluations = walk.evaluations;
+    Ok((walk.end(&start)?.map_or(from, |best| found(best, &bounds)), evaluations))
+}
+
+/// The step of each logarithm to which a slope of 1 belongs at an optimum: `1/√|h|`, h from differences of slopes; not less than the slope itself,
+/// for what tends to infinity.
+fn units(
+    walk: &mut Walk<'_, '_>,
+    at: &[f64],
+    slopes: &[f64],
+    bounds: &[(f64, f64)],
+) -> Result<Vec<f64>, NumericsError> {
+    let mut units = Vec::with_capacity(at.len());
+    for (k, &(min, max)) in bounds.iter().enumerate() {
+        let mut probe = at.to_vec();
+        // To the side where there is room.
+        probe[k] =
+            if at[k] < 0.5 * (min + max) { (at[k] + PROBE).min(max) } else { (at[k] - PROBE).max(min) };
+        let step = probe[k] - at[k];
+        let moved = walk.slopes(&probe)?[k];
+        let curvature = if step == 0.0 { 1.0 } else { (moved - slopes[k]) / step };
+        units.push(1.0 / curvature.abs().max(slopes[k].abs()).max(LEAST_CURVATURE).sqrt());
+    }
+    Ok(units)
 }
 
 /// One run of the optimizer, which leaves the best point in the walk.
-fn run(walk: &RefCell<Walk<'_, '_>>, from: &[f64], bounds: &[(f64, f64)], max_evaluations: usize) {
+fn run<'a, 'b>(
+    walk: Walk<'a, 'b>,
+    from: &[f64],
+    bounds: &[(f64, f64)],
+    max_evaluations: usize,
+    least_gain: f64,
+) -> Result<Walk<'a, 'b>, NumericsError> {
+    if from.is_empty() || max_evaluations == 0 {
+        return Ok(walk);
+    }
+    let from: Vec<f64> = from.iter().zip(&walk.units).map(|(x, unit)| x / unit).collect();
+    let bounds: Vec<(f64, f64)> =
+        bounds.iter().zip(&walk.units).map(|((min, max), unit)| (min / unit, max / unit)).collect();
+    let tolerances = StopTols { ftol_abs: least_gain * walk.scale, ..StopTols::default() };
+    let walk = RefCell::new(walk);
     let objective =
         |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| walk.borrow_mut().objective(x, gradient);
-    let tolerance = LEAST_GAIN * walk.borrow().scale;
     let constraints: [&dyn Func<()>; 0] = [];
-    let tolerances = StopTols { ftol_abs: tolerance, ..StopTols::default() };
     // How it ends is seen from the slopes where it does.
-    let _ = minimize(objective, from, bounds, &constraints, (), max_evaluations, Some(tolerances));
+    let _ = minimize(objective, &from, &bounds, &constraints, (), max_evaluations, Some(tolerances));
+    let mut walk = walk.into_inner();
+    match walk.error.take() {
+        Some(error) => Err(error),
+        None => Ok(walk),
+    }
 }
 
-/// What the optimizer sees: minus the merit, scaled.
-struct Walk<'a, 'b> {
-    evaluator: &'a mut Evaluator<'b>,
-    space: &'a Space,
-    observer: &'a dyn Observer,
-    scale: f64,
-    at: Option<Point>,
-    best: Option<(Vec<f64>, f64)>,
-    evaluations: usize,
-    error: Option<NumericsError>,
-}
-
-/// The last point that was looked at.
-struct Point {
-    logarithms: Vec<f64>,
-    hyperparameters: Hyperparameters,
-    state: Option<State>,
-    /// Of the score.
-    gradient: Option<Vec<f64>>,
-}
-
-impl Walk<'_, '_> {
-    /// Minus the merit and its slopes; infinite where the matrix is not positive definite. After an error everything is flat, so that the
-    /// optimizer ends without any work.
-    fn objective(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> f64 {
-        match self.evaluate(x, gradient) {
-            Ok(value) => value,
-            Err(error) => {
-                self.error = Some(error);
-                0.0
-            }
-        }
-    }
-
-    fn evaluate(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> Result<f64, NumericsError> {
-        let mut slopes = vec![0.0; x.len()];
-        let mut value = 0.0;
-        if self.error.is_none() {
-            let merit = self.merit(x)?;
-            value = merit.map_or(f64::INFINITY, |merit| -self.scale * merit);
-            if gradient.is_some() && merit.is_some() {
-                slopes = self.slopes(x)?;
-            }
-        }
-        if let Some(gradient) = gradient {
-            gradient.iter_mut().zip(slopes).for_each(|(g, slope)| *g = -self.scale * slope);
-        }
-        Ok(value)
-    }
-
-    /// The merit at a point; `None` where the matrix is not positive definite.
-    fn merit(&mut self, x: &[f64]) -> Result<Option<f64>, NumericsError> {
-        if self.at.as_ref().is_none_or(|at| at.logarithms != x) {
-            self.observer.checkpoint()?;
-            let hyperparameters = self.space.at(x);
-            self.at = None;
-            let state = self.evaluator.score(&hyperparameters, self.observer)?;
-            self.evaluations += 1;
-            self.at = Some(Point { logarithms: x.to_vec(), hyperparameters, state, gradient: None });
-        }
-        let Some(state) = self.at.as_ref().and_then(|at| at.state.as_ref()) else { return Ok(None) };
-        let (merit, _) = self.criterion().merit(state.score, self.evaluator.n_points());
-        if self.best.as_ref().is_none_or(|(_, best)| *best < merit) {
-            self.best = Some((x.to_vec(), merit));
-        }
-        Ok(Some(merit))
-    }
-
-    /// The slopes of the merit at a point.
-    fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>, NumericsError> {
-        self.merit(x)?;
-        let (criterion, n) = (self.criterion(), self.evaluator.n_points());
-        let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = &mut self.at else {
-            return Ok(vec![0.0; x.len()]);
-        };
-        let found = match gradient.take() {
-            Some(found) => found,
-            None => self.evaluator.gradient(self.space, hyperparameters, state, self.observer)?,
-        };
-        let (_, factor) = criterion.merit(state.score, n);
-        let slopes = found.iter().map(|slope| factor * slope).collect();
-        *gradient = Some(found);
-        Ok(slopes)
-    }
-
-    fn criterion(&self) -> Criterion {
-        self.evaluator.criterion()
-    }
-
-    fn best_logarithms(&self, start: &[f64]) -> Vec<f64> {
-        self.best.as_ref().map_or_else(|| start.to_vec(), |best| best.0.clone())
-    }
-
-    /// The best point with its slopes.
-    fn end(mut self, start: &[f64], bounds: &[(f64, f64)]) -> Result<(Option<Found>, usize), NumericsError> {
-        let logarithms = self.best_logarithms(start);
-        let slopes = self.slopes(&logarithms)?;
-        let converged = is_flat(&logarithms, &slopes, bounds);
-        let evaluations = self.evaluations;
-        let Some(Point { hyperparameters, state: Some(state), gradient, .. }) = self.at else {
-            return Ok((None, evaluations));
-        };
-        let (score, gradient) = (state.score, gradient.unwrap_or_default());
-        Ok((Some(Found { logarithms, hyperparameters, score, gradient, converged }), evaluations))
-    }
+fn found(best: Best, bounds: &[(f64, f64)]) -> Found {
+    let Best { logarithms, hyperparameters, score, gradient, slopes } = best;
+    let converged = free_slopes(&logarithms, &slopes, bounds).all(|slope| slope.abs() <= FLAT);
+    Found { logarithms, hyperparameters, score, gradient, converged }
 }
 
 /// Where a number is at a bound and would go on beyond it, there is no slope to follow: 0.
@@ -207,10 +179,6 @@ fn free_slopes<'a>(
         Some(Side::Min) if slope < 0.0 => 0.0,
         _ => slope,
     })
-}
-
-fn is_flat(x: &[f64], slopes: &[f64], bounds: &[(f64, f64)]) -> bool {
-    free_slopes(x, slopes, bounds).all(|slope| slope.abs() <= FLAT)
 }
 
 /// A bound.

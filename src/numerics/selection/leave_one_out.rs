@@ -10,8 +10,9 @@ use faer::{ColRef, MatMut};
 use rayon::prelude::*;
 
 use super::criterion::Criterion;
-use super::evaluation::{Evaluator, Subject, UNDETERMINED, never_definite};
+use super::evaluation::{Evaluator, UNDETERMINED, never_definite};
 use super::parameters::Hyperparameters;
+use super::subject::Subject;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;

@@ -4,6 +4,9 @@
 //! the ratio of noise to variance. Nothing finer than the grid is told apart by a few hundred values, and since a factorization depends on these
 //! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
 //! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
+//!
+//! That is [`learn`], for whoever says nothing. [`select`] searches the best hyperparameters of all values by a [`Criterion`], in n³ flops for every
+//! evaluation; [`alpha_path`] looks at many α for one kernel, and [`leave_one_out`] predicts each value from all others.
 
 mod alpha_path;
 mod contraction;
@@ -12,11 +15,16 @@ mod descent;
 mod evaluation;
 mod leave_one_out;
 mod likelihood;
+mod matrices;
 mod parameters;
 mod price;
 mod sample;
 mod search;
 mod select;
+mod space;
+mod spectrum;
+mod subject;
+mod walk;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::{Family, Kernel};

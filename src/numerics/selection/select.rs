@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 
 use super::criterion::Criterion;
-use super::descent::{Found, Side, descend, side};
-use super::evaluation::{Evaluator, Subject, never_definite};
-use super::parameters::{Hyperparameters, Parameter, Space, Variation};
+use super::descent::{Found, Side, descend, finish, side};
+use super::evaluation::{Evaluator, never_definite};
+use super::parameters::{Hyperparameters, Parameter, Variation};
+use super::space::Space;
+use super::subject::Subject;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Family;
 use crate::numerics::observer::{Observer, Stage};
@@ -84,7 +86,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     observer.enter(Stage::Factor);
     let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
     let ended = run_all(&subject, selection, &jobs, observer)?;
-    best_of(&subject, (families, &spaces), ended, observer)
+    best_of(&subject, selection, (families, &spaces), ended, observer)
 }
 
 /// Varying ε without a family that has one is a mistake.
@@ -148,33 +150,36 @@ fn run_all(
     }
 }
 
-/// The best of what the descents of every family found, in their order.
+/// The best of what the descents of every family found, in their order, brought to its end.
 fn best_of(
     subject: &Subject<'_>,
+    selection: &Selection<'_>,
     (families, spaces): (&[Family], &[Space]),
     ended: Vec<(Option<Found>, usize)>,
     observer: &dyn Observer,
 ) -> Result<Selected, NumericsError> {
-    let evaluations = ended.iter().map(|(_, evaluations)| evaluations).sum();
+    let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
     let per_family = ended.len() / families.len();
-    let better = |best: Option<(usize, Found)>, next: (usize, Found)| match best {
-        Some(best) if best.1.score >= next.1.score => Some(best),
-        _ => Some(next),
-    };
     let mut scores = vec![None; families.len()];
-    let mut best = None;
-    for (at, found) in ended.into_iter().enumerate().filter_map(|(at, (found, _))| Some((at, found?))) {
+    let mut best: Option<(usize, Found, usize)> = None;
+    for (at, (found, used)) in ended.into_iter().enumerate() {
+        let Some(found) = found else { continue };
         let family = at / per_family;
         scores[family] = Some(scores[family].map_or(found.score, |score: f64| score.max(found.score)));
-        best = better(best, (family, found));
+        if best.as_ref().is_none_or(|(_, best, _)| best.score < found.score) {
+            best = Some((family, found, used));
+        }
     }
-    let Some((family, found)) = best else {
+    let Some((family, found, used)) = best else {
         let start = spaces[0].at(&spaces[0].start());
         return Err(never_definite(&start, subject.n_points()));
     };
     let space = &spaces[family];
-    let mut evaluator = Evaluator::new(subject, Criterion::MarginalLikelihood, false);
-    evaluator.score(&found.hyperparameters, observer)?;
+    let mut evaluator = Evaluator::new(subject, selection.criterion, false);
+    let left = selection.max_evaluations.saturating_sub(used);
+    let (found, used) = finish(&mut evaluator, space, found, left, observer)?;
+    evaluations += used;
+    scores[family] = Some(found.score);
     let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, bounds)| side(x, bounds));
     Ok(Selected {
         free: space.parameters().zip(sides).collect(),

@@ -173,8 +173,9 @@ fn too_many_value_lists(limit: usize, required: usize) -> Problem {
 }
 
 fn too_many_quantiles(limit: usize, required: usize) -> Problem {
-    Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required))
-        .with_remedy("ask for fewer: they are those of normal distributions, whose means and variances say everything")
+    Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required)).with_remedy(
+        "ask for fewer: they are those of normal distributions, whose means and variances say everything",
+    )
 }
 
 /// What to tell a client whose rows are columns.

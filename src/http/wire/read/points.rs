@@ -16,7 +16,10 @@ pub struct Points {
 
 impl<'de> Deserialize<'de> for Points {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(PointsVisitor { what: "a list of points", row: "a point: a list of coordinates" })
+        deserializer.deserialize_seq(PointsVisitor {
+            what: "a list of points",
+            row: "a point: a list of coordinates",
+        })
     }
 }
 

@@ -6,7 +6,9 @@ use super::*;
 use crate::numerics::kernel::Family;
 use crate::numerics::observer::Unobserved;
 use crate::numerics::selection::parameters::{Parameter, Variation};
+use crate::numerics::solver::trend::Mean;
 use crate::numerics::solver::{Solution, Solver, System};
+use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::testing::{Random, all_families};
 
 const CRITERIA: [Criterion; 3] =
@@ -38,8 +40,8 @@ fn check_slopes(subject: &Subject<'_>, criterion: Criterion, base: &Hyperparamet
     let x = space.start();
     let mut evaluator = Evaluator::new(subject, criterion, false);
     let at = space.at(&x);
-    let mut state = evaluator.score(&at, &Unobserved).unwrap().unwrap();
-    let gradient = evaluator.gradient(&space, &at, &mut state, &Unobserved).unwrap();
+    let state = evaluator.score(&at, &Unobserved).unwrap().unwrap();
+    let gradient = evaluator.gradient(&space, &at, &state, &Unobserved).unwrap();
     assert_eq!(gradient.len(), space.n_free());
     for (k, slope) in gradient.iter().enumerate() {
         let step = 1e-4;

@@ -1,0 +1,62 @@
+//! What is looked at: values at points, and what their mean may be.
+
+use faer::Mat;
+
+use crate::numerics::error::NumericsError;
+use crate::numerics::machine::vector::dot;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::trend::{Basis, Mean, Trend, solve_gram};
+use crate::numerics::sums::regularization::Regularization;
+
+/// Values at the points of a cloud with a mean: what all evaluations share.
+pub(super) struct Subject<'a> {
+    pub(super) cloud: &'a Cloud,
+    /// `[n]`, without what all of them share where there is a mean.
+    pub(super) values: Vec<f64>,
+    shared: f64,
+    basis: Basis,
+    /// F, `[n, p]` column by column.
+    pub(super) functions: Vec<f64>,
+    pub(super) n_functions: usize,
+}
+
+impl<'a> Subject<'a> {
+    /// # Errors
+    /// [`NumericsError::LengthMismatch`]; [`NumericsError::MeanNotDetermined`] if the points do not tell the functions of the mean apart, or there
+    /// are no more of them.
+    pub(super) fn of(cloud: &'a Cloud, values: &[f64], mean: Mean) -> Result<Self, NumericsError> {
+        cloud.check_one_per_point(values)?;
+        let (n, basis) = (values.len(), Basis::of(mean, cloud));
+        let (functions, p) = (basis.columns(cloud), basis.n_functions());
+        let column = |a: usize| &functions[a * n..][..n];
+        let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
+        if p > 0 && (n <= p || solve_gram(&gram, Mat::identity(p, p)).is_none()) {
+            return Err(NumericsError::MeanNotDetermined);
+        }
+        // What all values share would cost digits of what they do not share.
+        let shared = if p > 0 { values.iter().sum::<f64>() / n as f64 } else { 0.0 };
+        let values = values.iter().map(|value| value - shared).collect();
+        Ok(Self { cloud, values, shared, basis, functions, n_functions: p })
+    }
+
+    pub(super) fn n_points(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The mean with coefficients that generalised least squares found, `[p]`.
+    pub(super) fn trend(&self, mut coefficients: Vec<f64>) -> Option<Trend> {
+        *coefficients.first_mut()? += self.shared;
+        Some(Trend::new(self.basis.clone(), coefficients))
+    }
+}
+
+/// The noise in units of its mean: 1 where it is the same everywhere, or nothing.
+pub(super) fn relative_noise(noise: &Regularization, n: usize) -> Vec<f64> {
+    match noise {
+        Regularization::Uniform(_) => vec![1.0; n],
+        Regularization::PerPoint(variances) => {
+            let mean = variances.iter().sum::<f64>() / n as f64;
+            if mean > 0.0 { variances.iter().map(|v| v / mean).collect() } else { vec![1.0; n] }
+        }
+    }
+}
