@@ -109,19 +109,21 @@ impl ValuesKey {
         Self(hasher.finalize().into())
     }
 
-    /// These values with what is known beforehand of what would be learned from them: family, length scale if it is given, and variance of
-    /// the kernel; the noise.
-    pub fn given(
-        self,
-        kernel: Option<(Family, Option<f64>, f64)>,
-        regularization: Option<&Regularization>,
-    ) -> Self {
+    /// These values with what is known beforehand of what would be learned from them: the kernel; the noise.
+    pub fn given(self, kernel: Option<GivenKernel<'_>>, regularization: Option<&Regularization>) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&self.0);
-        if let Some((family, length_scale, variance)) = kernel {
-            let (family, parameter) = family.canonical();
-            hasher.update(&[1, family]);
-            update_with_floats(&mut hasher, &[parameter, length_scale.unwrap_or(0.0), variance]);
+        match kernel {
+            None => {}
+            Some(GivenKernel::OfCloud(family, variance)) => {
+                let (family, parameter) = family.canonical();
+                hasher.update(&[1, family]);
+                update_with_floats(&mut hasher, &[parameter, variance]);
+            }
+            Some(GivenKernel::Whole(kernel)) => {
+                hasher.update(&[3]);
+                update_with_kernel(&mut hasher, kernel);
+            }
         }
         if let Some(regularization) = regularization {
             hasher.update(&[2]);
@@ -131,10 +133,22 @@ impl ValuesKey {
     }
 }
 
+/// As much of a kernel as a request gives.
+#[derive(Debug, Clone, Copy)]
+pub enum GivenKernel<'a> {
+    Whole(&'a Kernel),
+    /// Family and variance: the length scale that the cloud gives is the same whenever it is asked for.
+    OfCloud(Family, f64),
+}
+
 fn update_with_kernel(hasher: &mut blake3::Hasher, kernel: &Kernel) {
     let (family, parameter) = kernel.family().canonical();
     hasher.update(&[family]);
     update_with_floats(hasher, &[parameter, kernel.length_scale(), kernel.variance()]);
+    if let Some(length_scales) = kernel.length_scales() {
+        hasher.update(&[length_scales.len() as u8]);
+        update_with_floats(hasher, length_scales);
+    }
 }
 
 fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regularization) {
@@ -199,6 +213,8 @@ mod tests {
             of(0, &gauss, &Regularization::PerPoint(vec![0.0, 0.0]), false),
             of(0, &kernel(Family::Gauss, 2.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Gauss, 1.0, 2.0), &alpha(0.0), false),
+            of(0, &Kernel::of_axes(Family::Gauss, &[1.0], 1.0).unwrap(), &alpha(0.0), false),
+            of(0, &Kernel::of_axes(Family::Gauss, &[1.0, 2.0], 1.0).unwrap(), &alpha(0.0), false),
             of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),

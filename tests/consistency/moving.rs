@@ -40,7 +40,7 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
     for (family, tolerance) in [(Family::Matern { order: 1 }, 0.06), (Family::Matern { order: 2 }, 0.08)] {
         let kernel = Kernel::new(family, 0.6, 1.0).unwrap();
-        let system = || System::new(cloud.clone(), kernel, Regularization::Uniform(1e-4)).unwrap();
+        let system = || System::new(cloud.clone(), kernel.clone(), Regularization::Uniform(1e-4)).unwrap();
         let solver = Arc::new(Solver::dense(system(), &Unobserved).unwrap());
         let dense = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
         let dense = dense.at(&queries, JetOrder::Gradient, &Unobserved).unwrap();

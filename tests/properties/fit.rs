@@ -38,7 +38,7 @@ fn without_regularization_the_fit_interpolates() {
             if kernel.check_dimension(cloud.dimension()).is_err() {
                 continue;
             }
-            let factor = factorize(&cloud, kernel, 0.0);
+            let factor = factorize(&cloud, kernel.clone(), 0.0);
             let u = fit(&factor, &values);
             let error = distance(&jets(&u, &cloud, JetOrder::Value).values(), &values);
             // Cholesky is backward stable: n ε k₀ Σ|λ|. The fallback leaves out directions of power below
@@ -81,11 +81,11 @@ fn the_loss_of_norm_is_the_distance_plus_twice_the_misfit_over_alpha() {
     for family in families() {
         let kernel = kernel(family, 1.0);
         let gram = cross_gram(&cloud, &kernel, &cloud);
-        let exact = factorize(&cloud, kernel, 0.0);
+        let exact = factorize(&cloud, kernel.clone(), 0.0);
         let interpolant = fit(&exact, &values).solution;
         for decade in -6..4 {
             let alpha = 10f64.powi(decade);
-            let smoothed = fit(&factorize(&cloud, kernel, alpha), &values).solution;
+            let smoothed = fit(&factorize(&cloud, kernel.clone(), alpha), &values).solution;
             let pairs = interpolant.weights.iter().zip(&smoothed.weights);
             let difference: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
             let distance = dot(&difference, &times(&gram, &difference));
@@ -131,7 +131,7 @@ fn the_posterior_and_its_likelihood_are_those_of_a_direct_computation() {
     let values = waves(&cloud);
     for (family, alpha) in families().into_iter().flat_map(|family| [(family, 0.0), (family, 1e-2)]) {
         let factor = factorize(&cloud, kernel(family, 0.5), alpha);
-        let kernel = *factor.kernel();
+        let kernel = factor.kernel().clone();
         let mut gram = cross_gram(&cloud, &kernel, &cloud);
         gram.iter_mut().step_by(13).for_each(|diagonal| *diagonal += alpha);
         let lower = cholesky(&gram).unwrap();
@@ -183,7 +183,7 @@ fn variances_lie_between_zero_and_the_prior_and_fall_with_every_point() {
         let mut before = vec![kernel.at_zero(); 30];
         for n in 1..=24 {
             let cloud = Cloud::new(all.coordinates()[..2 * n].to_vec(), 2).unwrap();
-            let factor = factorize(&cloud, kernel, 1e-4);
+            let factor = factorize(&cloud, kernel.clone(), 1e-4);
             let now = latent(&factor, &queries);
             assert!(now.iter().all(|&variance| variance >= 0.0), "{family:?}");
             // Without rounding no variance grows; φ(0) itself is right to 4 ε.
@@ -194,7 +194,7 @@ fn variances_lie_between_zero_and_the_prior_and_fall_with_every_point() {
         }
         // Among the queries are some within ℓ/4 of a point: they have lost at least a tenth.
         assert!(before.iter().any(|&variance| variance < 0.9 * kernel.at_zero()), "{family:?}");
-        assert!(largest(latent(&factorize(&all, kernel, 0.0), &all)) <= 1e-9 * kernel.at_zero());
+        assert!(largest(latent(&factorize(&all, kernel.clone(), 0.0), &all)) <= 1e-9 * kernel.at_zero());
     }
 }
 

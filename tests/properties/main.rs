@@ -7,6 +7,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod axes;
 mod fit;
 mod invariance;
 mod operators;

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
-use crate::http::wire::read::members::{present, word};
+use crate::http::wire::read::members::{present, present_unless_empty, word};
 use crate::http::wire::write::answer::{Member, Parts};
 use crate::numerics::defaults::Purpose;
 use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
@@ -23,7 +23,8 @@ pub enum KernelFamily {
     InverseMultiquadric,
 }
 
-/// A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+/// A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
+/// is refused.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kernel {
@@ -34,6 +35,10 @@ pub struct Kernel {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub length_scale: Option<f64>,
+    /// A length scale for each axis instead, in the units of the coordinates. An empty list counts as absent.
+    #[serde(default, deserialize_with = "present_unless_empty")]
+    #[schema(nullable = false)]
+    pub length_scales: Option<Vec<f64>>,
     /// The factor of φ, unit of the values squared; 1 if absent.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
@@ -57,8 +62,14 @@ pub struct Kernel {
 pub struct KernelUsed {
     /// The family, which determines φ.
     pub family: KernelFamily,
-    /// The length scale ℓ, in the unit of the coordinates.
-    pub length_scale: f64,
+    /// The length scale ℓ, in the unit of the coordinates; absent where each axis has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub length_scale: Option<f64>,
+    /// The length scale of each axis, where each has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub length_scales: Option<Vec<f64>>,
     /// The factor of φ, unit of the values squared.
     pub variance: f64,
     /// laplace: φ = exp(−√(r² + epsilon)).
@@ -76,7 +87,7 @@ pub struct KernelUsed {
 }
 
 /// A kernel that is checked but for a length scale that the cloud has yet to give.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum PlannedKernel {
     Given(NumericalKernel),
     OfCloud { family: Family, variance: f64 },
@@ -93,9 +104,9 @@ impl PlannedKernel {
         purpose: Purpose,
         pointers: Pointers,
     ) -> Result<NumericalKernel, Problem> {
-        match *self {
-            Self::Given(kernel) => Ok(kernel),
-            Self::OfCloud { family, variance } => {
+        match self {
+            Self::Given(kernel) => Ok(kernel.clone()),
+            &Self::OfCloud { family, variance } => {
                 let scales = scales.ok_or_else(Problem::internal)?;
                 let length_scale = match purpose {
                     Purpose::Values => family.length_scale_of_values(scales),
@@ -116,12 +127,19 @@ impl Kernel {
     pub fn plan(&self, pointers: Pointers) -> Result<PlannedKernel, Problem> {
         let family = self.resolve_family(pointers)?;
         let variance = self.variance.unwrap_or(1.0);
-        // Without a length scale the other parameters are checked with any.
-        let kernel = NumericalKernel::new(family, self.length_scale.unwrap_or(1.0), variance)
-            .map_err(|error| Problem::from_numerics(error, pointers))?;
-        Ok(match self.length_scale {
-            Some(_) => PlannedKernel::Given(kernel),
-            None => PlannedKernel::OfCloud { family, variance },
+        let kernel = match (self.length_scale, &self.length_scales) {
+            (Some(_), Some(_)) => {
+                let detail = "length_scale and length_scales exclude each other";
+                return Err(Problem::invalid_request(format!("{}/length_scales", pointers.kernel), detail));
+            }
+            (None, Some(length_scales)) => NumericalKernel::of_axes(family, length_scales, variance),
+            // Without a length scale the other parameters are checked with any.
+            (length_scale, None) => NumericalKernel::new(family, length_scale.unwrap_or(1.0), variance),
+        };
+        let kernel = kernel.map_err(|error| Problem::from_numerics(error, pointers))?;
+        Ok(match (self.length_scale, &self.length_scales) {
+            (None, None) => PlannedKernel::OfCloud { family, variance },
+            _ => PlannedKernel::Given(kernel),
         })
     }
 
@@ -181,7 +199,8 @@ impl KernelUsed {
         let PatchKernel { length_scale, variance } = kernel;
         Self {
             family: KernelFamily::Matern,
-            length_scale,
+            length_scale: Some(length_scale),
+            length_scales: None,
             variance,
             epsilon: None,
             nu: Some(4.5),
@@ -203,7 +222,8 @@ impl From<&NumericalKernel> for KernelUsed {
     fn from(kernel: &NumericalKernel) -> Self {
         let mut full = Self {
             family: KernelFamily::Gauss,
-            length_scale: kernel.length_scale(),
+            length_scale: Some(kernel.length_scale()).filter(|_| !kernel.is_stretched()),
+            length_scales: kernel.length_scales().map(<[f64]>::to_vec),
             variance: kernel.variance(),
             epsilon: None,
             nu: None,

@@ -44,6 +44,8 @@ pub enum SelectionCriterion {
 pub enum SelectionParameter {
     /// The length scale of the kernel.
     LengthScale,
+    /// The length scale of one axis, or of every axis its own.
+    LengthScales,
     /// The variance of the kernel.
     Variance,
     /// The variance of the noise.
@@ -61,6 +63,10 @@ pub struct FreeParameter {
     /// Which.
     #[serde(deserialize_with = "word")]
     pub parameter: SelectionParameter,
+    /// length_scales: the axis, from 0; every axis if absent, each within these bounds.
+    #[serde(default, deserialize_with = "present")]
+    #[schema(nullable = false, minimum = 0)]
+    pub axis: Option<usize>,
     /// The least that it may be.
     #[schema(exclusive_minimum = 0.0)]
     pub min: f64,
@@ -83,7 +89,7 @@ request! {
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub criterion: Option<SelectionCriterion>,
-        /// What is free, and its bounds. Absent: length scale, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
+        /// What is free, and its bounds. Absent: length scale, or that of each axis where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
         /// alpha) to a hundred times of where the search begins.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false)]
@@ -157,7 +163,8 @@ answer! {
         mean_coefficients: Option<Array>,
         /// The criterion there; greater is better.
         score: f64,
-        /// Derivatives of the score in the logarithms of what is free, in the order of `vary`; null for nu, which takes steps.
+        /// Derivatives of the score in the logarithms of what is free, in the order of `vary`; for `length_scales` without an axis, in that of a factor
+        /// of all; null for nu, which takes steps.
         #[schema(value_type = Vec<Option<f64>>)]
         gradient: Vec<Option<f64>>,
         /// Whether no slope is left to follow within the bounds.
@@ -219,7 +226,7 @@ impl Operation for ModelSelectionRequest {
         planner.queries(None, &mut [&mut main])?;
         let (n, d) = (main.n_points(), main.stored.cloud.dimension());
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
-        let cost = Cost { work: search.price(n, d), n_numbers, n_held: n };
+        let cost = Cost { work: search.price((n, d), main.n_length_scales()), n_numbers, n_held: n };
         Ok(Plan { main, surface: None, work: Work { values, search }, cost })
     }
 

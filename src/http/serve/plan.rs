@@ -101,6 +101,14 @@ impl PlannedFit {
         self.stored.cloud.n_points()
     }
 
+    /// Length scales of the kernel: 1, or one for each axis.
+    pub fn n_length_scales(&self) -> usize {
+        match &self.kernel {
+            Some(PlannedKernel::Given(kernel)) => kernel.length_scales().map_or(1, <[f64]>::len),
+            _ => 1,
+        }
+    }
+
     /// Whether the surface is regressed locally.
     pub fn is_local(&self) -> bool {
         matches!(self.way, Way::Regressions(_))
@@ -150,8 +158,10 @@ impl PlannedFit {
     /// Those of the kernel that is given.
     pub(super) fn learning(&self, sampling: Arc<Sampling>) -> Result<Learning, Problem> {
         let values = self.values.as_ref().ok_or_else(Problem::internal)?;
-        let kernel =
-            self.kernel.map(|kernel| kernel.resolve(Some(sampling.scales()), self.purpose, self.pointers));
+        let kernel = self
+            .kernel
+            .as_ref()
+            .map(|kernel| kernel.resolve(Some(sampling.scales()), self.purpose, self.pointers));
         Ok(Learning {
             cloud: self.stored.cloud.clone(),
             kernel: kernel.transpose()?,
@@ -246,8 +256,7 @@ fn of_variance_one(
     let variance = kernel.variance();
     match regularization {
         Regularization::Uniform(alpha) if alpha == 0.0 || RATIOS.contains(&(alpha / variance)) => {
-            let unit = NumericalKernel::new(kernel.family(), kernel.length_scale(), 1.0)?;
-            Ok((unit, Regularization::uniform(alpha / variance)?, variance))
+            Ok((kernel.of_variance_one(), Regularization::uniform(alpha / variance)?, variance))
         }
         Regularization::Uniform(_) | Regularization::PerPoint(_) => Ok((kernel, regularization, 1.0)),
     }
@@ -322,7 +331,9 @@ impl FitPlan {
         let (n, d) = (self.fitted.n_points(), self.fitted.dimension());
         match self.model {
             FitModel::Dense { .. } => choose(n, d, memory),
-            FitModel::Moving { .. } => choose_moving(n, d, self.merge.is_some()),
+            FitModel::Moving { ref kernel, .. } => {
+                choose_moving(n, d, self.merge.is_some(), kernel.is_stretched())
+            }
             FitModel::Local(_) => choose_local(n, d),
         }
     }

@@ -21,7 +21,7 @@ use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
-use crate::store::key::{CloudId, ValuesKey};
+use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 
 /// Bytes that a number takes in JSON at most, with its comma.
 const BYTES_PER_NUMBER: usize = 25;
@@ -393,7 +393,9 @@ impl Planner<'_> {
         let (values, n_lists) = (chosen.values.clone(), chosen.n_lists);
         let regularization = chosen.regularization(&stored, pointers)?;
         let values = values
-            .map(|values| self.planned_values((values, n_lists), mean, &stored, kernel, &regularization))
+            .map(|values| {
+                self.planned_values((values, n_lists), mean, &stored, kernel.as_ref(), &regularization)
+            })
             .transpose()?;
         Ok(PlannedFit {
             owner: self.owner,
@@ -415,7 +417,7 @@ impl Planner<'_> {
         (values, n_lists): (Arc<Vec<f64>>, usize),
         mean: Mean,
         stored: &RegisteredCloud,
-        kernel: Option<PlannedKernel>,
+        kernel: Option<&PlannedKernel>,
         regularization: &Option<Regularization>,
     ) -> Result<Box<PlannedValues>, Problem> {
         match n_lists {
@@ -428,8 +430,8 @@ impl Planner<'_> {
         let named = ValuesKey::with_mean(&values, mean);
         // A length scale that the cloud gives is the same whenever it is asked for.
         let given = kernel.map(|kernel| match kernel {
-            PlannedKernel::Given(kernel) => (kernel.family(), Some(kernel.length_scale()), kernel.variance()),
-            PlannedKernel::OfCloud { family, variance } => (family, None, variance),
+            PlannedKernel::Given(kernel) => GivenKernel::Whole(kernel),
+            &PlannedKernel::OfCloud { family, variance } => GivenKernel::OfCloud(family, variance),
         });
         let key = (self.owner, stored.id, named.given(given, regularization.as_ref()));
         Ok(Box::new(PlannedValues { values, key, learned: self.app.learned.get(key) }))

@@ -3,6 +3,8 @@
 //! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, `F` of k(·, x_j) is its covariance with the value at x_j,
 //! and its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value (Rasmussen and Williams 2006, sec. 9.4).
 
+use std::borrow::Cow;
+
 use faer::{ColRef, MatMut};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -52,6 +54,18 @@ impl JetFunctional {
         Self { query, of_value: 0.0, of_gradient: zeros(dimension), of_hessian }
     }
 
+    /// The same of a function of the coordinates that a kernel stretches: gradients get the factors of their axes, Hessians those of both.
+    fn stretched(&self, kernel: &Kernel) -> Cow<'_, Self> {
+        if !kernel.is_stretched() {
+            return Cow::Borrowed(self);
+        }
+        let (mut found, d) = (self.clone(), self.of_gradient.len());
+        found.of_gradient.iter_mut().enumerate().for_each(|(a, g)| *g *= kernel.stretch(a));
+        let entries = found.of_hessian.iter_mut().enumerate();
+        entries.for_each(|(at, entry)| *entry *= kernel.stretch(at / d) * kernel.stretch(at % d));
+        Cow::Owned(found)
+    }
+
     fn has_hessian(&self) -> bool {
         !self.of_hessian.is_empty()
     }
@@ -61,7 +75,7 @@ impl JetFunctional {
     }
 
     /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
-    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
+    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`. Of a functional that is stretched as the kernel is.
     fn prior_variance(&self, kernel: &Kernel) -> f64 {
         let [value, slope, bend] = kernel.profile_at_zero();
         let (v, inverse_square) = (kernel.variance(), kernel.inverse_square_length());
@@ -111,7 +125,7 @@ pub(crate) fn deviations(
         observer.enter(Stage::Evaluate);
         let columns = &mut buffer[..n * block.len()];
         columns.par_chunks_exact_mut(n).zip(block).for_each(|(column, functional)| {
-            let x = queries.point(functional.query);
+            let (x, functional) = (queries.point(functional.query), &*functional.stretched(kernel));
             nodes.dispatch(Covariances { nodes: &nodes, kernel, functional, x, column });
         });
         observer.enter(Stage::Solve);
@@ -122,7 +136,8 @@ pub(crate) fn deviations(
                 let h = mean.unexplained_of(functional, queries.point(functional.query), column);
                 mean.product(&h, &h)
             });
-            (functional.prior_variance(kernel) - explained).max(0.0) + unexplained.unwrap_or(0.0)
+            (functional.stretched(kernel).prior_variance(kernel) - explained).max(0.0)
+                + unexplained.unwrap_or(0.0)
         };
         let variances = columns.par_chunks_exact(n).zip(block).map(variance);
         found.extend(variances.map(|variance| (factor * variance).sqrt()).collect::<Vec<f64>>());
@@ -130,7 +145,7 @@ pub(crate) fn deviations(
     Ok(found)
 }
 
-/// `F k(·, x_j)` for all j: with D = x − x_j, `v[cφ + 2φ′/ℓ² (g·D + tr A) + 4φ″/ℓ⁴ DᵀAD]`.
+/// `F k(·, x_j)` for all j: with D = x − x_j, `v[cφ + 2φ′/ℓ² (g·D + tr A) + 4φ″/ℓ⁴ DᵀAD]`, all of it as the kernel stretches it.
 struct Covariances<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,

@@ -100,7 +100,7 @@ mod tests {
         for family in all_families() {
             let kernel = Kernel::new(family, 0.9, 2.0).unwrap();
             let alpha = Regularization::uniform(1e-8).unwrap();
-            let system = System::new(Arc::new(fibonacci_sphere(40)), kernel, alpha).unwrap();
+            let system = System::new(Arc::new(fibonacci_sphere(40)), kernel.clone(), alpha).unwrap();
             let solver = Solver::dense(system, &Unobserved).unwrap();
             let covariance = covariance(&solver, &queries, &Unobserved).unwrap();
             let root = Root::of(&covariance, kernel.at_zero(), &Unobserved).unwrap();

@@ -1,9 +1,11 @@
-//! Radial positive definite kernels, `k(x, y) = variance · φ(q)` with `q = |x − y|²/ℓ²`.
+//! Radial positive definite kernels, `k(x, y) = variance · φ(q)` with `q = |x − y|²/ℓ²`, or `Σ_c (x_c − y_c)²/ℓ_c²` with a length scale
+//! for each axis.
 //!
 //! A family is its profile φ and two derivatives in q, because with D = x − y
 //! `∇k = 2·variance·φ′·D/ℓ²` and `D²k = variance·(4φ″·DDᵀ/ℓ⁴ + 2φ′·I/ℓ²)` need nothing else. To add one: a file with its
 //! formula and facts, and one line in `family.rs`.
 
+mod axes;
 mod facts;
 mod family;
 mod gauss;
@@ -12,12 +14,17 @@ mod laplace;
 mod matern;
 mod profile;
 mod wendland;
+mod zero;
 
-use pulp::{Simd, WithSimd};
+use std::sync::Arc;
+
+use pulp::Simd;
 
 use super::error::NumericsError;
-use super::machine::instruction_set::Portable;
-use super::machine::registers::{Block, Pack};
+use super::machine::heap::{arc_payload, block_bytes};
+use super::machine::registers::Pack;
+use super::points::cloud::Cloud;
+use axes::Axes;
 pub use family::Family;
 pub use matern::MAX_MATERN_ORDER;
 pub(crate) use profile::{HUGE, Pairs, distance_and_inverse};
@@ -26,13 +33,17 @@ pub use wendland::WendlandSmoothness;
 /// What `2|φ′|√q = ℓ|∇k|/variance` never exceeds, in any family: Wendland's of smoothness 6 comes to 2.8.
 pub(crate) const MAX_SLOPE: f64 = 4.0;
 
-/// A family with its length scale ℓ (unit L) and variance (unit V²), all checked.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A family with its length scale ℓ (unit L), or one for each axis, and variance (unit V²), all checked.
+///
+/// With a length scale for each axis, the kernel is that of the shortest one in stretched coordinates, `u_c = s_c x_c` with
+/// `s_c = ℓ/ℓ_c ≤ 1`: whatever is summed up over pairs sees differences of these, and derivatives are turned back by the chain rule.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     family: Family,
     length_scale: f64,
     variance: f64,
     inverse_square_length: f64,
+    axes: Option<Arc<Axes>>,
 }
 
 impl Kernel {
@@ -52,16 +63,43 @@ impl Kernel {
             return refuse(parameter, requirement);
         }
         let inverse_square_length = inverse_square(length_scale);
-        Ok(Self { family, length_scale, variance, inverse_square_length })
+        Ok(Self { family, length_scale, variance, inverse_square_length, axes: None })
+    }
+
+    /// With a length scale for each axis, `[d]`.
+    ///
+    /// # Errors
+    /// Those of [`Kernel::new`] for each of them; [`NumericsError::InvalidKernelParameter`] for none at all.
+    pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self, NumericsError> {
+        for &length_scale in length_scales {
+            Self::new(family, length_scale, variance)?;
+        }
+        let shortest = length_scales.iter().copied().reduce(f64::min).ok_or(AXES_MISMATCH)?;
+        let kernel = Self::new(family, shortest, variance)?;
+        Ok(Self { axes: Some(Arc::new(Axes::new(length_scales, shortest))), ..kernel })
+    }
+
+    /// With another variance.
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidKernelParameter`] for one that kernels do not take.
+    pub fn with_variance(&self, variance: f64) -> Result<Self, NumericsError> {
+        let Self { variance, .. } = Self::new(self.family, self.length_scale, variance)?;
+        Ok(Self { variance, ..self.clone() })
     }
 
     pub fn family(&self) -> Family {
         self.family
     }
 
-    /// ℓ, unit L.
+    /// ℓ, unit L; the shortest where each axis has its own.
     pub fn length_scale(&self) -> f64 {
         self.length_scale
+    }
+
+    /// ℓ_c of each axis, `[d]`, unit L, if each has its own.
+    pub fn length_scales(&self) -> Option<&[f64]> {
+        self.axes.as_ref().map(|axes| axes.length_scales())
     }
 
     /// The factor of φ, unit V².
@@ -90,8 +128,12 @@ impl Kernel {
     }
 
     /// # Errors
-    /// [`NumericsError::KernelNotPositiveDefinite`] in a dimension where the family is not.
+    /// [`NumericsError::KernelNotPositiveDefinite`] in a dimension where the family is not; [`NumericsError::InvalidKernelParameter`] where the
+    /// axes with a length scale are others.
     pub fn check_dimension(&self, dimension: usize) -> Result<(), NumericsError> {
+        if self.length_scales().is_some_and(|axes| axes.len() != dimension) {
+            return Err(AXES_MISMATCH);
+        }
         match self.family.max_dimension() {
             Some(max_dimension) if dimension > max_dimension => {
                 Err(NumericsError::KernelNotPositiveDefinite { dimension, max_dimension })
@@ -105,9 +147,41 @@ impl Kernel {
         self.inverse_square_length
     }
 
+    /// s_c = ℓ/ℓ_c, by which differences along an axis are multiplied; 1 where all axes are alike.
+    pub(crate) fn stretch(&self, axis: usize) -> f64 {
+        self.axes.as_ref().map_or(1.0, |axes| axes.factor(axis))
+    }
+
+    /// u_c of a difference along an axis.
+    #[inline(always)]
+    pub(crate) fn stretched<S: Simd>(&self, axis: usize, difference: Pack<S>) -> Pack<S> {
+        match &self.axes {
+            None => difference,
+            Some(axes) => difference * axes.factor(axis),
+        }
+    }
+
+    /// Whether each axis has a length scale of its own.
+    pub fn is_stretched(&self) -> bool {
+        self.axes.is_some()
+    }
+
+    /// Points in coordinates in which all axes are alike.
+    pub(crate) fn stretched_cloud(&self, cloud: &Cloud) -> Cloud {
+        match &self.axes {
+            None => cloud.clone(),
+            Some(axes) => cloud.stretched(|axis| axes.factor(axis)),
+        }
+    }
+
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        self.axes.as_ref().map_or(0, |axes| block_bytes(arc_payload::<Axes>()) + axes.n_bytes())
+    }
+
     /// φ, φ′ and φ″ at 0, for families that have them there.
     pub(crate) fn profile_at_zero(&self) -> [f64; 3] {
-        Portable {}.vectorize(AtZero(self))
+        self.family.profile_at_zero()
     }
 
     /// Runs over the pairs of a block with φ, φ′ and φ″. Derivatives that the loop body does not use are never computed.
@@ -117,40 +191,11 @@ impl Kernel {
     }
 }
 
-/// One block of pairs at a distance of 0.
-struct AtZero<'a>(&'a Kernel);
-
-impl WithSimd for AtZero<'_> {
-    type Output = [f64; 3];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let mut found = [Block::ZERO; 3];
-        self.0.profiles(Zero { simd, found: &mut found });
-        found.map(|block| block.0[0])
-    }
-}
-
-struct Zero<'a, S: Simd> {
-    simd: S,
-    found: &'a mut [Block; 3],
-}
-
-impl<S: Simd> Pairs<S> for Zero<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, _at: usize) -> (Pack<S>, ()) {
-        (Pack::splat(self.simd, 0.0), ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        for (block, value) in self.found.iter_mut().zip(profile) {
-            value.store(block, at);
-        }
-    }
-}
+/// What is wrong with as many length scales as there are.
+const AXES_MISMATCH: NumericsError = NumericsError::InvalidKernelParameter {
+    parameter: "length_scales",
+    requirement: "must be one for each coordinate of the points",
+};
 
 /// 1/x², rounded once: all entries of a Gram matrix share this error, and share it where their own average out.
 fn inverse_square(x: f64) -> f64 {

@@ -146,7 +146,7 @@ impl Patches {
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Vec<Weighted>, NumericsError> {
-        let candidates = candidates(n_terms(queries.dimension()), length_scale)?;
+        let candidates = candidates(n_terms(queries.dimension()), length_scale);
         let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
         let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
         Ok(pool(&candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))

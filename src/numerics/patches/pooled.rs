@@ -1,8 +1,7 @@
 //! Hyperparameters from the likelihood pooled over a sample of neighbourhoods.
 
 use super::regression::{Kriged, Model};
-use crate::numerics::error::NumericsError;
-use crate::numerics::kernel::{Family, Kernel};
+use crate::numerics::kernel::Family;
 
 /// ν = 9/2: kriged curvatures of analytic surfaces are as far off as their deviations say. With ν = 7/2 they are closer than that, with
 /// Gauss's kernel farther (docs/error-bars.md).
@@ -35,13 +34,10 @@ pub(crate) struct Weighted {
 }
 
 /// The models of one length scale among which the likelihood decides.
-///
-/// # Errors
-/// None: the parameters are legal.
-pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Result<Vec<Model>, NumericsError> {
-    let kernel = Kernel::new(Family::Matern { order: ORDER }, 1.0, 1.0)?;
-    let of = |noise: f64| Model { kernel, length_scale, noise, n_trend };
-    Ok(NOISES.map(of).to_vec())
+pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Vec<Model> {
+    let family = Family::Matern { order: ORDER };
+    let of = |noise: f64| Model { family, length_scale, noise, n_trend };
+    NOISES.map(of).to_vec()
 }
 
 /// Shares of the models among neighbourhoods with these log likelihoods, `[neighbourhoods][models]`: the mixture that makes the sample

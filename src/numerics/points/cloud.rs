@@ -75,6 +75,14 @@ impl Cloud {
         Self { coordinates, dimension: self.dimension }
     }
 
+    /// Its coordinates times a factor for each axis, none greater than 1.
+    pub(crate) fn stretched(&self, factor: impl Fn(usize) -> f64) -> Self {
+        let factors: Vec<f64> = (0..self.dimension).map(factor).collect();
+        let stretched =
+            |point: &[f64]| -> Vec<f64> { point.iter().zip(&factors).map(|(x, s)| x * s + 0.0).collect() };
+        Self { coordinates: self.points().flat_map(stretched).collect(), dimension: self.dimension }
+    }
+
     /// The same cloud without what a parser reserved beyond its points: for clouds that are kept.
     ///
     /// `Vec::shrink_to_fit` may leave a block as it is; a copy is the size of the points.

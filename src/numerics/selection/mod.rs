@@ -147,7 +147,7 @@ pub fn learn_mean(
         Noise::Uniform(alpha) => alpha / variance,
         Noise::PerPoint(all) => all.iter().sum::<f64>() / all.len() as f64 / variance,
     };
-    let trend = Sample::of(&observed).trend(&observed, *kernel, ratio, observer)?;
+    let trend = Sample::of(&observed).trend(&observed, kernel.clone(), ratio, observer)?;
     Ok(Learned { family: kernel.family(), length_scale: kernel.length_scale(), ratio, variance, trend })
 }
 

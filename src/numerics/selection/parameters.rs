@@ -20,8 +20,22 @@ pub struct Hyperparameters {
 impl Hyperparameters {
     /// Those of a kernel.
     pub fn of(kernel: &Kernel, noise: Regularization) -> Self {
-        let length_scales = vec![kernel.length_scale()];
+        let length_scales = match kernel.length_scales() {
+            Some(length_scales) => length_scales.to_vec(),
+            None => vec![kernel.length_scale()],
+        };
         Self { family: kernel.family(), length_scales, variance: kernel.variance(), noise }
+    }
+
+    /// The kernel.
+    ///
+    /// # Errors
+    /// Those of [`Kernel::new`] and [`Kernel::of_axes`].
+    pub fn kernel(&self) -> Result<Kernel, NumericsError> {
+        match self.length_scales[..] {
+            [length_scale] => Kernel::new(self.family, length_scale, self.variance),
+            ref length_scales => Kernel::of_axes(self.family, length_scales, self.variance),
+        }
     }
 
     /// The cloud and the kernel that have these covariances: with a length scale for each axis, the cloud in units of them and ℓ = 1.

@@ -119,12 +119,13 @@ pub fn choose_local(n_points: usize, dimension: usize) -> Choice {
 }
 
 /// Kriging around queries: a check of the system, and how its cloud is sampled, which is looked at here only where its duplicates are
-/// merged.
-pub fn choose_moving(n_points: usize, dimension: usize, is_merged: bool) -> Choice {
+/// merged or the kernel stretches it.
+pub fn choose_moving(n_points: usize, dimension: usize, is_merged: bool, is_stretched: bool) -> Choice {
     let numbers = n_points.saturating_mul((dimension + 4) * size_of::<f64>());
-    let looking = if is_merged { sampling_flops(n_points, dimension) } else { 0.0 };
+    let looking = if is_merged || is_stretched { sampling_flops(n_points, dimension) } else { 0.0 };
+    let sampled = sampling_bytes(n_points, dimension).saturating_add(numbers);
     let price = Price {
-        n_bytes: sampling_bytes(n_points, dimension).saturating_add(numbers).saturating_add(1 << 10),
+        n_bytes: sampled.saturating_mul(1 + usize::from(is_stretched)).saturating_add(1 << 10),
         // Coinciding points are found by sorting.
         flops: 100.0 * n_points as f64 + looking,
     };

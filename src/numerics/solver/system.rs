@@ -59,6 +59,6 @@ impl System {
             Regularization::Uniform(_) => 0,
             Regularization::PerPoint(variances) => vec_bytes(variances),
         };
-        noise + block_bytes(arc_payload::<Cloud>()) + self.cloud.n_bytes()
+        noise + block_bytes(arc_payload::<Cloud>()) + self.cloud.n_bytes() + self.kernel.n_bytes()
     }
 }

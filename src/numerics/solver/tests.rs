@@ -9,7 +9,7 @@ use crate::numerics::testing::{all_families, circle, fibonacci_sphere};
 fn dense(cloud: &Cloud, family: Family, length_scale: f64, alpha: f64) -> Solver {
     let kernel = Kernel::new(family, length_scale, 1.0).unwrap();
     let regularization = Regularization::uniform(alpha).unwrap();
-    System::new(Arc::new(cloud.clone()), kernel, regularization)
+    System::new(Arc::new(cloud.clone()), kernel.clone(), regularization)
         .and_then(|system| Solver::dense(system, &Unobserved))
         .unwrap()
 }
@@ -67,7 +67,7 @@ fn the_fallback_asks_before_it_takes_all_of_its_matrix() {
             answer
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let solver = System::new(cloud.clone(), kernel, alpha.clone())
+        let solver = System::new(cloud.clone(), kernel.clone(), alpha.clone())
             .and_then(|system| Solver::dense_in(workspace, system, &Unobserved));
         (solver, asked)
     };
@@ -107,7 +107,7 @@ fn coinciding_points_need_regularization() {
     let cloud = Cloud::new(vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 2).unwrap();
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let outcome = |regularization: Regularization| {
-        System::new(Arc::new(cloud.clone()), kernel, regularization)
+        System::new(Arc::new(cloud.clone()), kernel.clone(), regularization)
             .and_then(|system| Solver::dense(system, &Unobserved))
             .map(|f| f.method())
     };
@@ -127,7 +127,7 @@ fn values_that_no_expansion_can_reach_are_refused_with_a_remedy() {
     match Solution::of(&solver, &values, &Unobserved) {
         Err(NumericsError::NotPositiveDefinite { minimum_alpha, .. }) => {
             assert!(minimum_alpha > 0.0 && minimum_alpha < 1e-7);
-            let kernel = *solver.kernel();
+            let kernel = solver.kernel().clone();
             let remedy = Regularization::uniform(minimum_alpha).unwrap();
             let again = System::new(Arc::new(cloud), kernel, remedy)
                 .and_then(|system| Solver::dense(system, &Unobserved))
@@ -174,7 +174,7 @@ fn the_fallback_stops_at_every_checkpoint() {
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let outcome = |checkpoint: usize| {
         let observer = StopAt { checkpoint, n_checkpoints: Default::default() };
-        let solver = System::new(cloud.clone(), kernel, Regularization::Uniform(0.0))
+        let solver = System::new(cloud.clone(), kernel.clone(), Regularization::Uniform(0.0))
             .and_then(|system| Solver::dense(system, &observer));
         (solver.map(|f| f.method()), observer.n_checkpoints.into_inner())
     };
@@ -194,7 +194,7 @@ fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let noise: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { 0.5 } else { 0.0 }).collect();
     let regularization = Regularization::per_point(noise.clone()).unwrap();
-    let solver = System::new(Arc::new(cloud.clone()), kernel, regularization)
+    let solver = System::new(Arc::new(cloud.clone()), kernel.clone(), regularization)
         .and_then(|system| Solver::dense(system, &Unobserved))
         .unwrap();
     let weights: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { (i as f64).cos() } else { 0.0 }).collect();
@@ -226,7 +226,7 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
     poisoned.fill(f64::NAN);
     drop(poisoned);
     let workspace = Workspace { spare: &spare, may_take: &mut |_| unreachable!("it is well conditioned") };
-    let recycled = System::new(cloud.clone(), kernel, alpha.clone())
+    let recycled = System::new(cloud.clone(), kernel.clone(), alpha.clone())
         .and_then(|system| Solver::dense_in(workspace, system, &Unobserved))
         .unwrap();
     let fresh =

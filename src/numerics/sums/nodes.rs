@@ -51,7 +51,8 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
-    /// `q = |x − y|²/ℓ²` for pack `at` of the points y of a block; `each(c, x[c] − y[c])` sees the differences, in order.
+    /// `q = |u|²/ℓ²` for pack `at` of the points y of a block, u the difference `x − y` as the kernel stretches it; `each(c, u[c])` sees
+    /// its coordinates, in order.
     #[inline(always)]
     pub(crate) fn scaled_distances<S: Simd>(
         &self,
@@ -64,7 +65,7 @@ impl Nodes {
         let columns = &self.coordinates[block * self.dimension..][..self.dimension];
         let mut sum = Pack::splat(simd, 0.0);
         for (c, (column, &x)) in columns.iter().zip(x).enumerate() {
-            let difference = x - Pack::load(simd, column, at);
+            let difference = kernel.stretched(c, x - Pack::load(simd, column, at));
             each(c, difference);
             sum = difference.mul_add(difference, sum);
         }

@@ -63,6 +63,7 @@ impl Search {
         if let Some(at) = (1..families.len()).find(|&at| families[..at].contains(&families[at])) {
             return Err(Problem::invalid_request(format!("/families/{at}"), "a family is tried once"));
         }
+        check_axes(request.vary.as_deref().unwrap_or_default())?;
         Ok(Self {
             criterion: match request.criterion.unwrap_or_default() {
                 SelectionCriterion::MarginalLikelihood => Criterion::MarginalLikelihood,
@@ -78,8 +79,13 @@ impl Search {
     }
 
     /// What the search takes, where it takes as long as it mostly does.
-    pub(super) fn price(&self, n: usize, d: usize) -> Price {
-        let n_free = self.vary.as_ref().map_or(3, Vec::len);
+    pub(super) fn price(&self, (n, d): (usize, usize), n_length_scales: usize) -> Price {
+        let is_of_axes =
+            |free: &FreeParameter| free.parameter == SelectionParameter::LengthScales && free.axis.is_none();
+        let n_free = match &self.vary {
+            None => 2 + n_length_scales,
+            Some(vary) => vary.iter().map(|free| if is_of_axes(free) { d } else { 1 }).sum(),
+        };
         let n_families = self.families.len().max(1) + self.orders.map_or(0, |(a, b)| usize::from(b - a));
         let n_descents = n_families * (1 + self.restarts);
         let n_evaluations = n_descents * expected_evaluations(n_free);
@@ -123,6 +129,9 @@ impl Search {
         let variation = |(at, free): (usize, &FreeParameter)| {
             let parameter = match free.parameter {
                 SelectionParameter::LengthScale => Parameter::LengthScale,
+                SelectionParameter::LengthScales => {
+                    free.axis.map_or(Parameter::LengthScales, Parameter::LengthScaleOfAxis)
+                }
                 SelectionParameter::Variance => Parameter::Variance,
                 SelectionParameter::Alpha => Parameter::Alpha,
                 SelectionParameter::Epsilon => Parameter::Epsilon,
@@ -137,17 +146,34 @@ impl Search {
 /// Length scale, variance and noise about the start.
 fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
     let about = |parameter, x: f64, below: f64| Variation { parameter, min: x / below, max: x * RANGE };
-    let length_scale = start.length_scales.first().copied().unwrap_or(1.0);
-    let mut variations = vec![
-        about(Parameter::LengthScale, length_scale, RANGE),
-        about(Parameter::Variance, start.variance, RANGE),
-    ];
+    let mut variations: Vec<Variation> = match start.length_scales[..] {
+        [length_scale] => vec![about(Parameter::LengthScale, length_scale, RANGE)],
+        ref all => {
+            let axes = all.iter().enumerate();
+            axes.map(|(axis, &scale)| about(Parameter::LengthScaleOfAxis(axis), scale, RANGE)).collect()
+        }
+    };
+    variations.push(about(Parameter::Variance, start.variance, RANGE));
     if let Regularization::Uniform(alpha) = start.noise {
         // A start without noise says nothing of how much there may be.
         let alpha = alpha.max(start.variance / RANGE_OF_ALPHA);
         variations.push(about(Parameter::Alpha, alpha, RANGE_OF_ALPHA));
     }
     variations.into_iter().enumerate().collect()
+}
+
+/// # Errors
+/// 422 for the axis of what has none.
+fn check_axes(vary: &[FreeParameter]) -> Result<(), Problem> {
+    let is_wrong =
+        |free: &FreeParameter| free.axis.is_some() && free.parameter != SelectionParameter::LengthScales;
+    match vary.iter().position(is_wrong) {
+        None => Ok(()),
+        Some(at) => {
+            let detail = "only length_scales have an axis";
+            Err(Problem::invalid_request(format!("/vary/{at}/axis"), detail))
+        }
+    }
 }
 
 /// The orders ν − ½ within bounds on ν.
@@ -203,12 +229,13 @@ impl Work {
         let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
         let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
         let mut gradient = vec![None; n_given];
-        for ((at, _), slope) in variations.iter().zip(&selected.gradient) {
-            gradient[*at] = Some(*slope);
+        let mut slopes = selected.gradient.iter();
+        for (at, variation) in &variations {
+            let n_free = if variation.parameter == Parameter::LengthScales { cloud.dimension() } else { 1 };
+            gradient[*at] = Some(slopes.by_ref().take(n_free).sum());
         }
-        let Hyperparameters { family, length_scales, variance, noise } = &selected.hyperparameters;
-        let length_scale = length_scales.first().copied().unwrap_or(1.0);
-        let kernel = Kernel::new(*family, length_scale, *variance).map_err(refused)?;
+        let kernel = selected.hyperparameters.kernel().map_err(refused)?;
+        let noise = &selected.hyperparameters.noise;
         Ok(ModelSelectionResponse {
             kernel: KernelUsed::from(&kernel),
             alpha: match noise {
@@ -237,7 +264,7 @@ fn scaled(
     regularization: &Regularization,
     scale: f64,
 ) -> Result<Hyperparameters, NumericsError> {
-    let kernel = Kernel::new(kernel.family(), kernel.length_scale(), kernel.variance() * scale)?;
+    let kernel = kernel.with_variance(kernel.variance() * scale)?;
     let noise = match regularization {
         Regularization::Uniform(alpha) => Regularization::uniform(alpha * scale)?,
         // Noise per point is never scaled.

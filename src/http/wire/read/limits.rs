@@ -49,7 +49,7 @@ impl<'a> ParseContext<'a> {
             List::Points | List::Numbers | List::ValueLists => self.max_points,
             List::Queries => self.max_queries,
             List::Quantiles => MAX_QUANTILES,
-            List::Coordinates => self.max_dimension,
+            List::Coordinates | List::LengthScales => self.max_dimension,
             List::Other => usize::MAX,
         }
     }
@@ -63,6 +63,7 @@ impl<'a> ParseContext<'a> {
             (List::Queries, _) => too_many_queries(limit, length),
             (List::Numbers, _) => too_many_numbers(limit, length),
             (List::ValueLists, _) => too_many_value_lists(limit, length),
+            (List::LengthScales, _) => too_many_length_scales(limit, length),
             (List::Quantiles, _) => too_many_quantiles(limit, length),
             (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
         };
@@ -83,6 +84,8 @@ pub(super) enum List {
     ValueLists,
     /// Probabilities.
     Quantiles,
+    /// One number for each axis.
+    LengthScales,
     /// One row.
     Coordinates,
     /// Words, or no list at all.
@@ -96,6 +99,7 @@ impl List {
             "queries" => Self::Queries,
             "values" | "noise_variances" => Self::Numbers,
             "quantiles" => Self::Quantiles,
+            "length_scales" => Self::LengthScales,
             _ => Self::Other,
         }
     }
@@ -110,7 +114,9 @@ impl List {
         match self {
             Self::Points | Self::Queries => Self::Coordinates,
             Self::ValueLists => Self::Numbers,
-            Self::Numbers | Self::Quantiles | Self::Coordinates | Self::Other => Self::Other,
+            Self::Numbers | Self::Quantiles | Self::LengthScales | Self::Coordinates | Self::Other => {
+                Self::Other
+            }
         }
     }
 }
@@ -172,6 +178,12 @@ fn too_many_value_lists(limit: usize, required: usize) -> Problem {
     )
 }
 
+fn too_many_length_scales(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "length scales", limit, Some(required)).with_remedy(
+        "send one per coordinate of the points (operators raise the limit by GRAMIAN_MAX_DIMENSION)",
+    )
+}
+
 fn too_many_quantiles(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required)).with_remedy(
         "ask for fewer: they are those of normal distributions, whose means and variances say everything",
@@ -227,7 +239,16 @@ mod tests {
         let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
         assert_eq!(
             names,
-            ["noise_variances", "normals", "points", "quantiles", "queries", "values", "values"]
+            [
+                "length_scales",
+                "noise_variances",
+                "normals",
+                "points",
+                "quantiles",
+                "queries",
+                "values",
+                "values"
+            ]
         );
         for (name, depth) in found {
             // The rows of batches are named by their type: requests of one list have the same name for it.

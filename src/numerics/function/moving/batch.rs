@@ -10,10 +10,10 @@ pub(super) struct Batch {
     /// Points of a neighbourhood.
     pub count: usize,
     lanes: usize,
-    /// From the nearest point to each of the others, `[d, places, lanes]`, unit L: differences are what distances are made of, and
-    /// from a query far away all of them would be the same.
+    /// From the nearest point to each of the others as the kernel stretches it, `[d, places, lanes]`, unit L: differences are what distances
+    /// are made of, and from a query far away all of them would be the same.
     pub points: Vec<f64>,
-    /// From the nearest point to the query, `[d, lanes]`, unit L.
+    /// From the nearest point to the query, likewise, `[d, lanes]`.
     pub query: Vec<f64>,
     /// `[places, lanes]`, unit V; 0 in places that are left empty.
     pub values: Vec<f64>,
@@ -49,15 +49,15 @@ impl Batch {
         system: &System,
         values: &[f64],
     ) {
-        let (lanes, n_places) = (self.lanes, self.n_places());
+        let (lanes, n_places, kernel) = (self.lanes, self.n_places(), system.kernel());
         let Some(origin) = nearest.first().map(|first| system.cloud().point(first.point)) else { return };
         for (axis, (x, o)) in x.iter().zip(origin).enumerate() {
-            self.query[axis * lanes + lane] = x - o;
+            self.query[axis * lanes + lane] = (x - o) * kernel.stretch(axis);
         }
         for (j, neighbour) in nearest.iter().enumerate() {
             let at = j * lanes + lane;
             for (axis, (x, o)) in system.cloud().point(neighbour.point).iter().zip(origin).enumerate() {
-                self.points[axis * n_places * lanes + at] = x - o;
+                self.points[axis * n_places * lanes + at] = (x - o) * kernel.stretch(axis);
             }
             self.values[at] = values[neighbour.point];
             self.noise[at] = system.regularization().at(neighbour.point);

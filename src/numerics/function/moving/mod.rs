@@ -22,9 +22,10 @@ use super::posterior::Variances;
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::machine::heap::{arc_payload, block_bytes};
 use crate::numerics::machine::instruction_set::InstructionSet;
+use crate::numerics::machine::small::Small;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::points::neighbours::{Neighbour, Neighbours};
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::System;
 use crate::numerics::solver::choose::NEIGHBOURS;
@@ -35,7 +36,34 @@ use kriging::{Found, Krige, Parts, Workspace};
 /// A system that is solved around each query anew.
 pub struct Moving {
     system: System,
-    sampling: Arc<Sampling>,
+    near: Near,
+}
+
+/// Who knows which points are near: those with the greatest covariances.
+enum Near {
+    Sampled(Arc<Sampling>),
+    /// The cloud in coordinates in which the kernel has one length scale.
+    Stretched(Cloud, Neighbours),
+}
+
+impl Near {
+    /// The nearest points, nearest first.
+    fn nearest_into(&self, system: &System, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        match self {
+            Self::Sampled(sampling) => sampling.neighbours().nearest_into(system.cloud(), x, count, found),
+            Self::Stretched(cloud, neighbours) => {
+                let stretched = x.iter().enumerate().map(|(axis, x)| x * system.kernel().stretch(axis));
+                neighbours.nearest_into(cloud, &stretched.collect::<Small>(), count, found);
+            }
+        }
+    }
+
+    fn n_bytes(&self) -> usize {
+        match self {
+            Self::Sampled(sampling) => block_bytes(arc_payload::<Sampling>()) + sampling.n_bytes(),
+            Self::Stretched(cloud, neighbours) => cloud.n_bytes() + neighbours.n_bytes(),
+        }
+    }
 }
 
 /// What is asked at queries.
@@ -57,7 +85,15 @@ pub struct MovingAnswer {
 impl Moving {
     /// Of a system and how its cloud is sampled.
     pub fn new(system: System, sampling: Arc<Sampling>) -> Self {
-        Self { system, sampling }
+        let near = match system.kernel().is_stretched() {
+            false => Near::Sampled(sampling),
+            true => {
+                let cloud = system.kernel().stretched_cloud(system.cloud());
+                let neighbours = Neighbours::of(&cloud);
+                Near::Stretched(cloud, neighbours)
+            }
+        };
+        Self { system, near }
     }
 
     pub fn system(&self) -> &System {
@@ -71,7 +107,7 @@ impl Moving {
 
     /// Bytes held on the heap, those of the cloud and its sampling included.
     pub fn n_bytes(&self) -> usize {
-        self.system.n_bytes() + block_bytes(arc_payload::<Sampling>()) + self.sampling.n_bytes()
+        self.system.n_bytes() + self.near.n_bytes()
     }
 
     /// Answers at queries `[m, d]` for values `[n]`, unit V.
@@ -164,12 +200,12 @@ impl Room {
 
     /// Puts the neighbourhoods of some consecutive queries side by side.
     fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
-        let Moving { system, sampling } = fit.moving;
+        let Moving { system, near } = fit.moving;
         let needs_smooth = fit.request.order != JetOrder::Value && system.kernel().has_kink();
         for lane in 0..n_queries {
             let (query, count) = (first + lane, self.batch.count);
             let x = fit.queries.point(query);
-            sampling.neighbours().nearest_into(system.cloud(), x, count, &mut self.nearest);
+            near.nearest_into(system, x, count, &mut self.nearest);
             let coinciding = |n: &&Neighbour| system.cloud().point(n.point) == x;
             if let Some(found) = self.nearest.iter().find(coinciding).filter(|_| needs_smooth) {
                 return Err(NumericsError::KernelNotSmooth { query, point: found.point });

@@ -156,7 +156,7 @@ fn repeated_observations_with_noise_count_as_often_as_they_are_there() {
     let of = |n: usize, noise: f64| {
         let cloud = Cloud::new(place.repeat(n), 3).unwrap();
         let noise = Regularization::per_point(vec![noise; n]).unwrap();
-        moving(System::new(Arc::new(cloud), kernel, noise).unwrap())
+        moving(System::new(Arc::new(cloud), kernel.clone(), noise).unwrap())
             .at(&vec![2.0; n], &inside(), EVERYTHING, &Unobserved)
             .unwrap()
     };

@@ -77,7 +77,7 @@ impl<S: Simd> Factored<'_, S> {
         let n_blocks = triangle(n).div_ceil(per_block);
         for block in 0..n_blocks {
             let entries = &mut self.matrix[block * per_block..][..per_block];
-            self.model.kernel.profiles(Fill { simd: self.simd, entries, scale });
+            self.model.family.profiles(Fill { simd: self.simd, entries, scale });
         }
         for i in 0..n {
             let (row, mask) = (triangle(i), self.mask(i));
@@ -137,7 +137,7 @@ impl<S: Simd> Factored<'_, S> {
                 }
                 square.write(&mut q, j - start);
             }
-            self.model.kernel.profiles(Derivatives {
+            self.model.family.profiles(Derivatives {
                 simd: self.simd,
                 entries: &mut q[..per_block],
                 first: &mut first[..per_block],

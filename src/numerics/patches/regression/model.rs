@@ -3,13 +3,13 @@
 use smallvec::SmallVec;
 
 use super::{Squares, triangle};
-use crate::numerics::kernel::Kernel;
+use crate::numerics::kernel::Family;
 
 /// Shape of the covariance: all but its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Model {
-    /// φ of length scale 1, variance 1.
-    pub kernel: Kernel,
+    /// φ.
+    pub family: Family,
     /// ℓ in units of the radius of a patch.
     pub length_scale: f64,
     /// τ²: variance of the noise of a point over s².
@@ -33,7 +33,7 @@ const THIRD_DERIVATIVE: f64 = 8.0 * 4.5 * 4.5 * 4.5 / 105.0;
 pub(super) fn prior_covariance(model: &Model, k: usize) -> Squares {
     let p = triangle(k) + k + 1;
     let scale = model.length_scale.powi(-2);
-    let [phi, first, second] = model.kernel.profile_at_zero();
+    let [phi, first, second] = model.family.profile_at_zero();
     let (slope, bend) = (2.0 * first * scale, 4.0 * second * scale * scale);
     let mut prior = Squares::from_elem(0.0, p * p);
     prior[0] = phi;

@@ -75,7 +75,8 @@ impl Layout {
     }
 
     /// Turns the sums `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′` into as much of a jet as there is room for: factors
-    /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian.
+    /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian. Where the kernel stretches coordinates, D are differences of
+    /// those, and derivatives along an axis come with its factor.
     ///
     /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
     pub(crate) fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
@@ -86,10 +87,11 @@ impl Layout {
             let sum = variance * sum;
             *slot = match at {
                 0 => sum,
-                at if at < self.hessian() => 2.0 * sum * inverse * inverse,
+                at if at < self.hessian() => 2.0 * sum * inverse * inverse * kernel.stretch(at - 1),
                 _ => {
                     let entry = 4.0 * sum * inverse * inverse * inverse * inverse;
                     let entry = if row == column { entry + trace } else { entry };
+                    let entry = entry * kernel.stretch(row) * kernel.stretch(column);
                     column += 1;
                     if column == self.dimension {
                         row += 1;

@@ -157,7 +157,19 @@ fn operator_matrix(
         let (component, query) = (index / m, index % m);
         if !geometry.is_null()[query] {
             let x = queries.point(query);
-            nodes.dispatch(Row { nodes: &nodes, kernel, geometry, operator, component, query, x, row });
+            let tangential_trace = stretched_trace(kernel, geometry.normal(query));
+            let nodes = &nodes;
+            nodes.dispatch(Row {
+                nodes,
+                kernel,
+                geometry,
+                operator,
+                component,
+                query,
+                x,
+                tangential_trace,
+                row,
+            });
         }
         Ok(())
     })?;
@@ -223,8 +235,19 @@ fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
     (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query])
 }
 
+/// `tr S² − νᵀS²ν`, S the factors by which a kernel stretches coordinates: d − 1 where it does not.
+fn stretched_trace(kernel: &Kernel, normal: &[f64]) -> f64 {
+    if !kernel.is_stretched() {
+        return (normal.len() - 1) as f64;
+    }
+    let across = |(axis, nu): (usize, &f64)| kernel.stretch(axis).powi(2) * (1.0 - nu * nu);
+    normal.iter().enumerate().map(across).sum()
+}
+
 /// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:
 /// `P∇k = 2vφ′/ℓ² (D − aν)` and `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+///
+/// Where the kernel stretches coordinates by S = diag(s), D is `S²(x − x_j)`, and d − 1 is `tr S² − νᵀS²ν`.
 struct Row<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
@@ -233,6 +256,8 @@ struct Row<'a> {
     component: usize,
     query: usize,
     x: &'a [f64],
+    /// `tr S² − νᵀS²ν`.
+    tangential_trace: f64,
     row: &'a mut [f64],
 }
 
@@ -264,13 +289,14 @@ struct RowPairs<'a, S> {
 }
 
 impl<S: Simd> RowPairs<'_, S> {
-    /// q and a = ν·D of a pack; `each` sees the differences.
+    /// q and a = ν·D of a pack; `each` sees the entries of D.
     #[inline(always)]
     fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
         let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
         let normal = geometry.normal(query);
         let mut along = Pack::splat(self.simd, 0.0);
-        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, stretched| {
+            let difference = kernel.stretched(c, stretched);
             along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
             each(c, difference);
         });
@@ -310,22 +336,27 @@ struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
 impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
     type Others = (Pack<S>, Pack<S>);
 
-    /// Hands on q and a.
+    /// Hands on |D|²/ℓ² and a.
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
-        let (q, along) = self.0.along(at, |_, _| ());
-        (q, (q, along))
+        let Row { kernel, .. } = *self.0.row;
+        if !kernel.is_stretched() {
+            let (q, along) = self.0.along(at, |_, _| ());
+            return (q, (q, along));
+        }
+        let mut square = Pack::splat(self.0.simd, 0.0);
+        let (q, along) = self.0.along(at, |_, difference| square = difference.mul_add(difference, square));
+        (q, (square * kernel.inverse_square_length(), along))
     }
 
     #[inline(always)]
-    fn take(&mut self, at: usize, (q, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
-        let Row { kernel, geometry, query, x, .. } = *self.0.row;
+    fn take(&mut self, at: usize, (square, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
+        let Row { kernel, geometry, query, tangential_trace, .. } = *self.0.row;
         let inverse_square = kernel.inverse_square_length();
         let first = 2.0 * kernel.variance() * inverse_square;
-        let tangent_dimension = (x.len() - 1) as f64;
-        // (|D|² − a²)/ℓ², with |D|²/ℓ² = q.
-        let tangential = q - along * along * inverse_square;
-        let turned = tangent_dimension - along * geometry.trace_of_shape_operator(query);
+        // (|D|² − a²)/ℓ².
+        let tangential = square - along * along * inverse_square;
+        let turned = tangential_trace - along * geometry.trace_of_shape_operator(query);
         (2.0 * first * bend).mul_add(tangential, first * slope * turned).store(self.0.out, at);
     }
 }

@@ -78,7 +78,7 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
     let nodes = Arc::new(Cloud::new(nodes, d)?);
     let fit = |alpha| {
         let alpha = Regularization::Uniform(alpha);
-        let solver = System::new(nodes.clone(), kernel, alpha)
+        let solver = System::new(nodes.clone(), kernel.clone(), alpha)
             .and_then(|system| Solver::dense(system, &Unobserved))?;
         Interpolant::fit(Arc::new(solver), &data, &Unobserved)
     };
