@@ -21,6 +21,7 @@ mod examples;
 mod fits;
 mod golden;
 mod learned;
+mod length_scales;
 mod limits;
 mod load;
 mod local;

@@ -53,7 +53,7 @@ impl Kernel {
     pub fn new(family: Family, length_scale: f64, variance: f64) -> Result<Self, NumericsError> {
         let refuse =
             |parameter, requirement| Err(NumericsError::InvalidKernelParameter { parameter, requirement });
-        if !(1e-140..=1e140).contains(&length_scale) {
+        if !LENGTH_SCALES.contains(&length_scale) {
             return refuse("length_scale", "must be positive, between 1e-140 and 1e140");
         }
         if !(1e-140..=1e140).contains(&variance) {
@@ -71,8 +71,9 @@ impl Kernel {
     /// # Errors
     /// Those of [`Kernel::new`] for each of them; [`NumericsError::InvalidKernelParameter`] for none at all.
     pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self, NumericsError> {
-        for &length_scale in length_scales {
-            Self::new(family, length_scale, variance)?;
+        if let Some(&wrong) = length_scales.iter().find(|length_scale| !LENGTH_SCALES.contains(length_scale))
+        {
+            Self::new(family, wrong, variance).map_err(of_axis)?;
         }
         let shortest = length_scales.iter().copied().reduce(f64::min).ok_or(AXES_MISMATCH)?;
         let kernel = Self::new(family, shortest, variance)?;
@@ -188,6 +189,19 @@ impl Kernel {
     #[inline(always)]
     pub(crate) fn profiles<S: Simd>(&self, pairs: impl Pairs<S>) {
         self.family.profiles(pairs);
+    }
+}
+
+/// Their squares and inverse squares are well inside float64.
+const LENGTH_SCALES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+
+/// What is wrong with a length scale, said of one of several.
+fn of_axis(error: NumericsError) -> NumericsError {
+    match error {
+        NumericsError::InvalidKernelParameter { parameter: "length_scale", requirement } => {
+            NumericsError::InvalidKernelParameter { parameter: "length_scales", requirement }
+        }
+        other => other,
     }
 }
 
