@@ -603,6 +603,9 @@ answer has them yet.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct FreeParameter {
+        ///length_scales: the axis, from 0; every axis if absent, each within these bounds.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub axis: ::std::option::Option<u64>,
         ///The greatest that it may be.
         pub max: f64,
         ///The least that it may be.
@@ -857,7 +860,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+    /**A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
+is refused.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct Kernel {
@@ -869,6 +873,9 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub length_scale: ::std::option::Option<f64>,
+        ///A length scale for each axis instead, in the units of the coordinates. An empty list counts as absent.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub length_scales: ::std::vec::Vec<f64>,
         ///matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
@@ -1007,8 +1014,12 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         pub epsilon: ::std::option::Option<f64>,
         ///The family, which determines φ.
         pub family: KernelFamily,
-        ///The length scale ℓ, in the unit of the coordinates.
-        pub length_scale: f64,
+        ///The length scale ℓ, in the unit of the coordinates; absent where each axis has its own.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub length_scale: ::std::option::Option<f64>,
+        ///The length scale of each axis, where each has its own.
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub length_scales: ::std::vec::Vec<f64>,
         ///matern: the smoothness ν.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
@@ -1367,7 +1378,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
-        /**What is free, and its bounds. Absent: length scale, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
+        /**What is free, and its bounds. Absent: length scale, or that of each axis where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
 alpha) to a hundred times of where the search begins.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub vary: ::std::vec::Vec<FreeParameter>,
@@ -1391,7 +1402,8 @@ alpha) to a hundred times of where the search begins.*/
         pub evaluations: u64,
         ///The families that were tried.
         pub families: ::std::vec::Vec<FamilyScore>,
-        ///Derivatives of the score in the logarithms of what is free, in the order of `vary`; null for nu, which takes steps.
+        /**Derivatives of the score in the logarithms of what is free, in the order of `vary`; for `length_scales` without an axis, in that of a factor
+of all; null for nu, which takes steps.*/
         pub gradient: ::std::vec::Vec<::std::option::Option<f64>>,
         ///The kernel that was selected: sent as `kernel` it is used.
         pub kernel: KernelUsed,
@@ -1927,6 +1939,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub enum SelectionParameter {
         #[serde(rename = "length_scale")]
         LengthScale,
+        #[serde(rename = "length_scales")]
+        LengthScales,
         #[serde(rename = "variance")]
         Variance,
         #[serde(rename = "alpha")]
@@ -1940,6 +1954,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
             match *self {
                 Self::LengthScale => f.write_str("length_scale"),
+                Self::LengthScales => f.write_str("length_scales"),
                 Self::Variance => f.write_str("variance"),
                 Self::Alpha => f.write_str("alpha"),
                 Self::Epsilon => f.write_str("epsilon"),
@@ -1954,6 +1969,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ) -> ::std::result::Result<Self, self::error::ConversionError> {
             match value {
                 "length_scale" => Ok(Self::LengthScale),
+                "length_scales" => Ok(Self::LengthScales),
                 "variance" => Ok(Self::Variance),
                 "alpha" => Ok(Self::Alpha),
                 "epsilon" => Ok(Self::Epsilon),
@@ -4189,6 +4205,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         }
         #[derive(Clone, Debug)]
         pub struct FreeParameter {
+            axis: ::std::result::Result<
+                ::std::option::Option<u64>,
+                ::std::string::String,
+            >,
             max: ::std::result::Result<f64, ::std::string::String>,
             min: ::std::result::Result<f64, ::std::string::String>,
             parameter: ::std::result::Result<
@@ -4199,6 +4219,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         impl ::std::default::Default for FreeParameter {
             fn default() -> Self {
                 Self {
+                    axis: Ok(Default::default()),
                     max: Err("no value supplied for max".to_string()),
                     min: Err("no value supplied for min".to_string()),
                     parameter: Err("no value supplied for parameter".to_string()),
@@ -4206,6 +4227,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         impl FreeParameter {
+            pub fn axis<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<u64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.axis = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for axis: {e}")
+                    });
+                self
+            }
             pub fn max<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<f64>,
@@ -4249,6 +4282,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 value: FreeParameter,
             ) -> ::std::result::Result<Self, super::error::ConversionError> {
                 Ok(Self {
+                    axis: value.axis?,
                     max: value.max?,
                     min: value.min?,
                     parameter: value.parameter?,
@@ -4258,6 +4292,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         impl ::std::convert::From<super::FreeParameter> for FreeParameter {
             fn from(value: super::FreeParameter) -> Self {
                 Self {
+                    axis: Ok(value.axis),
                     max: Ok(value.max),
                     min: Ok(value.min),
                     parameter: Ok(value.parameter),
@@ -5291,6 +5326,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::option::Option<f64>,
                 ::std::string::String,
             >,
+            length_scales: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
             nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
             smoothness: ::std::result::Result<
                 ::std::option::Option<super::Smoothness>,
@@ -5307,6 +5346,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     epsilon: Ok(Default::default()),
                     family: Err("no value supplied for family".to_string()),
                     length_scale: Ok(Default::default()),
+                    length_scales: Ok(Default::default()),
                     nu: Ok(Default::default()),
                     smoothness: Ok(Default::default()),
                     variance: Ok(Default::default()),
@@ -5347,6 +5387,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for length_scale: {e}")
+                    });
+                self
+            }
+            pub fn length_scales<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.length_scales = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for length_scales: {e}")
                     });
                 self
             }
@@ -5394,6 +5446,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     epsilon: value.epsilon?,
                     family: value.family?,
                     length_scale: value.length_scale?,
+                    length_scales: value.length_scales?,
                     nu: value.nu?,
                     smoothness: value.smoothness?,
                     variance: value.variance?,
@@ -5406,6 +5459,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     epsilon: Ok(value.epsilon),
                     family: Ok(value.family),
                     length_scale: Ok(value.length_scale),
+                    length_scales: Ok(value.length_scales),
                     nu: Ok(value.nu),
                     smoothness: Ok(value.smoothness),
                     variance: Ok(value.variance),
@@ -5672,7 +5726,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::string::String,
             >,
             family: ::std::result::Result<super::KernelFamily, ::std::string::String>,
-            length_scale: ::std::result::Result<f64, ::std::string::String>,
+            length_scale: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            length_scales: ::std::result::Result<
+                ::std::vec::Vec<f64>,
+                ::std::string::String,
+            >,
             nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
             smoothness: ::std::result::Result<
                 ::std::option::Option<super::Smoothness>,
@@ -5685,7 +5746,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self {
                     epsilon: Ok(Default::default()),
                     family: Err("no value supplied for family".to_string()),
-                    length_scale: Err("no value supplied for length_scale".to_string()),
+                    length_scale: Ok(Default::default()),
+                    length_scales: Ok(Default::default()),
                     nu: Ok(Default::default()),
                     smoothness: Ok(Default::default()),
                     variance: Err("no value supplied for variance".to_string()),
@@ -5719,13 +5781,25 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
             pub fn length_scale<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<f64>,
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.length_scale = value
                     .try_into()
                     .map_err(|e| {
                         format!("error converting supplied value for length_scale: {e}")
+                    });
+                self
+            }
+            pub fn length_scales<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.length_scales = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for length_scales: {e}")
                     });
                 self
             }
@@ -5773,6 +5847,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     epsilon: value.epsilon?,
                     family: value.family?,
                     length_scale: value.length_scale?,
+                    length_scales: value.length_scales?,
                     nu: value.nu?,
                     smoothness: value.smoothness?,
                     variance: value.variance?,
@@ -5785,6 +5860,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     epsilon: Ok(value.epsilon),
                     family: Ok(value.family),
                     length_scale: Ok(value.length_scale),
+                    length_scales: Ok(value.length_scales),
                     nu: Ok(value.nu),
                     smoothness: Ok(value.smoothness),
                     variance: Ok(value.variance),

@@ -6,7 +6,7 @@ from typing import Any, Self, TypeVar
 from attrs import define as _attrs_define
 
 from ..models.selection_parameter import SelectionParameter
-from ..types import without_unset
+from ..types import UNSET, Unset, without_unset
 
 T = TypeVar("T", bound="FreeParameter")
 
@@ -19,11 +19,13 @@ class FreeParameter:
         parameter (SelectionParameter): What may be free.
         min_ (float): The least that it may be.
         max_ (float): The greatest that it may be.
+        axis (int | Unset): length_scales: the axis, from 0; every axis if absent, each within these bounds.
     """
 
     parameter: SelectionParameter
     min_: float
     max_: float
+    axis: int | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -34,6 +36,8 @@ class FreeParameter:
 
         max_ = self.max_
 
+        axis = self.axis
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -43,6 +47,8 @@ class FreeParameter:
                 "max": max_,
             }
         )
+        if axis is not UNSET:
+            field_dict["axis"] = axis
 
         return field_dict
 
@@ -55,10 +61,13 @@ class FreeParameter:
 
         max_ = d.pop("max")
 
+        axis = d.pop("axis", UNSET)
+
         free_parameter = cls(
             parameter=parameter,
             min_=min_,
             max_=max_,
+            axis=axis,
         )
 
         return free_parameter

@@ -26,8 +26,9 @@ class Geometry:
         Attributes:
             cloud (CloudRef | Unset): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points`
                 is given.
-            kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
-                another family is refused.
+            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
+                − y_c)²/length_scales_c²`. A parameter of another family
+                is refused.
             alpha (float | Unset): Added to the diagonal of its Gram matrix.
             noise_variances (list[float] | Unset): One entry per point of its cloud, instead of `alpha`. An empty list
                 counts as absent.

@@ -26,8 +26,9 @@ class InterpolationRequest:
     Attributes:
         cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
         values (list[float]): The values at the points, in their order.
-        kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
-            another family is refused.
+        kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
+            − y_c)²/length_scales_c²`. A parameter of another family
+            is refused.
         alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
             interpolates, the variance
             of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 from attrs import define as _attrs_define
 
@@ -14,22 +14,27 @@ T = TypeVar("T", bound="Kernel")
 
 @_attrs_define
 class Kernel:
-    """A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of another family is refused.
+    """A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A
+    parameter of another family
+    is refused.
 
-    Attributes:
-        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-        length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; chosen from the cloud if
-            absent.
-        variance (float | Unset): The factor of φ, unit of the values squared; 1 if absent.
-        epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of
-            the cloud.
-        nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no
-            enumerations of fractions.)
-        smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
+        Attributes:
+            family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
+            length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; chosen from the cloud if
+                absent.
+            length_scales (list[float] | Unset): A length scale for each axis instead, in the units of the coordinates. An
+                empty list counts as absent.
+            variance (float | Unset): The factor of φ, unit of the values squared; 1 if absent.
+            epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of
+                the cloud.
+            nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no
+                enumerations of fractions.)
+            smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
     """
 
     family: KernelFamily
     length_scale: float | Unset = UNSET
+    length_scales: list[float] | Unset = UNSET
     variance: float | Unset = UNSET
     epsilon: float | Unset = UNSET
     nu: float | Unset = UNSET
@@ -41,6 +46,10 @@ class Kernel:
         family = self.family.value
 
         length_scale = self.length_scale
+
+        length_scales: list[float] | Unset = UNSET
+        if not isinstance(self.length_scales, Unset):
+            length_scales = self.length_scales
 
         variance = self.variance
 
@@ -61,6 +70,8 @@ class Kernel:
         )
         if length_scale is not UNSET:
             field_dict["length_scale"] = length_scale
+        if length_scales is not UNSET:
+            field_dict["length_scales"] = length_scales
         if variance is not UNSET:
             field_dict["variance"] = variance
         if epsilon is not UNSET:
@@ -79,6 +90,8 @@ class Kernel:
 
         length_scale = d.pop("length_scale", UNSET)
 
+        length_scales = cast(list[float], d.pop("length_scales", UNSET))
+
         variance = d.pop("variance", UNSET)
 
         epsilon = d.pop("epsilon", UNSET)
@@ -95,6 +108,7 @@ class Kernel:
         kernel = cls(
             family=family,
             length_scale=length_scale,
+            length_scales=length_scales,
             variance=variance,
             epsilon=epsilon,
             nu=nu,

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
@@ -19,16 +19,19 @@ class KernelUsed:
 
     Attributes:
         family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-        length_scale (float): The length scale ℓ, in the unit of the coordinates.
         variance (float): The factor of φ, unit of the values squared.
+        length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; absent where each axis has its
+            own.
+        length_scales (list[float] | Unset): The length scale of each axis, where each has its own.
         epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)).
         nu (float | Unset): matern: the smoothness ν.
         smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
     """
 
     family: KernelFamily
-    length_scale: float
     variance: float
+    length_scale: float | Unset = UNSET
+    length_scales: list[float] | Unset = UNSET
     epsilon: float | Unset = UNSET
     nu: float | Unset = UNSET
     smoothness: Smoothness | Unset = UNSET
@@ -39,9 +42,13 @@ class KernelUsed:
     def to_dict(self) -> dict[str, Any]:
         family = self.family.value
 
+        variance = self.variance
+
         length_scale = self.length_scale
 
-        variance = self.variance
+        length_scales: list[float] | Unset = UNSET
+        if not isinstance(self.length_scales, Unset):
+            length_scales = self.length_scales
 
         epsilon = self.epsilon
 
@@ -56,10 +63,13 @@ class KernelUsed:
         field_dict.update(
             {
                 "family": family,
-                "length_scale": length_scale,
                 "variance": variance,
             }
         )
+        if length_scale is not UNSET:
+            field_dict["length_scale"] = length_scale
+        if length_scales is not UNSET:
+            field_dict["length_scales"] = length_scales
         if epsilon is not UNSET:
             field_dict["epsilon"] = epsilon
         if nu is not UNSET:
@@ -74,9 +84,11 @@ class KernelUsed:
         d = dict(src_dict)
         family = KernelFamily(d.pop("family"))
 
-        length_scale = d.pop("length_scale")
-
         variance = d.pop("variance")
+
+        length_scale = d.pop("length_scale", UNSET)
+
+        length_scales = cast(list[float], d.pop("length_scales", UNSET))
 
         epsilon = d.pop("epsilon", UNSET)
 
@@ -91,8 +103,9 @@ class KernelUsed:
 
         kernel_used = cls(
             family=family,
-            length_scale=length_scale,
             variance=variance,
+            length_scale=length_scale,
+            length_scales=length_scales,
             epsilon=epsilon,
             nu=nu,
             smoothness=smoothness,

@@ -29,8 +29,9 @@ class ModelSelectionRequest:
         Attributes:
             cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
             values (list[float]): The values at the points, in their order.
-            kernel (Kernel | Unset): A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`. A parameter of
-                another family is refused.
+            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
+                − y_c)²/length_scales_c²`. A parameter of another family
+                is refused.
             alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
                 interpolates, the variance
                 of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
@@ -43,8 +44,9 @@ class ModelSelectionRequest:
             mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
                 the points.
             criterion (SelectionCriterion | Unset): What is made as great as possible.
-            vary (list[FreeParameter] | Unset): What is free, and its bounds. Absent: length scale, variance and, unless
-                noise is given for each point, alpha, from a hundredth (a millionth for
+            vary (list[FreeParameter] | Unset): What is free, and its bounds. Absent: length scale, or that of each axis
+                where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a
+                millionth for
                 alpha) to a hundred times of where the search begins.
             families (list[KernelFamily] | Unset): Families to try, with the parameters of `kernel` where it is of that
                 family; that of the start alone if absent.

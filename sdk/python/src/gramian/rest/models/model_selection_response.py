@@ -28,7 +28,8 @@ class ModelSelectionResponse:
             answer.
         score (float): The criterion there; greater is better.
         gradient (list[float | None]): Derivatives of the score in the logarithms of what is free, in the order of
-            `vary`; null for nu, which takes steps.
+            `vary`; for `length_scales` without an axis, in that of a factor
+            of all; null for nu, which takes steps.
         converged (bool): Whether no slope is left to follow within the bounds.
         evaluations (int): How often the criterion was evaluated.
         families (list[FamilyScore]): The families that were tried.

@@ -5,6 +5,7 @@ class SelectionParameter(StrEnum):
     ALPHA = "alpha"
     EPSILON = "epsilon"
     LENGTH_SCALE = "length_scale"
+    LENGTH_SCALES = "length_scales"
     NU = "nu"
     VARIANCE = "variance"
 
