@@ -7,39 +7,17 @@
 
 mod support;
 
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Instant;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::observer::{Observer, Stage};
+use gramian::numerics::observer::Stage;
 use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 use support::common::clouds::fibonacci_sphere;
-use support::{ROUNDS, measure, size_argument, timed};
-
-/// Time spent in each stage.
-#[derive(Default)]
-struct Stopwatch(Mutex<Vec<(Stage, Instant)>>);
-
-impl Observer for Stopwatch {
-    fn enter(&self, stage: Stage) {
-        self.0.lock().unwrap().push((stage, Instant::now()));
-    }
-
-    fn is_cancelled(&self) -> bool {
-        false
-    }
-}
-
-impl Stopwatch {
-    fn time(&self, stage: Stage, end: Instant) -> Duration {
-        let entries = self.0.lock().unwrap();
-        let at = entries.iter().position(|entry| entry.0 == stage).unwrap();
-        entries.get(at + 1).map_or(end, |next| next.1) - entries[at].1
-    }
-}
+use support::{ROUNDS, Stopwatch, measure, size_argument, timed};
 
 fn main() {
     let n = size_argument(4000);

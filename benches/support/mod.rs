@@ -6,8 +6,10 @@
 pub mod common;
 
 use std::io::{BufRead, Write};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use gramian::numerics::observer::{Observer, Stage};
 use gramian::numerics::points::cloud::Cloud;
 
 /// Rounds of a benchmark that runs by itself.
@@ -95,4 +97,27 @@ pub fn random(n: usize, seed: u64) -> Vec<f64> {
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     (0..n).map(|_| next()).collect()
+}
+
+/// Time spent in each stage.
+#[derive(Default)]
+pub struct Stopwatch(Mutex<Vec<(Stage, Instant)>>);
+
+impl Observer for Stopwatch {
+    fn enter(&self, stage: Stage) {
+        self.0.lock().unwrap().push((stage, Instant::now()));
+    }
+
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
+impl Stopwatch {
+    /// What a stage took; `end` is that of the last one.
+    pub fn time(&self, stage: Stage, end: Instant) -> Duration {
+        let entries = self.0.lock().unwrap();
+        let at = entries.iter().position(|entry| entry.0 == stage).unwrap();
+        entries.get(at + 1).map_or(end, |next| next.1) - entries[at].1
+    }
 }

@@ -21,9 +21,8 @@ impl Axes {
         &self.length_scales
     }
 
-    #[inline(always)]
-    pub(super) fn factor(&self, axis: usize) -> f64 {
-        self.factors[axis]
+    pub(super) fn factors(&self) -> &[f64] {
+        &self.factors
     }
 
     /// Bytes held on the heap.

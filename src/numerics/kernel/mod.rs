@@ -22,7 +22,6 @@ use pulp::Simd;
 
 use super::error::NumericsError;
 use super::machine::heap::{arc_payload, block_bytes};
-use super::machine::registers::Pack;
 use super::points::cloud::Cloud;
 use axes::Axes;
 pub use family::Family;
@@ -149,17 +148,15 @@ impl Kernel {
     }
 
     /// s_c = ℓ/ℓ_c, by which differences along an axis are multiplied; 1 where all axes are alike.
+    #[inline]
     pub(crate) fn stretch(&self, axis: usize) -> f64 {
-        self.axes.as_ref().map_or(1.0, |axes| axes.factor(axis))
+        self.factors().map_or(1.0, |factors| factors[axis])
     }
 
-    /// u_c of a difference along an axis.
+    /// The same for all axes, `[d]`, where they are not alike.
     #[inline(always)]
-    pub(crate) fn stretched<S: Simd>(&self, axis: usize, difference: Pack<S>) -> Pack<S> {
-        match &self.axes {
-            None => difference,
-            Some(axes) => difference * axes.factor(axis),
-        }
+    pub(crate) fn factors(&self) -> Option<&[f64]> {
+        self.axes.as_ref().map(|axes| axes.factors())
     }
 
     /// Whether each axis has a length scale of its own.
@@ -171,7 +168,7 @@ impl Kernel {
     pub(crate) fn stretched_cloud(&self, cloud: &Cloud) -> Cloud {
         match &self.axes {
             None => cloud.clone(),
-            Some(axes) => cloud.stretched(|axis| axes.factor(axis)),
+            Some(axes) => cloud.stretched(axes.factors()),
         }
     }
 

@@ -76,10 +76,9 @@ impl Cloud {
     }
 
     /// Its coordinates times a factor for each axis, none greater than 1.
-    pub(crate) fn stretched(&self, factor: impl Fn(usize) -> f64) -> Self {
-        let factors: Vec<f64> = (0..self.dimension).map(factor).collect();
+    pub(crate) fn stretched(&self, factors: &[f64]) -> Self {
         let stretched =
-            |point: &[f64]| -> Vec<f64> { point.iter().zip(&factors).map(|(x, s)| x * s + 0.0).collect() };
+            |point: &[f64]| -> Vec<f64> { point.iter().zip(factors).map(|(x, s)| x * s + 0.0).collect() };
         Self { coordinates: self.points().flat_map(stretched).collect(), dimension: self.dimension }
     }
 

@@ -58,6 +58,8 @@ impl Spectrum {
         let values = vectors.par_chunks_exact(n).map(|u| dot(u, &subject.values)).collect();
         Ok(Self { eigenvalues, vectors, values, n })
     }
+
+    /// U as a matrix.
     pub(super) fn vectors(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.vectors, self.n, self.eigenvalues.len())
     }

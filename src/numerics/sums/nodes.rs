@@ -63,11 +63,24 @@ impl Nodes {
         mut each: impl FnMut(usize, Pack<S>),
     ) -> Pack<S> {
         let columns = &self.coordinates[block * self.dimension..][..self.dimension];
+        let coordinates = columns.iter().zip(x).enumerate();
         let mut sum = Pack::splat(simd, 0.0);
-        for (c, (column, &x)) in columns.iter().zip(x).enumerate() {
-            let difference = kernel.stretched(c, x - Pack::load(simd, column, at));
-            each(c, difference);
-            sum = difference.mul_add(difference, sum);
+        // Two loops: a question for each coordinate takes a twentieth of the time of both.
+        match kernel.factors() {
+            None => {
+                for (c, (column, &x)) in coordinates {
+                    let difference = x - Pack::load(simd, column, at);
+                    each(c, difference);
+                    sum = difference.mul_add(difference, sum);
+                }
+            }
+            Some(factors) => {
+                for ((c, (column, &x)), &factor) in coordinates.zip(factors) {
+                    let difference = (x - Pack::load(simd, column, at)) * factor;
+                    each(c, difference);
+                    sum = difference.mul_add(difference, sum);
+                }
+            }
         }
         sum * kernel.inverse_square_length()
     }

@@ -296,7 +296,7 @@ impl<S: Simd> RowPairs<'_, S> {
         let normal = geometry.normal(query);
         let mut along = Pack::splat(self.simd, 0.0);
         let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, stretched| {
-            let difference = kernel.stretched(c, stretched);
+            let difference = stretched * kernel.stretch(c);
             along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
             each(c, difference);
         });
