@@ -132,13 +132,13 @@ impl Case {
     }
 }
 
-fn tangential(field: &Jet, on: &Truth) -> [f64; 3] {
+pub fn tangential(field: &Jet, on: &Truth) -> [f64; 3] {
     let along = dot(field.gradient, on.normal);
     std::array::from_fn(|c| field.gradient[c] - along * on.normal[c])
 }
 
 /// `tr D²f − νᵀD²fν − (κ₁ + κ₂) ∂_νf`.
-fn laplacian(field: &Jet, on: &Truth) -> f64 {
+pub fn laplacian(field: &Jet, on: &Truth) -> f64 {
     let trace: f64 = (0..3).map(|c| field.hessian[c][c]).sum();
     let across: f64 = (0..3).map(|c| on.normal[c] * dot(field.hessian[c], on.normal)).sum();
     trace - across - (on.curvatures[0] + on.curvatures[1]) * dot(field.gradient, on.normal)

@@ -26,7 +26,7 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
-    laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix, laplace_beltrami_stencils,
+    Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix, laplace_beltrami_stencils,
 };
 use crate::store::Owner;
 
@@ -194,14 +194,17 @@ impl Operation for LaplaceBeltramiRequest {
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         let mut degenerate = surface.degenerate();
-        let mut of_values = None;
-        if work.request.has_deviations {
-            let scale = fits.main.plan.scale;
-            let found = laplace_beltrami_deviations(geometry, &interpolant, scale, &work.queries, observer)
-                .map_err(|error| fits.main.refused(error))?;
-            surface.flag_uncertain(&values, &found, &mut degenerate);
-            of_values = Some(surface.known_per_query(found, &[m]));
-        }
+        let refused = |error| fits.main.refused(error);
+        let (factor, queries) = (fits.main.plan.scale, &*work.queries);
+        let judged = Judged { geometry, interpolant: &interpolant, factor, queries, found: &values };
+        let (doubts, of_values) = if work.request.has_deviations {
+            let found = laplace_beltrami_deviations(geometry, &interpolant, factor, queries, observer)
+                .map_err(refused)?;
+            (judged.by_deviations(&found), Some(surface.known_per_query(found, &[m])))
+        } else {
+            (judged.laplace_beltrami(observer).map_err(refused)?, None)
+        };
+        surface.flag_doubts(doubts, &mut degenerate);
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
             value_deviations: of_values,

@@ -24,7 +24,8 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
-    surface_gradient, surface_gradient_deviations, surface_gradient_matrices, surface_gradient_stencils,
+    Judged, surface_gradient, surface_gradient_deviations, surface_gradient_matrices,
+    surface_gradient_stencils,
 };
 use crate::store::Owner;
 
@@ -181,14 +182,17 @@ impl Operation for SurfaceGradientRequest {
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         let mut degenerate = surface.degenerate();
-        let mut of_gradients = None;
-        if work.request.has_deviations {
-            let scale = fits.main.plan.scale;
-            let found = surface_gradient_deviations(geometry, &interpolant, scale, &work.queries, observer)
-                .map_err(|error| fits.main.refused(error))?;
-            surface.flag_uncertain(&gradients, &found, &mut degenerate);
-            of_gradients = Some(surface.known_per_query(found, &[m, d]));
-        }
+        let refused = |error| fits.main.refused(error);
+        let (factor, queries) = (fits.main.plan.scale, &*work.queries);
+        let judged = Judged { geometry, interpolant: &interpolant, factor, queries, found: &gradients };
+        let (doubts, of_gradients) = if work.request.has_deviations {
+            let found = surface_gradient_deviations(geometry, &interpolant, factor, queries, observer)
+                .map_err(refused)?;
+            (judged.by_deviations(&found), Some(surface.known_per_query(found, &[m, d])))
+        } else {
+            (judged.surface_gradient(observer).map_err(refused)?, None)
+        };
+        surface.flag_doubts(doubts, &mut degenerate);
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
             gradient_deviations: of_gradients,

@@ -26,7 +26,7 @@ use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use crate::numerics::surface::operators::{SparseMatrix, Stencils};
+use crate::numerics::surface::operators::{JUDGED_FUNCTIONALS, SparseMatrix, Stencils};
 use crate::store::clouds::RegisteredCloud;
 
 /// A checked request for normals or curvatures.
@@ -149,9 +149,12 @@ pub fn plan_applied(
     };
     let mut work = work_price(asked, n_values, m, d);
     let mut n_numbers = m.checked_mul(numbers_per_query(d));
+    let of_operator = n_numbers.unwrap_or(usize::MAX);
     if has_deviations {
-        work = work.and(deviations_price(n_values, n_numbers.unwrap_or(usize::MAX)));
+        work = work.and(deviations_price(n_values, of_operator));
         n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
+    } else if surface.is_some() {
+        work = work.and(deviations_price(n_values, of_operator.min(JUDGED_FUNCTIONALS)));
     }
     let cost = Cost {
         work,

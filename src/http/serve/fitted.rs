@@ -26,7 +26,7 @@ use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
 use crate::numerics::surface::local::LocalSurface;
-use crate::numerics::surface::operators::uncertain;
+use crate::numerics::surface::operators::Doubts;
 use crate::numerics::surface::served::ServedBy;
 use crate::numerics::surface::signature::SignatureSurface;
 use crate::store::key::ValuesKey;
@@ -328,15 +328,18 @@ impl SurfaceGeometry {
         self.geometry.degenerate().iter().map(entry).collect()
     }
 
-    /// Flags queries, unless they are flagged already, whose deviation leaves little of what is found: `[m, k]` both.
-    pub fn flag_uncertain(&self, found: &[f64], deviations: &[f64], degenerate: &mut Vec<Degenerate>) {
-        let mut is_flagged = vec![false; self.geometry.n_queries()];
+    /// Flags queries, unless they are flagged already, where what was found of values is doubtful.
+    pub fn flag_doubts(&self, doubts: Doubts, degenerate: &mut Vec<Degenerate>) {
+        let (m, is_null) = (self.geometry.n_queries(), self.geometry.is_null());
+        let mut is_flagged = is_null.to_vec();
         degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
-        for query in uncertain(found, deviations, self.geometry.is_null()) {
-            if !is_flagged[query] {
-                let gradient_norm = self.geometry.gradient_norms()[query];
-                degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
-            }
+        let (reason, queries) = match doubts {
+            Doubts::TooRough => (DegenerateReason::KernelTooRough, (0..m).collect()),
+            Doubts::Uncertain(queries) => (DegenerateReason::Uncertain, queries),
+        };
+        for query in queries.into_iter().filter(|&query| !is_flagged[query]) {
+            let gradient_norm = self.geometry.gradient_norms()[query];
+            degenerate.push(Degenerate { query, reason, gradient_norm });
         }
         degenerate.sort_by_key(|entry| entry.query);
     }

@@ -77,25 +77,12 @@ pub fn surface_gradient_deviations(
     Ok(total)
 }
 
-/// Deviations beyond this share of the root mean square of what is found leave little of it: an error of half of that is two deviations.
-const UNCERTAIN: f64 = 0.25;
-
-/// The queries, of those that are not null, whose deviation leaves little of what is found; `[m, k]` both.
-pub fn uncertain(found: &[f64], deviations: &[f64], is_null: &[bool]) -> Vec<usize> {
-    let (m, k) = (is_null.len(), found.len() / is_null.len());
-    let of = |list: &[f64], query: usize| norm(&list[query * k..][..k]);
-    let regular: Vec<usize> = (0..m).filter(|&query| !is_null[query]).collect();
-    let norms: Vec<f64> = regular.iter().map(|&query| of(found, query)).collect();
-    let root_mean_square = norm(&norms) / (norms.len() as f64).sqrt();
-    regular.into_iter().filter(|&query| of(deviations, query) > UNCERTAIN * root_mean_square).collect()
-}
-
 /// An operator on a function.
-struct Applied<'a> {
-    geometry: &'a Geometry,
-    interpolant: &'a Interpolant,
-    factor: f64,
-    queries: &'a Cloud,
+pub(super) struct Applied<'a> {
+    pub(super) geometry: &'a Geometry,
+    pub(super) interpolant: &'a Interpolant,
+    pub(super) factor: f64,
+    pub(super) queries: &'a Cloud,
 }
 
 impl Applied<'_> {
@@ -117,7 +104,8 @@ impl Applied<'_> {
         Ok(total)
     }
 
-    fn functionals(&self, operator: Operator, query: usize) -> Vec<JetFunctional> {
+    /// The operator at a query, a functional for each of its components.
+    pub(super) fn functionals(&self, operator: Operator, query: usize) -> Vec<JetFunctional> {
         let normal = self.geometry.normal(query);
         let d = normal.len();
         let projection = |a: usize, b: usize| f64::from(u8::from(a == b)) - normal[a] * normal[b];

@@ -5,6 +5,7 @@
 //! to each kernel translate, by a solve with m right-hand sides.
 
 mod deviations;
+mod doubts;
 mod resolution;
 mod stencils;
 
@@ -27,7 +28,8 @@ use crate::numerics::solver::Solver;
 use crate::numerics::solver::trend::{Basis, Mean};
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
-pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations, uncertain};
+pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
+pub use doubts::{Doubts, JUDGED_FUNCTIONALS, Judged};
 pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.

@@ -1,0 +1,72 @@
+//! Prints how many answers of operators on values are off by half without a flag, for every kernel and for the defaults: a table of
+//! docs/error-bars.md.
+//!
+//! `cargo run --release --example operator_flags [clouds per case] [sizes of clouds]`, 2 and 300, 1000 if not said; some minutes.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/values/fields.rs"]
+mod fields;
+#[path = "../tests/values/flags.rs"]
+mod flags;
+#[path = "../tests/error_bars/jet.rs"]
+mod jet;
+#[path = "../tests/error_bars/sampling.rs"]
+mod sampling;
+#[path = "../tests/error_bars/shapes.rs"]
+mod shapes;
+#[path = "../tests/values/sweep.rs"]
+mod sweep;
+
+use common::kernels::all_families;
+use fields::FIELDS;
+use flags::{Asked, Counts, Request};
+use rayon::prelude::*;
+use shapes::Shape;
+use sweep::NOISES;
+
+const SHAPES: [Shape; 5] = [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Wave];
+
+fn main() {
+    let arguments: Vec<usize> = std::env::args().skip(1).filter_map(|n| n.parse().ok()).collect();
+    let n_clouds = arguments.first().copied().unwrap_or(2);
+    let sizes = if arguments.len() > 1 { arguments[1..].to_vec() } else { vec![300, 1000] };
+    let mut asked = vec![Asked::Nothing];
+    for family in all_families().into_iter().filter(|family| !family.has_kink()) {
+        asked.push(Asked::Family(family));
+        asked.extend([0.3, 3.0].map(|factor| Asked::Width(family, factor)));
+    }
+    println!("Per cent without a flag, and of these off by half: surface gradient; Laplace–Beltrami.\n");
+    let of_noises: Vec<String> = NOISES.iter().map(|noise| format!("noise {} %", 100.0 * noise)).collect();
+    println!("| kernel | {} | refused |", of_noises.join(" | "));
+    println!("|---|{}---|", "---|".repeat(NOISES.len()));
+    let mut all = [Counts::default(); NOISES.len()];
+    for asked in asked {
+        let mut cells = Vec::new();
+        let mut n_refused = 0;
+        for (noise, all) in NOISES.into_iter().zip(&mut all) {
+            let mut requests = Vec::new();
+            for &n_points in &sizes {
+                for shape in SHAPES {
+                    requests.extend(FIELDS.map(|field| Request { asked, shape, field, n_points, noise }));
+                }
+            }
+            let counts: Vec<Counts> = requests.par_iter().map(|request| request.run(n_clouds)).collect();
+            let counts = counts.iter().fold(Counts::default(), Counts::plus);
+            n_refused += counts.n_refused;
+            *all = all.plus(&counts);
+            cells.push(cell(&counts));
+        }
+        println!("| {asked:?} | {} | {n_refused} |", cells.join(" | "));
+    }
+    println!("| all | {} | |", all.map(|counts| cell(&counts)).join(" | "));
+}
+
+fn cell(counts: &Counts) -> String {
+    let of = |operator: usize| {
+        let unflagged = 100.0 * counts.n_unflagged[operator] as f64 / counts.n[operator].max(1) as f64;
+        let off = 100.0 * counts.n_off[operator] as f64 / counts.n_unflagged[operator].max(1) as f64;
+        format!("{unflagged:.0}, {off:.2}")
+    };
+    format!("{}; {}", of(0), of(1))
+}
