@@ -31,6 +31,7 @@ FITS: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("matern", nu=3.5), "alpha": 1e-6},
     "wendland": {"kernel": {"family": "wendland", "smoothness": 6, "length_scale": 3}, "alpha": np.float32(0.25)},
     "interpolation": {"kernel": Kernel("inverse_multiquadric", length_scale=0.5), "alpha": 0, "solver": "dense"},
+    "length scales": {"kernel": Kernel("matern", length_scales=[1.5, 0.1], variance=2), "alpha": 1e-6},
     "merged": {"kernel": "gauss", "alpha": 0, "duplicates": "merge"},
     "noise": {"kernel": "gauss", "noise_variances": NOISE},
     "noise alone": {"noise_variances": NOISE},
@@ -38,6 +39,7 @@ FITS: dict[str, dict[str, Any]] = {
 GEOMETRIES: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("gauss", length_scale=2)},
     "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface": "signature"},
+    "length scales": {"kernel": Kernel("gauss", length_scales=[2, 1 / 3]), "alpha": 1e-8},
     "noise": {"noise_variances": NOISE},
 }
 
@@ -189,8 +191,13 @@ def test_representations_are_as_one_writes_them(cloud: Any) -> None:
     answer = cloud.interpolate(VALUES, QUERIES, kernel="gauss", alpha=0.5)
     assert repr(answer).startswith("Interpolation(values=array[2], diagnostics=Diagnostics(cloud_id=")
     kernel = answer.diagnostics.kernel
-    assert repr(kernel) == f"KernelUsed(family='gauss', length_scale={kernel.length_scale}, variance=1.0)"
-    assert eval(repr(Kernel("gauss", length_scale=2)), {"Kernel": Kernel}) == Kernel("gauss", length_scale=2)
+    assert repr(kernel) == f"KernelUsed(family='gauss', variance=1.0, length_scale={kernel.length_scale})"
+    for written in [
+        Kernel("gauss", length_scale=2),
+        Kernel("gauss", length_scales=[2]),
+        Kernel("gauss", length_scales=range(1, 9)),
+    ]:
+        assert eval(repr(written), {"Kernel": Kernel}) == written
     assert repr(Geometry(cloud=cloud, kernel=Kernel("wendland", smoothness=4), noise_variances=NOISE)) == (
         f"Geometry(cloud=Cloud(id='{cloud.id[:8]}…', n_points=8, dimension=2), "
         "kernel=Kernel(family='wendland', smoothness=4), noise_variances=array[8])"

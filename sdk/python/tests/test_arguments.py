@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import dataclasses
 import enum
 import inspect
 from collections import ChainMap
@@ -362,6 +363,11 @@ def test_one_noise_for_all_points_is_alpha(method: str) -> None:
         sent(method, noise_variances=0.1)
 
 
+def test_quantiles_are_not_one_for_each_point() -> None:
+    with pytest.raises(ValueError, match=r"^quantiles must have the shape \[quantiles\], not \[\]$"):
+        sent("posterior", quantiles=0.5)
+
+
 def test_a_cloud_on_a_line_says_how_to_write_its_queries() -> None:
     line = cloud()
     line.description.dimension = 1
@@ -487,6 +493,7 @@ def test_misspelt_words_of_other_fields_name_the_nearest() -> None:
 # Kernels
 
 GAUSS = {"family": "gauss", "length_scale": 2.0}
+OF_AXES = {"family": "gauss", "length_scales": [1.0, 2.0]}
 KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
     "word": ("gauss", {"family": "gauss"}),
     "word with underscore": ("inverse_multiquadric", {"family": "inverse_multiquadric"}),
@@ -507,9 +514,14 @@ KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "used": (models.KernelUsed.from_dict({**GAUSS, "variance": 3.0}), {**GAUSS, "variance": 3.0}),
     "used by a later service": (
-        models.KernelUsed.from_dict({**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]}),
-        {**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]},
+        models.KernelUsed.from_dict({**GAUSS, "variance": 3.0, "turn": [1.0, 2.0]}),
+        {**GAUSS, "variance": 3.0, "turn": [1.0, 2.0]},
     ),
+    "length scales": (Kernel("gauss", length_scales=(1, 2)), OF_AXES),
+    "length scales of NumPy": ({"family": "gauss", "length_scales": np.array([1, 2], dtype="f4")}, OF_AXES),
+    "length scales of another library": ({"family": "gauss", "length_scales": Foreign([1, 2])}, OF_AXES),
+    "length scales, generated": (models.Kernel(family=KernelFamily.GAUSS, length_scales=[1.0, 2.0]), OF_AXES),
+    "length scales, used": (models.KernelUsed.from_dict({**OF_AXES, "variance": 1.0}), {**OF_AXES, "variance": 1.0}),
     "described": (
         models.KernelDescription.from_dict(
             {
@@ -553,6 +565,31 @@ def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected:
         ),
         (2.0, TypeError, "kernel is to be a family such as 'gauss', .*, not of the type float$"),
         (["gauss"], TypeError, "kernel is to be a family such as 'gauss', .*, not of the type list$"),
+        (
+            {"family": "gauss", "length_scales": [1, 2, 3]},
+            ValueError,
+            r"kernel.length_scales must have the shape \[d\] = \[2\], not \[3\]: one number for each axis$",
+        ),
+        (
+            {"family": "gauss", "length_scales": 2},
+            ValueError,
+            r"kernel.length_scales must .* not \[\]: one number for each axis; one for all of them is length_scale$",
+        ),
+        (
+            Kernel("gauss", length_scales=[1]),
+            ValueError,
+            r"kernel.length_scales must have the shape \[d\] = \[2\], not \[1\]: one number for each axis$",
+        ),
+        (
+            {"family": "gauss", "length_scales": [1, np.nan]},
+            ValueError,
+            r"kernel.length_scales\[1\] is nan, and only finite numbers can be sent$",
+        ),
+        (
+            {"family": "gauss", "length_scales": ["1", "2"]},
+            TypeError,
+            r"kernel.length_scales has text \(<U1\); only real numbers can be sent$",
+        ),
     ],
     ids=repr,
 )
@@ -575,6 +612,26 @@ def test_a_kernel_is_checked_where_it_is_written() -> None:
     assert Kernel("gauss", length_scale=2) == Kernel(KernelFamily.GAUSS, length_scale=np.float32(2))
     assert hash(Kernel("gauss")) == hash(Kernel("gauss", variance=None))
     assert isinstance(Kernel("gauss").family, KernelFamily)
+
+
+def test_length_scales_are_part_of_what_a_kernel_is() -> None:
+    scales = np.array([1.0, 2.0])
+    kernel = Kernel("gauss", length_scales=scales)
+    scales[:] = 7
+    assert kernel.length_scales == (1.0, 2.0)
+    assert kernel == Kernel("gauss", length_scales=range(1, 3)) != Kernel("gauss", length_scales=[2, 1])
+    assert hash(kernel) == hash(Kernel("gauss", length_scales=np.array([1, 2], dtype="f4")))
+    assert Kernel("gauss", length_scales=UNSET) == Kernel("gauss")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        kernel.length_scales = None  # type: ignore[misc]
+    with pytest.raises(ValueError, match=r"^kernel.length_scales must have the shape \[d\], not \[1, 2\]; np.ravel\("):
+        Kernel("gauss", length_scales=[[1, 2]])
+    with pytest.raises(ValueError, match=r"^kernel.length_scales\[0\] is inf"):
+        Kernel("gauss", length_scales=[np.inf, 1])
+    with pytest.raises(
+        TypeError, match=r"^Kernel\(\) has no parameter 'lengthscales'; did you mean 'length_scales'\?$"
+    ):
+        Kernel("gauss", lengthscales=[1, 2])  # type: ignore[call-arg]
 
 
 # Geometries

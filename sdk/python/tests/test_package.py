@@ -463,3 +463,29 @@ def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Arr
 
 def test_a_server_without_keys_takes_any(circle: Array) -> None:
     assert gramian.Client(api_key="secret").cloud(circle).n_points == 8
+
+
+@pytest.mark.parametrize("format_", ["safetensors", "json"])
+def test_every_axis_may_have_a_length_scale_of_its_own(format_: Format, circle: Array) -> None:
+    scales = np.array([2.0, 0.5])
+    cloud, scaled = (gramian.Client(format=format_).cloud(points) for points in [circle, circle / scales])
+    queries = np.array([[0.3, -0.2], [1.5, 0.1]])
+    answer = cloud.interpolate(circle[:, 0], queries, derivatives=2, kernel=Kernel("matern", length_scales=scales))
+    single = scaled.interpolate(circle[:, 0], queries / scales, derivatives=2, kernel=Kernel("matern", length_scale=1))
+    np.testing.assert_allclose(answer.values, single.values, rtol=1e-9)
+    assert answer.gradients is not None
+    assert single.gradients is not None
+    np.testing.assert_allclose(answer.gradients * scales, single.gradients, atol=1e-9)
+    used = answer.diagnostics.kernel
+    assert (used.length_scale, used.length_scales) == (gramian.UNSET, [2.0, 0.5])
+    again = cloud.interpolate(circle[:, 0], queries, kernel=used, alpha=answer.diagnostics.alpha)
+    np.testing.assert_array_equal(again.values, answer.values)
+    assert repr(used) == "KernelUsed(family='matern', variance=1.0, length_scales=[2.0, 0.5], nu=2.5)"
+    refused: list[gramian.KernelLike] = [
+        Kernel("gauss", length_scale=1, length_scales=scales),
+        {"family": "gauss", "length_scales": [1, 0]},
+    ]
+    for kernel in refused:
+        with pytest.raises(gramian.Problem) as caught:
+            cloud.normals(kernel=kernel)
+        assert caught.value.pointer == "/kernel/length_scales"

@@ -18,6 +18,12 @@ Sizes: TypeAlias = Mapping[str, int]
 
 AnyArray: TypeAlias = npt.NDArray[Any]
 
+EACH = {"n": "point of the cloud", "d": "axis"}
+"""What the numbers of an array with one axis are for, each one."""
+
+ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
+"""What takes one number where these take many."""
+
 ROWS = {"points": "points", "queries": "points", "normals": "normals"}
 """What the rows of an array with two axes are."""
 
@@ -131,19 +137,21 @@ def _check_shape(name: str, array: AnyArray, axes: Sequence[str], sizes: Sizes) 
         return
     known = [str(axis if length is None else length) for axis, length in zip(axes, wanted, strict=True)]
     shape = f"[{', '.join(axes)}]" + (f" = [{', '.join(known)}]" if known != list(axes) else "")
-    raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}{_advice(name, array, wanted)}")
+    raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}{_advice(name, array, axes, wanted)}")
 
 
-def _advice(name: str, array: AnyArray, wanted: Sequence[int | None]) -> str:
+def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[int | None]) -> str:
     """Says what may have been meant."""
     if array.size == 0:
         return ": it is empty"
+    field = name.rpartition(".")[2]
     if len(wanted) == 1:
         if array.ndim < 2:
-            one_for_all = "; one for all of them is alpha" if array.ndim == 0 and "noise" in name else ""
-            return f": one number for each point of the cloud{one_for_all}"
+            one = ONE_FOR_ALL.get(field) if array.ndim == 0 else None
+            one_for_all = f"; one for all of them is {one}" if one else ""
+            return f": one number for each {EACH[axes[0]]}{one_for_all}" if axes[0] in EACH else ""
         return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
-    rows = ROWS.get(name.rpartition(".")[2], "points")
+    rows = ROWS.get(field, "points")
     if array.ndim == 1:
         one = f"np.reshape({name}, (1, -1)) is one of {len(array)} coordinates"
         line = f"np.reshape({name}, (-1, 1)) are {len(array)} on a line"

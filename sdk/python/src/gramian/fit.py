@@ -62,7 +62,7 @@ Quantity: TypeAlias = (
 @suggest_names
 @dataclass(frozen=True, init=False, repr=False)
 class Kernel:
-    """A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`.
+    """A kernel `k(x, y) = variance · φ(r²)`, `r = |x − y|/length_scale` or `r² = Σ (x_c − y_c)²/length_scales_c²`.
 
     What is None is chosen by the service. `Client.kernels()` lists the families with their formulas.
 
@@ -72,6 +72,8 @@ class Kernel:
         What determines φ.
     length_scale
         ℓ, unit of the coordinates; chosen from the cloud if absent.
+    length_scales
+        `[d]`, instead: a length scale for each axis, in the units of the coordinates.
     variance
         The factor of φ, unit of the values squared; 1 if absent.
     epsilon
@@ -85,10 +87,13 @@ class Kernel:
     --------
     >>> gramian.Kernel("gauss", length_scale=np.float32(2))
     Kernel(family='gauss', length_scale=2.0)
+    >>> gramian.Kernel("matern", length_scales=np.array([1, 0.5]))
+    Kernel(family='matern', length_scales=(1.0, 0.5))
     """
 
     family: KernelFamily
     length_scale: float | None
+    length_scales: tuple[float, ...] | None
     variance: float | None
     epsilon: float | None
     nu: float | None
@@ -99,17 +104,19 @@ class Kernel:
         family: Family,
         *,
         length_scale: Number | None = None,
+        length_scales: npt.ArrayLike | Unset | None = None,
         variance: Number | None = None,
         epsilon: Number | None = None,
         nu: Number | None = None,
         smoothness: Whole | Unset | None = None,
     ) -> None:
         """Takes the parameters, of which the family allows some; see the attributes."""
-        numbers = {"length_scale": length_scale, "variance": variance, "epsilon": epsilon, "nu": nu}
-        given: dict[str, Any] = normalise(
-            {"family": family, **numbers, "smoothness": smoothness}, KERNEL, path="kernel."
-        )
+        scales = {"length_scale": length_scale, "length_scales": length_scales}
+        numbers = {"variance": variance, "epsilon": epsilon, "nu": nu, "smoothness": smoothness}
+        given: dict[str, Any] = normalise({"family": family, **scales, **numbers}, KERNEL, path="kernel.")
         given["family"] = KernelFamily(given["family"])
+        if "length_scales" in given:
+            given["length_scales"] = tuple(given["length_scales"].tolist())
         for name in KERNEL:
             object.__setattr__(self, name, given.get(name))
 
@@ -122,6 +129,7 @@ class KernelFields(TypedDict, total=False):
 
     family: Required[Family]
     length_scale: Number | None
+    length_scales: npt.ArrayLike | None
     variance: Number | None
     epsilon: Number | None
     nu: Number | None

@@ -195,6 +195,7 @@ REQUIRED = frozenset({"points", "values", "family"})
 KERNEL: Mapping[str, Rule] = {
     "family": word(*KernelFamily),
     "length_scale": number,
+    "length_scales": array("d"),
     "variance": number,
     "epsilon": number,
     "nu": number,
