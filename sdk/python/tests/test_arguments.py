@@ -15,7 +15,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 import numpy.typing as npt
 import pytest
-from sent import CIRCLE, METHODS, OPERATORS, VALUES, client, cloud, posted, sent
+from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, VALUES, client, cloud, posted, sent
 
 import gramian
 from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
@@ -185,7 +185,9 @@ LAYOUTS: dict[str, Any] = {
 @every_method
 def test_arrays_of_all_kinds_are_arrays(method: str, values: npt.ArrayLike) -> None:
     assert sent(method, noise_variances=values)["noise_variances"] == VALUES.tolist()
-    if "values" in METHODS[method]:
+    if method in BATCHES:
+        assert sent(method, values=[values, values])["values"] == [VALUES.tolist()] * 2
+    elif "values" in METHODS[method]:
         assert sent(method, values=values)["values"] == VALUES.tolist()
     if method in OPERATORS:
         body = sent(method, geometry=Geometry(noise_variances=values))
@@ -308,9 +310,13 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
     bad = VALUES.copy()
     bad[3] = np.nan
     message = r"\[3\] is nan, and only finite numbers can be sent$"
-    if "values" in METHODS[method]:
+    if method in BATCHES:
+        with pytest.raises(ValueError, match=r"^values\[1, 3\] is nan, and only finite numbers can be sent$"):
+            sent(method, values=[VALUES, bad])
+    elif "values" in METHODS[method]:
         with pytest.raises(ValueError, match=rf"^values{message}"):
             sent(method, values=bad)
+    if "values" in METHODS[method]:
         with pytest.raises(TypeError, match=r"^values is missing$"):
             sent(method, values=None)
     with pytest.raises(ValueError, match=rf"^noise_variances{message}"):
@@ -338,9 +344,32 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
 def test_there_is_one_value_for_each_point(method: str, shape: tuple[int, ...], message: str) -> None:
     with pytest.raises(ValueError, match=rf"^noise_variances {message}"):
         sent(method, noise_variances=np.ones(shape))
-    if "values" in METHODS[method]:
+    if "values" in METHODS[method] and method not in BATCHES:
         with pytest.raises(ValueError, match=rf"^values {message}"):
             sent(method, values=np.ones(shape))
+
+
+@pytest.mark.parametrize("method", BATCHES)
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (VALUES, r"not \[8\]: rows are lists of values; np.reshape\(values, \(1, -1\)\) is one of 8$"),
+        (LISTS.T, r"not \[8, 3\]: rows are lists of values; it looks transposed, send values.T$"),
+        (LISTS[:, 1:], r"not \[3, 7\]: rows are lists of values$"),
+        (LISTS[None], r"not \[1, 3, 8\]: rows are lists of values$"),
+        (LISTS[:0], r"not \[0, 8\]: it is empty$"),
+        (1.0, r"not \[\]: rows are lists of values$"),
+    ],
+)
+def test_the_rows_of_a_batch_are_lists_of_values(method: str, values: npt.ArrayLike, message: str) -> None:
+    with pytest.raises(ValueError, match=rf"^values must have the shape \[k, n\] = \[k, 8\], {message}"):
+        sent(method, values=values)
+
+
+@pytest.mark.parametrize("rows", [LISTS.tolist(), list(LISTS), np.asfortranarray(LISTS), Foreign(LISTS), LISTS.data])
+def test_rows_of_all_kinds_are_lists_of_values(rows: object) -> None:
+    for method in BATCHES:
+        assert sent(method, values=rows)["values"] == LISTS.tolist()
 
 
 @every_method
@@ -421,7 +450,7 @@ def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
             assert sent(method, orientation=orientation)["orientation"] == "gradient"
 
 
-@pytest.mark.parametrize("method", ["normals", "curvatures"])
+@pytest.mark.parametrize("method", ["normals", "curvatures", "interpolate", "interpolate_batch"])
 def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
     wanted = {"include": ["deviations"]}
     said: list[dict[str, Any]] = [
@@ -433,9 +462,9 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
         {"include": [gramian.GeometryInclude.DEVIATIONS], "deviations": False},
     ]
     for arguments in said:
-        assert sent(method, **arguments) == wanted
+        assert sent(method, **arguments) == sent(method) | wanted
     for absent in [None, UNSET, False]:
-        assert sent(method, deviations=absent, include=UNSET) == {}
+        assert sent(method, deviations=absent, include=UNSET) == sent(method)
     for number in [1, 0.0, "yes", [True]]:
         with pytest.raises(TypeError, match=r"^deviations is to be True or False, not "):
             sent(method, deviations=number)
@@ -451,7 +480,8 @@ def test_one_word_may_stand_for_a_list(include: object) -> None:
 
 
 def test_several_words_keep_their_order() -> None:
-    assert sent("posterior", include=("gradients", "variance"))["include"] == ["gradients", "variance"]
+    for method in ["posterior", "posterior_batch"]:
+        assert sent(method, include=("gradients", "variance"))["include"] == ["gradients", "variance"]
 
 
 @every_method
@@ -676,9 +706,13 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
 @pytest.mark.parametrize("absent", [None, UNSET], ids=repr)
 def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
     names = ["queries", "kernel", "noise_variances", "solver", "duplicates"]
-    names += {"interpolate": ["derivatives"], "posterior": ["include"], "normals": ["surface", "orientation"]}.get(
-        method, []
-    )
+    names += {
+        "interpolate": ["derivatives"],
+        "interpolate_batch": ["derivatives", "deviations", "mean"],
+        "posterior": ["include"],
+        "posterior_batch": ["include", "samples", "quantiles", "threshold", "mean"],
+        "normals": ["surface", "orientation"],
+    }.get(method, [])
     names += ["geometry"] if method in OPERATORS else []
     assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
     if method in OPERATORS:

@@ -20,7 +20,7 @@ import pytest
 import scipy.sparse
 
 import gramian
-from gramian import Cloud, Geometry, Kernel, KernelFamily
+from gramian import Cloud, Geometry, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
 from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
@@ -38,6 +38,23 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
         include=["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"],
         kernel={"family": "gauss", "length_scale": 2.0},
         alpha=1e-6,
+    ),
+    "interpolate_batch": lambda cloud: cloud.interpolate_batch(
+        lists(cloud), QUERIES, derivatives=2, deviations=True, mean="linear", kernel=GAUSS
+    ),
+    "posterior_batch": lambda cloud: cloud.posterior_batch(
+        lists(cloud),
+        QUERIES,
+        include=["variance", "covariance", "gradients", "gradient_variances", "log_marginal_likelihood"],
+        samples={"count": 4, "seed": 1},
+        quantiles=[0.1, 0.5, 0.9],
+        threshold=0.5,
+        mean="constant",
+        kernel=GAUSS,
+        alpha=1e-6,
+    ),
+    "posterior_batch of one list": lambda cloud: cloud.posterior_batch(
+        lists(cloud)[:1], QUERIES[:1], include="log_marginal_likelihood", samples=1, quantiles=[0.5], kernel=GAUSS
     ),
     "posterior with noise": lambda cloud: cloud.posterior(
         squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
@@ -64,6 +81,11 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
 def squares(cloud: Cloud) -> Array:
     assert cloud.points is not None
     return np.square(cloud.points[:, 0])
+
+
+def lists(cloud: Cloud) -> Array:
+    assert cloud.points is not None
+    return np.vstack([squares(cloud), cloud.points.T])
 
 
 def members(answer: object) -> dict[str, object]:
@@ -140,6 +162,78 @@ def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
     assert gradient.gradient_deviations is not None
     assert gradient.gradient_deviations.shape == (300, 3)
     assert sphere.surface_gradient(values, kernel="matern").gradient_deviations is None
+
+
+def test_a_batch_answers_what_each_list_alone_does(client: gramian.Client) -> None:
+    random = np.random.default_rng(4)
+    points, queries = random.uniform(-1, 1, size=(60, 2)), random.uniform(-1, 1, size=(7, 2))
+    cloud = client.cloud(points)
+    values = np.stack([np.sin(3 * points[:, 0]), points[:, 1] + 2, 5 * points[:, 0] * points[:, 1]])
+    values += 0.05 * random.normal(size=(3, 60))
+    for fit in [gramian.ValuesFit(mean="linear"), gramian.ValuesFit(kernel=GAUSS, alpha=1e-4), gramian.ValuesFit()]:
+        answer = cloud.interpolate_batch(values, queries, derivatives=2, deviations=True, **fit)
+        assert_shapes(answer, values=(3, 7), gradients=(3, 7, 2), hessians=(3, 7, 2, 2))
+        assert_shapes(answer, value_deviations=(7,), gradient_deviations=(7, 2), hessian_deviations=(7, 2, 2))
+        for i, of_one in enumerate(values):
+            single = cloud.interpolate(of_one, queries, derivatives=2, deviations=True, **answer.fit)
+            assert_row(answer, i, single, "values", "gradients", "hessians")
+            for name in ["value_deviations", "gradient_deviations", "hessian_deviations"]:
+                np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
+            mean = single.diagnostics.mean_coefficients
+            if isinstance(mean, gramian.Unset):
+                assert answer.mean_coefficients is None
+            else:
+                assert_shapes(answer, mean_coefficients=(3, len(mean)))
+                assert answer.mean_coefficients is not None
+                np.testing.assert_allclose(answer.mean_coefficients[i], mean, rtol=1e-9)
+
+
+def test_so_does_a_batch_of_posteriors(client: gramian.Client) -> None:
+    random = np.random.default_rng(5)
+    points, queries = random.uniform(-1, 1, size=(50, 2)), random.uniform(-1, 1, size=(6, 2))
+    cloud = client.cloud(points)
+    values = np.stack([np.sin(3 * points[:, 0]), np.cos(points[:, 1])]) + 0.05 * random.normal(size=(2, 50))
+    answer = cloud.posterior_batch(
+        values, queries, include=list(gramian.PosteriorQuantity), samples=4, quantiles=[0.1, 0.5, 0.9], threshold=0.5
+    )
+    assert_shapes(answer, means=(2, 6), gradients=(2, 6, 2), samples=(2, 4, 6), quantiles=(2, 3, 6))
+    assert_shapes(answer, exceedance_probabilities=(2, 6), log_marginal_likelihoods=(2,), mean_coefficients=(2, 1))
+    assert_shapes(answer, variances=(6,), observation_variances=(6,), covariance=(6, 6), gradient_variances=(6, 2))
+    assert answer.log_marginal_likelihoods is not None
+    for i, of_one in enumerate(values):
+        single = cloud.posterior(
+            of_one,
+            queries,
+            include=list(gramian.PosteriorQuantity),
+            quantiles=[0.1, 0.5, 0.9],
+            threshold=0.5,
+            **answer.fit,
+        )
+        assert_row(answer, i, single, "means", "gradients", "quantiles", "exceedance_probabilities")
+        for name in ["variances", "observation_variances", "covariance", "gradient_variances"]:
+            np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
+        assert answer.log_marginal_likelihoods[i] == pytest.approx(single.log_marginal_likelihood, rel=1e-9)
+    plain = cloud.posterior_batch(values, queries, kernel=GAUSS)
+    assert [name for name, value in members(plain).items() if value is not None] == ["means", "diagnostics", "fit"]
+
+
+def assert_shapes(answer: object, **shapes: tuple[int, ...]) -> None:
+    assert {name: getattr(answer, name).shape for name in shapes} == shapes
+
+
+def assert_row(answer: object, i: int, single: object, *names: str) -> None:
+    for name in names:
+        np.testing.assert_allclose(getattr(answer, name)[i], getattr(single, name), atol=1e-9, rtol=1e-9, err_msg=name)
+
+
+def test_batches_are_dense(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    methods: list[Callable[..., InterpolationBatch | PosteriorBatch]] = [cloud.interpolate_batch, cloud.posterior_batch]
+    for method in methods:
+        with pytest.raises(gramian.Problem) as caught:
+            method(circle.T, solver="local")
+        assert (caught.value.slug, caught.value.pointer) == ("unsupported-by-solver", "/solver")
+        assert method(circle.T, solver="auto").diagnostics.solver is gramian.SolverUsed.DENSE
 
 
 def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) -> None:

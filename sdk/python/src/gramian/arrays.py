@@ -24,7 +24,7 @@ EACH = {"n": "point of the cloud", "d": "axis"}
 ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
 """What takes one number where these take many."""
 
-ROWS = {"points": "points", "queries": "points", "normals": "normals"}
+ROWS = {"points": "points", "queries": "points", "normals": "normals", "values": "lists of values"}
 """What the rows of an array with two axes are."""
 
 KINDS = {"c": "complex numbers", "b": "truth values", "S": "bytes", "U": "text", "M": "dates", "m": "durations"}
@@ -153,12 +153,15 @@ def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[in
         return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
     rows = ROWS.get(field, "points")
     if array.ndim == 1:
-        one = f"np.reshape({name}, (1, -1)) is one of {len(array)} coordinates"
+        one = f"np.reshape({name}, (1, -1)) is one of {len(array)}"
+        if axes[1] != "d":
+            return f": rows are {rows}; {one}"
+        one += " coordinates"
         line = f"np.reshape({name}, (-1, 1)) are {len(array)} on a line"
         likely = {1: line, len(array): one}.get(wanted[1] or 0, f"{line}, {one}")
         return f": rows are {rows}; {likely}"
-    length, d = wanted
-    transposed = array.ndim == 2 and d in (None, array.shape[0]) and length in (None, array.shape[1])
+    length, width = wanted
+    transposed = array.ndim == 2 and width in (None, array.shape[0]) and length in (None, array.shape[1])
     return f": rows are {rows}" + (f"; it looks transposed, send {name}.T" if transposed else "")
 
 

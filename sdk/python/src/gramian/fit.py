@@ -28,6 +28,7 @@ from .rest.models import (
     SurfaceChoice,
 )
 from .rest.types import Unset
+from .tensors import Array
 
 if TYPE_CHECKING:
     from .registration import RegisteredCloud
@@ -251,10 +252,21 @@ def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
 
 def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
     """Returns that of values, with the mean if there is one; their local solver takes a kernel as the other does."""
-    fit, mean = cast("ValuesFit", _numbers_used(diagnostics, request)), diagnostics.mean_coefficients
-    if not isinstance(mean, Unset):
-        fit["mean"] = MeanChoice.CONSTANT if len(mean) == 1 else MeanChoice.LINEAR
-    return fit
+    mean = diagnostics.mean_coefficients
+    return _with_mean(_numbers_used(diagnostics, request), 0 if isinstance(mean, Unset) else len(mean))
+
+
+def batch_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any], mean_coefficients: Array | None) -> ValuesFit:
+    """Returns that of many lists of values, whose means have a row each."""
+    fit = _numbers_used(diagnostics, request)
+    return _with_mean(fit, 0 if mean_coefficients is None else mean_coefficients.shape[-1])
+
+
+def _with_mean(fit: Fit, n_coefficients: int) -> ValuesFit:
+    values_fit = cast("ValuesFit", fit)
+    if n_coefficients:
+        values_fit["mean"] = MeanChoice.CONSTANT if n_coefficients == 1 else MeanChoice.LINEAR
+    return values_fit
 
 
 def _numbers_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:

@@ -55,7 +55,7 @@ def normalise(
     fields
         What was given, by name.
     rules
-        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
     sizes
         The lengths of the axes of arrays, by name, as far as they are known: n points, d coordinates.
     path
@@ -232,6 +232,12 @@ REQUEST: Mapping[str, Rule] = {
 
 GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
 """Those of normals and curvatures, and of values and operators that may have deviations."""
+
+BATCH: Mapping[str, Rule] = {**REQUEST, "values": array("k", "n")}
+"""Those of many lists of values."""
+
+GEOMETRIC_BATCH: Mapping[str, Rule] = {**GEOMETRIC, "values": array("k", "n")}
+"""Those of many lists of values that may have deviations."""
 
 CLIENT: Mapping[str, Rule] = {
     "timeout": duration,

@@ -128,6 +128,10 @@ class Members:
         """Returns an array, or None if the answer has no such member."""
         return self.array(name, *entry) if name in self.tensors or name in self.fields else None
 
+    def optional_arrays(self, name: str, *entry: int) -> Array | None:
+        """Returns a stack of arrays, or None if the answer has no such member."""
+        return self.arrays(name, *entry) if name in self.tensors or name in self.fields else None
+
 
 def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
     """Reads the answer to a request in the format that it announces; tensors are views of its bytes."""
