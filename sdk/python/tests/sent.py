@@ -32,6 +32,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "posterior": {"values": VALUES},
     "interpolate_batch": {"values": LISTS},
     "posterior_batch": {"values": LISTS},
+    "select_model": {"values": VALUES},
     "normals": {},
     "curvatures": {},
     "surface_gradient": {"values": VALUES},
@@ -41,6 +42,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "laplace_beltrami_matrix": {},
     "laplace_beltrami_sparse_matrix": {},
 }
+QUERYING = [method for method in METHODS if method != "select_model"]
 BATCHES = [method for method in METHODS if method.endswith("_batch")]
 OPERATORS = [method for method in METHODS if "surface_gradient" in method or "laplace" in method]
 

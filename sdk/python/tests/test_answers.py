@@ -11,14 +11,14 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from sent import CIRCLE, METHODS, OPERATORS, VALUES
+from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 
 import gramian
 from gramian import Geometry, Kernel
 from gramian.answers import Answer
-from gramian.rest.types import Unset
+from gramian.rest.types import UNSET, Unset
 
-every_method = pytest.mark.parametrize("method", METHODS)
+every_method = pytest.mark.parametrize("method", QUERYING)
 every_operator = pytest.mark.parametrize("method", OPERATORS)
 
 NOISE = np.linspace(0.01, 0.02, 8)
@@ -160,6 +160,34 @@ def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: 
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
 
 
+# What a search may begin with.
+SEARCHES: dict[str, dict[str, Any]] = {
+    **{name: fit for name, fit in FITS.items() if name != "merged"},
+    "mean": {"mean": "linear"},
+    "refused": {"kernel": "gauss", "alpha": 1e-3, "duplicates": "refuse"},
+}
+
+
+@pytest.mark.parametrize("fit", SEARCHES.values(), ids=SEARCHES.keys())
+def test_the_fit_of_a_selection_is_what_was_selected(cloud: Any, fit: dict[str, Any]) -> None:
+    selected = cloud.select_model(VALUES, **fit)
+    for again in [selected.fit, pickle.loads(pickle.dumps(selected)).fit, copy.deepcopy(selected).fit]:
+        answer = cloud.posterior(VALUES, QUERIES, **again)
+        assert answer.diagnostics.kernel == selected.kernel
+        if selected.alpha is None:
+            assert answer.diagnostics.alpha is UNSET
+        else:  # the service keeps its ratio to the variance
+            assert answer.diagnostics.alpha == pytest.approx(selected.alpha, rel=1e-15)
+        if selected.mean_coefficients is None:
+            assert answer.diagnostics.mean_coefficients is UNSET
+        else:
+            mean = selected.mean_coefficients
+            np.testing.assert_allclose(answer.diagnostics.mean_coefficients, mean, rtol=1e-6, atol=1e-9)
+        assert_same(answer, cloud.posterior(VALUES, QUERIES, **answer.fit))
+    further = cloud.select_model(VALUES, **selected.fit)  # the search may go on from there
+    assert further.score > selected.score - 1e-6 * abs(selected.score)
+
+
 def test_the_noise_of_a_fit_stays_what_was_sent(cloud: Any) -> None:
     noise = NOISE.copy()
     answer = cloud.posterior(VALUES, noise_variances=noise, include="variance")
@@ -174,12 +202,12 @@ def test_the_families_that_the_service_lists_can_be_sent(cloud: Any) -> None:
             assert answer.diagnostics.kernel.family is described.family
 
 
-@every_method
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("fit", [{}, {"noise_variances": NOISE}], ids=["alpha", "noise"])
 def test_an_answer_shows_arrays_by_shape_and_nothing_that_is_absent(
     cloud: Any, method: str, fit: dict[str, Any]
 ) -> None:
-    shown = repr(ask(cloud, method, **fit, queries=None))
+    shown = repr(getattr(cloud, method)(**METHODS[method], **fit))
     assert "unset" not in shown.lower()
     assert "None" not in shown
     assert "<" not in shown

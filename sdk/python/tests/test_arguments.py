@@ -15,7 +15,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 import numpy.typing as npt
 import pytest
-from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, VALUES, client, cloud, posted, sent
+from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, VALUES, client, cloud, posted, sent
 
 import gramian
 from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
@@ -211,7 +211,7 @@ ROWS: dict[str, Any] = {
 @pytest.mark.parametrize("rows", ROWS.values(), ids=ROWS.keys())
 def test_rows_of_all_kinds_are_points(rows: object) -> None:
     assert posted(rows, rows) == {"points": CIRCLE.tolist(), "normals": CIRCLE.tolist()}
-    for method in METHODS:
+    for method in QUERYING:
         assert sent(method, queries=rows)["queries"] == CIRCLE.tolist()
 
 
@@ -293,7 +293,7 @@ def test_other_things_than_rows_of_numbers_are_refused_by_name(
     if not hasattr(rows, "__next__"):
         with pytest.raises(kind, match="^" + message.format("normals")):
             posted(CIRCLE, rows)
-        for method in METHODS:
+        for method in QUERYING:
             with pytest.raises(kind, match="^" + message.format("queries")):
                 sent(method, queries=rows)
 
@@ -372,7 +372,7 @@ def test_rows_of_all_kinds_are_lists_of_values(rows: object) -> None:
         assert sent(method, values=rows)["values"] == LISTS.tolist()
 
 
-@every_method
+@pytest.mark.parametrize("method", QUERYING)
 def test_queries_have_the_dimension_of_the_cloud(method: str) -> None:
     with pytest.raises(
         ValueError, match=r"^queries must have the shape \[m, d\] = \[m, 2\], not \[1, 3\]: rows are points$"
@@ -664,6 +664,92 @@ def test_length_scales_are_part_of_what_a_kernel_is() -> None:
         Kernel("gauss", lengthscales=[1, 2])  # type: ignore[call-arg]
 
 
+# What is free
+
+FREE = [{"parameter": "length_scales", "min": 0.1, "max": 10.0}, {"parameter": "alpha", "min": 1e-6, "max": 1.0}]
+OF_ONE_AXIS = {"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 10.0}
+VARIED: dict[str, tuple[Any, list[dict[str, Any]]]] = {
+    "dictionary": ({"length_scales": (0.1, 10), "alpha": (1e-6, 1)}, FREE),
+    "dictionary with None": ({"length_scales": [0.1, 10], "nu": None, "alpha": (1e-6, 1), "variance": UNSET}, FREE),
+    "members": (
+        {gramian.SelectionParameter.LENGTH_SCALES: np.array([0.1, 10]), gramian.SelectionParameter.ALPHA: (1e-6, 1)},
+        FREE,
+    ),
+    "other mapping": (MappingProxyType({"length_scales": Foreign([0.1, 10]), "alpha": (1e-6, np.float64(1))}), FREE),
+    "another order": ({"alpha": (1e-6, 1), "length_scales": (0.1, 10)}, FREE[::-1]),
+    "list": (FREE, FREE),
+    "tuple with an axis": (({**OF_ONE_AXIS, "axis": np.int64(1)}, {**FREE[1], "axis": None}), [OF_ONE_AXIS, FREE[1]]),
+    "iterator": (iter([{**FREE[0], "max": Fraction(10)}]), FREE[:1]),
+    "generated": (
+        [
+            models.FreeParameter(parameter=gramian.SelectionParameter.LENGTH_SCALES, min_=0.1, max_=10.0, axis=1),
+            gramian.FreeParameter(parameter=gramian.SelectionParameter.ALPHA, min_=1e-6, max_=1.0),
+        ],
+        [OF_ONE_AXIS, FREE[1]],
+    ),
+    "nothing": ([], []),
+    "nothing by name": ({}, []),
+}
+
+
+@pytest.mark.parametrize(("vary", "expected"), VARIED.values(), ids=VARIED.keys())
+def test_what_is_free_may_be_a_dictionary_or_a_list(vary: object, expected: object) -> None:
+    assert sent("select_model", vary=vary)["vary"] == expected
+
+
+@pytest.mark.parametrize(
+    ("vary", "kind", "message"),
+    [
+        (
+            {"lenght_scales": (1, 2)},
+            TypeError,
+            r"vary has no 'lenght_scales', but .*'length_scales'.*; did you mean 'length_scales'\?$",
+        ),
+        (
+            {"alpha": 1},
+            ValueError,
+            r"vary.alpha must have the shape \[bounds\] = \[2\], not \[\]: the least and the greatest$",
+        ),
+        ({"alpha": (1, 2, 3)}, ValueError, r"vary.alpha must .* not \[3\]: the least and the greatest$"),
+        ({"alpha": (1, np.inf)}, ValueError, r"vary.alpha\[1\] is inf, and only finite numbers can be sent$"),
+        ({"alpha": ("1", "2")}, TypeError, r"vary.alpha has text"),
+        (
+            "alpha",
+            TypeError,
+            r"vary is to be a mapping such as {'alpha': \(1e-6, 1\)}, or a list, not of the type str$",
+        ),
+        (0.5, TypeError, r"vary is to be a mapping such as .*, not of the type float$"),
+        (["alpha"], TypeError, r"vary\[0\] is to be a mapping such as {'parameter': .*}, not of the type str$"),
+        ([FREE[0], {"parameter": "alpha", "min": 1}], TypeError, r"vary\[1\].max is missing$"),
+        ([{"min": 1, "max": 2}], TypeError, r"vary\[0\].parameter is missing$"),
+        ([{**FREE[0], "parameter": "scale"}], ValueError, r"vary\[0\].parameter is 'scale', which is none of "),
+        ([{**FREE[0], "axis": 0.5}], ValueError, r"vary\[0\].axis is to be a whole number, not 0.5$"),
+        ([{**FREE[0], "min": np.nan}], ValueError, r"vary\[0\].min is nan, and only finite numbers can be sent$"),
+        ([{**FREE[0], "least": 1}], TypeError, r"vary\[0\] has no 'least', but 'parameter', 'axis', 'min', 'max'"),
+    ],
+    ids=repr,
+)
+def test_other_things_than_bounds_are_refused_by_name(vary: object, kind: type[Exception], message: str) -> None:
+    with pytest.raises(kind, match=rf"^{message}"):
+        sent("select_model", vary=vary)
+
+
+def test_a_selection_takes_words_and_whole_numbers() -> None:
+    body = sent("select_model", criterion=gramian.SelectionCriterion.LEAVE_ONE_OUT, restarts=np.int8(5), seed=7.0)
+    assert (body["criterion"], body["restarts"], body["seed"]) == ("leave_one_out", 5, 7)
+    for families in ["gauss", KernelFamily.GAUSS, ["gauss"], np.array(["gauss"])]:
+        assert sent("select_model", families=families)["families"] == ["gauss"]
+    assert sent("select_model", families=("matern", "gauss"))["families"] == ["matern", "gauss"]
+    with pytest.raises(ValueError, match=r"^criterion is 'leave_one', .*; did you mean 'leave_one_out'\?$"):
+        sent("select_model", criterion="leave_one")
+    with pytest.raises(ValueError, match=r"^families\[1\] is 'gaus', .*; did you mean 'gauss'\?$"):
+        sent("select_model", families=["matern", "gaus"])
+    with pytest.raises(ValueError, match=r"^restarts is to be a whole number, not 0.5$"):
+        sent("select_model", restarts=0.5)
+    with pytest.raises(TypeError, match=r"^select_model\(\) has no parameter 'queries'"):
+        sent("select_model", queries=CIRCLE)
+
+
 # Geometries
 
 
@@ -705,12 +791,14 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
 @every_method
 @pytest.mark.parametrize("absent", [None, UNSET], ids=repr)
 def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
-    names = ["queries", "kernel", "noise_variances", "solver", "duplicates"]
+    names = ["kernel", "noise_variances", "solver", "duplicates"]
+    names += ["queries"] if method in QUERYING else []
     names += {
         "interpolate": ["derivatives"],
         "interpolate_batch": ["derivatives", "deviations", "mean"],
         "posterior": ["include"],
         "posterior_batch": ["include", "samples", "quantiles", "threshold", "mean"],
+        "select_model": ["criterion", "vary", "families", "restarts", "seed", "mean"],
         "normals": ["surface", "orientation"],
     }.get(method, [])
     names += ["geometry"] if method in OPERATORS else []

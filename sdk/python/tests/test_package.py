@@ -21,6 +21,7 @@ import scipy.sparse
 
 import gramian
 from gramian import Cloud, Geometry, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
+from gramian.answers import Answer
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
 from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
@@ -55,6 +56,20 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     ),
     "posterior_batch of one list": lambda cloud: cloud.posterior_batch(
         lists(cloud)[:1], QUERIES[:1], include="log_marginal_likelihood", samples=1, quantiles=[0.5], kernel=GAUSS
+    ),
+    "select_model": lambda cloud: cloud.select_model(
+        np.sin(3 * squares(cloud)),
+        vary=[
+            {"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10},
+            {"parameter": "nu", "min": 0.5, "max": 2.5},
+        ],
+        families=["matern", "gauss"],
+        kernel={"family": "matern", "length_scales": [1, 2]},
+        mean="linear",
+        seed=1,
+    ),
+    "select_model with noise": lambda cloud: cloud.select_model(
+        squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points)
     ),
     "posterior with noise": lambda cloud: cloud.posterior(
         squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
@@ -96,7 +111,11 @@ def members(answer: object) -> dict[str, object]:
 @pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS.keys())
 def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], object], circle: Array) -> None:
     formats: list[Format] = ["safetensors", "json"]
-    binary, text = (members(operation(gramian.Client(format=format_).cloud(circle))) for format_ in formats)
+    binary, text = (operation(gramian.Client(format=format_).cloud(circle)) for format_ in formats)
+    assert_equal(members(binary), members(text))
+
+
+def assert_equal(binary: dict[str, object], text: dict[str, object]) -> None:
     assert binary.keys() == text.keys()
     for name, value in binary.items():
         other = text[name]
@@ -113,6 +132,8 @@ def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], ob
                 assert (matrix != other_matrix).nnz == 0
         elif name == "fit":
             assert repr(value) == repr(other)
+        elif isinstance(value, Answer):
+            assert_equal(members(value), members(other))
         else:
             assert value == other, name
 
@@ -234,6 +255,76 @@ def test_batches_are_dense(client: gramian.Client, circle: Array) -> None:
             method(circle.T, solver="local")
         assert (caught.value.slug, caught.value.pointer) == ("unsupported-by-solver", "/solver")
         assert method(circle.T, solver="auto").diagnostics.solver is gramian.SolverUsed.DENSE
+
+
+def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
+    random = np.random.default_rng(6)
+    points = random.uniform(-1, 1, size=(70, 2))
+    values = np.sin(4 * points[:, 0]) + 0.1 * random.normal(size=70)  # whatever the second coordinate is
+    cloud = client.cloud(points)
+    vary: gramian.Bounds = {"length_scales": (0.05, 50), "variance": (0.01, 100), "alpha": (1e-6, 1)}
+    found = cloud.select_model(values, vary=vary, families=["gauss", "matern"], kernel="gauss", alpha=1e-2)
+    assert found.converged
+    assert found.evaluations > 1
+    assert not isinstance(found.kernel.length_scales, gramian.Unset)
+    assert found.kernel.length_scales[0] < 1 < 5 < found.kernel.length_scales[1]
+    assert found.alpha is not None
+    assert np.sqrt(found.alpha) == pytest.approx(0.1, rel=0.3)
+    assert found.mean_coefficients is None
+    assert_shapes(found, gradient=(3,))
+    assert_shapes(found.path, alphas=found.path.scores.shape)
+    assert_shapes(found.leave_one_out, means=(70,), variances=(70,), log_predictive_densities=(70,))
+    assert np.all(np.diff(found.path.alphas) > 0)
+    assert np.nanmax(found.path.scores) <= found.score + 1e-6
+    assert [entry.family for entry in found.families] == [KernelFamily.GAUSS, KernelFamily.MATERN]
+    assert found.score == max(entry.score for entry in found.families if isinstance(entry.score, float))
+    assert found.diagnostics.alpha == 1e-2
+    answer = cloud.posterior(values, include="log_marginal_likelihood", **found.fit)
+    assert answer.log_marginal_likelihood == pytest.approx(found.score, rel=1e-9)
+    errors = (values - found.leave_one_out.means) / np.sqrt(found.leave_one_out.variances)
+    densities = -0.5 * errors**2 - 0.5 * np.log(2 * np.pi * found.leave_one_out.variances)
+    np.testing.assert_allclose(found.leave_one_out.log_predictive_densities, densities, rtol=1e-9)
+    others = client.cloud(points[1:]).posterior(values[1:], points[:1], include="observation_variance", **found.fit)
+    assert others.observation_variances is not None
+    assert others.means[0] == pytest.approx(found.leave_one_out.means[0], abs=1e-6)
+    assert others.observation_variances[0] == pytest.approx(found.leave_one_out.variances[0], rel=1e-6)
+
+
+def test_a_selection_tries_every_smoothness_within_bounds(client: gramian.Client) -> None:
+    random = np.random.default_rng(7)
+    points = random.uniform(-1, 1, size=(40, 2))
+    values = np.abs(points[:, 0]) + 0.05 * random.normal(size=40)
+    cloud = client.cloud(points)
+    for criterion in gramian.SelectionCriterion:
+        found = cloud.select_model(
+            values, vary={"nu": (0.5, 2.5), "length_scale": (0.1, 10)}, kernel="matern", alpha=0.01, criterion=criterion
+        )
+        assert [entry.nu for entry in found.families] == [0.5, 1.5, 2.5]
+        assert np.isnan(found.gradient).tolist() == [True, False]
+        if criterion is gramian.SelectionCriterion.LEAVE_ONE_OUT:
+            assert found.score == pytest.approx(found.leave_one_out.log_predictive_densities.sum(), rel=1e-9)
+    noise = cloud.select_model(values, noise_variances=np.full(40, 0.0025))
+    assert (noise.alpha, noise.path.alphas.shape, noise.path.scores.shape) == (None, (0,), (0,))
+    assert "alpha" not in noise.fit
+
+
+def test_a_selection_is_refused_by_name(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    refusals: dict[str, Callable[[], object]] = {
+        "/vary/0": lambda: cloud.select_model(circle[:, 0], vary={"alpha": (1, 0.1)}),
+        "/vary/1": lambda: cloud.select_model(circle[:, 0], vary={"nu": (0.5, 1.5), "epsilon": (0.1, 1)}),
+        "/restarts": lambda: cloud.select_model(circle[:, 0], restarts=101),
+        "/families/1": lambda: cloud.select_model(circle[:, 0], families=["gauss", "gauss"]),
+        "/duplicates": lambda: cloud.select_model(circle[:, 0], duplicates="merge"),
+        "/vary/0/axis": lambda: cloud.select_model(
+            circle[:, 0], vary=[{"parameter": "alpha", "axis": 0, "min": 0.1, "max": 1}]
+        ),
+        "/solver": lambda: cloud.select_model(circle[:, 0], solver="local"),
+    }
+    for pointer, refused in refusals.items():
+        with pytest.raises(gramian.Problem) as caught:
+            refused()
+        assert caught.value.pointer == pointer
 
 
 def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) -> None:

@@ -15,12 +15,15 @@ generated from the service's OpenAPI document, with all of the interface.
 import copyreg
 
 from .answers import (
+    AlphaPath,
     Curvatures,
     Interpolation,
     InterpolationBatch,
     LaplaceBeltrami,
     LaplaceBeltramiMatrix,
     LaplaceBeltramiSparseMatrix,
+    LeaveOneOut,
+    ModelSelection,
     Normals,
     Posterior,
     PosteriorBatch,
@@ -38,12 +41,16 @@ from .rest.models import (
     Diagnostics,
     DuplicatePolicy,
     FactorizationUsed,
+    FamilyScore,
+    FreeParameter,
     GeometryInclude,
     KernelDescription,
     KernelFamily,
     KernelUsed,
     OrientationChoice,
     PosteriorQuantity,
+    SelectionCriterion,
+    SelectionParameter,
     Smoothness,
     SolverChoice,
     SolverUsed,
@@ -52,12 +59,15 @@ from .rest.models import (
     WarningCode,
 )
 from .rest.types import UNSET, Unset
+from .selection import Bounds, FreeParameterFields, Vary
 
 # The generated code compares with this one object, which therefore must stay one when an answer is pickled or copied.
 copyreg.pickle(Unset, lambda _: "UNSET")
 
 __all__ = [
     "UNSET",
+    "AlphaPath",
+    "Bounds",
     "Client",
     "Cloud",
     "Curvatures",
@@ -66,7 +76,10 @@ __all__ = [
     "Diagnostics",
     "DuplicatePolicy",
     "FactorizationUsed",
+    "FamilyScore",
     "Fit",
+    "FreeParameter",
+    "FreeParameterFields",
     "Geometry",
     "GeometryFields",
     "GeometryInclude",
@@ -82,6 +95,8 @@ __all__ = [
     "LaplaceBeltrami",
     "LaplaceBeltramiMatrix",
     "LaplaceBeltramiSparseMatrix",
+    "LeaveOneOut",
+    "ModelSelection",
     "Normals",
     "NotPositiveDefinite",
     "OperatorFit",
@@ -91,6 +106,8 @@ __all__ = [
     "PosteriorBatch",
     "PosteriorQuantity",
     "Problem",
+    "SelectionCriterion",
+    "SelectionParameter",
     "Smoothness",
     "SolverChoice",
     "SolverUsed",
@@ -102,5 +119,6 @@ __all__ = [
     "UnknownCloud",
     "Unset",
     "ValuesFit",
+    "Vary",
     "WarningCode",
 ]

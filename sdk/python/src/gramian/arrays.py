@@ -18,8 +18,12 @@ Sizes: TypeAlias = Mapping[str, int]
 
 AnyArray: TypeAlias = npt.NDArray[Any]
 
-EACH = {"n": "point of the cloud", "d": "axis"}
-"""What the numbers of an array with one axis are for, each one."""
+NUMBERS = {
+    "n": "one number for each point of the cloud",
+    "d": "one number for each axis",
+    "bounds": "the least and the greatest",
+}
+"""What the numbers of an array with one axis are."""
 
 ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
 """What takes one number where these take many."""
@@ -149,7 +153,7 @@ def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[in
         if array.ndim < 2:
             one = ONE_FOR_ALL.get(field) if array.ndim == 0 else None
             one_for_all = f"; one for all of them is {one}" if one else ""
-            return f": one number for each {EACH[axes[0]]}{one_for_all}" if axes[0] in EACH else ""
+            return f": {NUMBERS[axes[0]]}{one_for_all}" if axes[0] in NUMBERS else ""
         return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
     rows = ROWS.get(field, "points")
     if array.ndim == 1:

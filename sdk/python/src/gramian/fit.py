@@ -262,6 +262,15 @@ def batch_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any], mean_co
     return _with_mean(fit, 0 if mean_coefficients is None else mean_coefficients.shape[-1])
 
 
+def selected_fit(start: ValuesFit, kernel: KernelUsed, alpha: float | None) -> ValuesFit:
+    """Returns the fit that a search ended with, from that which it began with."""
+    fit = start.copy()
+    fit["kernel"] = kernel
+    if alpha is not None:
+        fit["alpha"] = alpha
+    return fit
+
+
 def _with_mean(fit: Fit, n_coefficients: int) -> ValuesFit:
     values_fit = cast("ValuesFit", fit)
     if n_coefficients:
