@@ -14,6 +14,7 @@ from gramian.rest import models
 
 CIRCLE = np.column_stack([np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)])
 VALUES = np.arange(8.0)
+LISTS = np.stack([VALUES, VALUES[::-1] ** 2, np.cos(VALUES)])
 ID = "ab" * 32
 
 DESCRIPTION = {
@@ -29,6 +30,9 @@ DESCRIPTION = {
 METHODS: dict[str, dict[str, Any]] = {
     "interpolate": {"values": VALUES},
     "posterior": {"values": VALUES},
+    "interpolate_batch": {"values": LISTS},
+    "posterior_batch": {"values": LISTS},
+    "select_model": {"values": VALUES},
     "normals": {},
     "curvatures": {},
     "surface_gradient": {"values": VALUES},
@@ -38,6 +42,8 @@ METHODS: dict[str, dict[str, Any]] = {
     "laplace_beltrami_matrix": {},
     "laplace_beltrami_sparse_matrix": {},
 }
+QUERYING = [method for method in METHODS if method != "select_model"]
+BATCHES = [method for method in METHODS if method.endswith("_batch")]
 OPERATORS = [method for method in METHODS if "surface_gradient" in method or "laplace" in method]
 
 

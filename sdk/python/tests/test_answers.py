@@ -11,14 +11,14 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from sent import CIRCLE, METHODS, OPERATORS, VALUES
+from sent import CIRCLE, METHODS, OPERATORS, QUERYING, VALUES
 
 import gramian
 from gramian import Geometry, Kernel
 from gramian.answers import Answer
-from gramian.rest.types import Unset
+from gramian.rest.types import UNSET, Unset
 
-every_method = pytest.mark.parametrize("method", METHODS)
+every_method = pytest.mark.parametrize("method", QUERYING)
 every_operator = pytest.mark.parametrize("method", OPERATORS)
 
 NOISE = np.linspace(0.01, 0.02, 8)
@@ -31,6 +31,7 @@ FITS: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("matern", nu=3.5), "alpha": 1e-6},
     "wendland": {"kernel": {"family": "wendland", "smoothness": 6, "length_scale": 3}, "alpha": np.float32(0.25)},
     "interpolation": {"kernel": Kernel("inverse_multiquadric", length_scale=0.5), "alpha": 0, "solver": "dense"},
+    "length scales": {"kernel": Kernel("matern", length_scales=[1.5, 0.1], variance=2), "alpha": 1e-6},
     "merged": {"kernel": "gauss", "alpha": 0, "duplicates": "merge"},
     "noise": {"kernel": "gauss", "noise_variances": NOISE},
     "noise alone": {"noise_variances": NOISE},
@@ -38,6 +39,7 @@ FITS: dict[str, dict[str, Any]] = {
 GEOMETRIES: dict[str, dict[str, Any]] = {
     "kernel": {"kernel": Kernel("gauss", length_scale=2)},
     "alpha": {"kernel": "gauss", "alpha": 1e-6, "surface": "signature"},
+    "length scales": {"kernel": Kernel("gauss", length_scales=[2, 1 / 3]), "alpha": 1e-8},
     "noise": {"noise_variances": NOISE},
 }
 
@@ -158,6 +160,34 @@ def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: 
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
 
 
+# What a search may begin with.
+SEARCHES: dict[str, dict[str, Any]] = {
+    **{name: fit for name, fit in FITS.items() if name != "merged"},
+    "mean": {"mean": "linear"},
+    "refused": {"kernel": "gauss", "alpha": 1e-3, "duplicates": "refuse"},
+}
+
+
+@pytest.mark.parametrize("fit", SEARCHES.values(), ids=SEARCHES.keys())
+def test_the_fit_of_a_selection_is_what_was_selected(cloud: Any, fit: dict[str, Any]) -> None:
+    selected = cloud.select_model(VALUES, **fit)
+    for again in [selected.fit, pickle.loads(pickle.dumps(selected)).fit, copy.deepcopy(selected).fit]:
+        answer = cloud.posterior(VALUES, QUERIES, **again)
+        assert answer.diagnostics.kernel == selected.kernel
+        if selected.alpha is None:
+            assert answer.diagnostics.alpha is UNSET
+        else:  # the service keeps its ratio to the variance
+            assert answer.diagnostics.alpha == pytest.approx(selected.alpha, rel=1e-15)
+        if selected.mean_coefficients is None:
+            assert answer.diagnostics.mean_coefficients is UNSET
+        else:
+            mean = selected.mean_coefficients
+            np.testing.assert_allclose(answer.diagnostics.mean_coefficients, mean, rtol=1e-6, atol=1e-9)
+        assert_same(answer, cloud.posterior(VALUES, QUERIES, **answer.fit))
+    further = cloud.select_model(VALUES, **selected.fit)  # the search may go on from there
+    assert further.score > selected.score - 1e-6 * abs(selected.score)
+
+
 def test_the_noise_of_a_fit_stays_what_was_sent(cloud: Any) -> None:
     noise = NOISE.copy()
     answer = cloud.posterior(VALUES, noise_variances=noise, include="variance")
@@ -172,12 +202,12 @@ def test_the_families_that_the_service_lists_can_be_sent(cloud: Any) -> None:
             assert answer.diagnostics.kernel.family is described.family
 
 
-@every_method
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("fit", [{}, {"noise_variances": NOISE}], ids=["alpha", "noise"])
 def test_an_answer_shows_arrays_by_shape_and_nothing_that_is_absent(
     cloud: Any, method: str, fit: dict[str, Any]
 ) -> None:
-    shown = repr(ask(cloud, method, **fit, queries=None))
+    shown = repr(getattr(cloud, method)(**METHODS[method], **fit))
     assert "unset" not in shown.lower()
     assert "None" not in shown
     assert "<" not in shown
@@ -189,8 +219,13 @@ def test_representations_are_as_one_writes_them(cloud: Any) -> None:
     answer = cloud.interpolate(VALUES, QUERIES, kernel="gauss", alpha=0.5)
     assert repr(answer).startswith("Interpolation(values=array[2], diagnostics=Diagnostics(cloud_id=")
     kernel = answer.diagnostics.kernel
-    assert repr(kernel) == f"KernelUsed(family='gauss', length_scale={kernel.length_scale}, variance=1.0)"
-    assert eval(repr(Kernel("gauss", length_scale=2)), {"Kernel": Kernel}) == Kernel("gauss", length_scale=2)
+    assert repr(kernel) == f"KernelUsed(family='gauss', variance=1.0, length_scale={kernel.length_scale})"
+    for written in [
+        Kernel("gauss", length_scale=2),
+        Kernel("gauss", length_scales=[2]),
+        Kernel("gauss", length_scales=range(1, 9)),
+    ]:
+        assert eval(repr(written), {"Kernel": Kernel}) == written
     assert repr(Geometry(cloud=cloud, kernel=Kernel("wendland", smoothness=4), noise_variances=NOISE)) == (
         f"Geometry(cloud=Cloud(id='{cloud.id[:8]}…', n_points=8, dimension=2), "
         "kernel=Kernel(family='wendland', smoothness=4), noise_variances=array[8])"

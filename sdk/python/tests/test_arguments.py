@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import dataclasses
 import enum
 import inspect
 from collections import ChainMap
@@ -14,7 +15,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 import numpy.typing as npt
 import pytest
-from sent import CIRCLE, METHODS, OPERATORS, VALUES, client, cloud, posted, sent
+from sent import BATCHES, CIRCLE, LISTS, METHODS, OPERATORS, QUERYING, VALUES, client, cloud, posted, sent
 
 import gramian
 from gramian import Geometry, Kernel, KernelFamily, SolverChoice, SolverUsed
@@ -184,7 +185,9 @@ LAYOUTS: dict[str, Any] = {
 @every_method
 def test_arrays_of_all_kinds_are_arrays(method: str, values: npt.ArrayLike) -> None:
     assert sent(method, noise_variances=values)["noise_variances"] == VALUES.tolist()
-    if "values" in METHODS[method]:
+    if method in BATCHES:
+        assert sent(method, values=[values, values])["values"] == [VALUES.tolist()] * 2
+    elif "values" in METHODS[method]:
         assert sent(method, values=values)["values"] == VALUES.tolist()
     if method in OPERATORS:
         body = sent(method, geometry=Geometry(noise_variances=values))
@@ -208,7 +211,7 @@ ROWS: dict[str, Any] = {
 @pytest.mark.parametrize("rows", ROWS.values(), ids=ROWS.keys())
 def test_rows_of_all_kinds_are_points(rows: object) -> None:
     assert posted(rows, rows) == {"points": CIRCLE.tolist(), "normals": CIRCLE.tolist()}
-    for method in METHODS:
+    for method in QUERYING:
         assert sent(method, queries=rows)["queries"] == CIRCLE.tolist()
 
 
@@ -290,7 +293,7 @@ def test_other_things_than_rows_of_numbers_are_refused_by_name(
     if not hasattr(rows, "__next__"):
         with pytest.raises(kind, match="^" + message.format("normals")):
             posted(CIRCLE, rows)
-        for method in METHODS:
+        for method in QUERYING:
             with pytest.raises(kind, match="^" + message.format("queries")):
                 sent(method, queries=rows)
 
@@ -307,9 +310,13 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
     bad = VALUES.copy()
     bad[3] = np.nan
     message = r"\[3\] is nan, and only finite numbers can be sent$"
-    if "values" in METHODS[method]:
+    if method in BATCHES:
+        with pytest.raises(ValueError, match=r"^values\[1, 3\] is nan, and only finite numbers can be sent$"):
+            sent(method, values=[VALUES, bad])
+    elif "values" in METHODS[method]:
         with pytest.raises(ValueError, match=rf"^values{message}"):
             sent(method, values=bad)
+    if "values" in METHODS[method]:
         with pytest.raises(TypeError, match=r"^values is missing$"):
             sent(method, values=None)
     with pytest.raises(ValueError, match=rf"^noise_variances{message}"):
@@ -337,12 +344,35 @@ def test_values_are_refused_by_name_and_place(method: str) -> None:
 def test_there_is_one_value_for_each_point(method: str, shape: tuple[int, ...], message: str) -> None:
     with pytest.raises(ValueError, match=rf"^noise_variances {message}"):
         sent(method, noise_variances=np.ones(shape))
-    if "values" in METHODS[method]:
+    if "values" in METHODS[method] and method not in BATCHES:
         with pytest.raises(ValueError, match=rf"^values {message}"):
             sent(method, values=np.ones(shape))
 
 
-@every_method
+@pytest.mark.parametrize("method", BATCHES)
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (VALUES, r"not \[8\]: rows are lists of values; np.reshape\(values, \(1, -1\)\) is one of 8$"),
+        (LISTS.T, r"not \[8, 3\]: rows are lists of values; it looks transposed, send values.T$"),
+        (LISTS[:, 1:], r"not \[3, 7\]: rows are lists of values$"),
+        (LISTS[None], r"not \[1, 3, 8\]: rows are lists of values$"),
+        (LISTS[:0], r"not \[0, 8\]: it is empty$"),
+        (1.0, r"not \[\]: rows are lists of values$"),
+    ],
+)
+def test_the_rows_of_a_batch_are_lists_of_values(method: str, values: npt.ArrayLike, message: str) -> None:
+    with pytest.raises(ValueError, match=rf"^values must have the shape \[k, n\] = \[k, 8\], {message}"):
+        sent(method, values=values)
+
+
+@pytest.mark.parametrize("rows", [LISTS.tolist(), list(LISTS), np.asfortranarray(LISTS), Foreign(LISTS), LISTS.data])
+def test_rows_of_all_kinds_are_lists_of_values(rows: object) -> None:
+    for method in BATCHES:
+        assert sent(method, values=rows)["values"] == LISTS.tolist()
+
+
+@pytest.mark.parametrize("method", QUERYING)
 def test_queries_have_the_dimension_of_the_cloud(method: str) -> None:
     with pytest.raises(
         ValueError, match=r"^queries must have the shape \[m, d\] = \[m, 2\], not \[1, 3\]: rows are points$"
@@ -360,6 +390,11 @@ def test_queries_have_the_dimension_of_the_cloud(method: str) -> None:
 def test_one_noise_for_all_points_is_alpha(method: str) -> None:
     with pytest.raises(ValueError, match=r"one number for each point of the cloud; one for all of them is alpha$"):
         sent(method, noise_variances=0.1)
+
+
+def test_quantiles_are_not_one_for_each_point() -> None:
+    with pytest.raises(ValueError, match=r"^quantiles must have the shape \[quantiles\], not \[\]$"):
+        sent("posterior", quantiles=0.5)
 
 
 def test_a_cloud_on_a_line_says_how_to_write_its_queries() -> None:
@@ -415,7 +450,7 @@ def test_words_may_be_strings_or_members_of_enumerations(method: str) -> None:
             assert sent(method, orientation=orientation)["orientation"] == "gradient"
 
 
-@pytest.mark.parametrize("method", ["normals", "curvatures"])
+@pytest.mark.parametrize("method", ["normals", "curvatures", "interpolate", "interpolate_batch"])
 def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
     wanted = {"include": ["deviations"]}
     said: list[dict[str, Any]] = [
@@ -427,9 +462,9 @@ def test_deviations_may_be_asked_for_by_their_own_name(method: str) -> None:
         {"include": [gramian.GeometryInclude.DEVIATIONS], "deviations": False},
     ]
     for arguments in said:
-        assert sent(method, **arguments) == wanted
+        assert sent(method, **arguments) == sent(method) | wanted
     for absent in [None, UNSET, False]:
-        assert sent(method, deviations=absent, include=UNSET) == {}
+        assert sent(method, deviations=absent, include=UNSET) == sent(method)
     for number in [1, 0.0, "yes", [True]]:
         with pytest.raises(TypeError, match=r"^deviations is to be True or False, not "):
             sent(method, deviations=number)
@@ -445,7 +480,8 @@ def test_one_word_may_stand_for_a_list(include: object) -> None:
 
 
 def test_several_words_keep_their_order() -> None:
-    assert sent("posterior", include=("gradients", "variance"))["include"] == ["gradients", "variance"]
+    for method in ["posterior", "posterior_batch"]:
+        assert sent(method, include=("gradients", "variance"))["include"] == ["gradients", "variance"]
 
 
 @every_method
@@ -487,6 +523,7 @@ def test_misspelt_words_of_other_fields_name_the_nearest() -> None:
 # Kernels
 
 GAUSS = {"family": "gauss", "length_scale": 2.0}
+OF_AXES = {"family": "gauss", "length_scales": [1.0, 2.0]}
 KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
     "word": ("gauss", {"family": "gauss"}),
     "word with underscore": ("inverse_multiquadric", {"family": "inverse_multiquadric"}),
@@ -507,9 +544,14 @@ KERNELS: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "used": (models.KernelUsed.from_dict({**GAUSS, "variance": 3.0}), {**GAUSS, "variance": 3.0}),
     "used by a later service": (
-        models.KernelUsed.from_dict({**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]}),
-        {**GAUSS, "variance": 3.0, "length_scales": [1.0, 2.0]},
+        models.KernelUsed.from_dict({**GAUSS, "variance": 3.0, "turn": [1.0, 2.0]}),
+        {**GAUSS, "variance": 3.0, "turn": [1.0, 2.0]},
     ),
+    "length scales": (Kernel("gauss", length_scales=(1, 2)), OF_AXES),
+    "length scales of NumPy": ({"family": "gauss", "length_scales": np.array([1, 2], dtype="f4")}, OF_AXES),
+    "length scales of another library": ({"family": "gauss", "length_scales": Foreign([1, 2])}, OF_AXES),
+    "length scales, generated": (models.Kernel(family=KernelFamily.GAUSS, length_scales=[1.0, 2.0]), OF_AXES),
+    "length scales, used": (models.KernelUsed.from_dict({**OF_AXES, "variance": 1.0}), {**OF_AXES, "variance": 1.0}),
     "described": (
         models.KernelDescription.from_dict(
             {
@@ -553,6 +595,31 @@ def test_kernels_of_all_kinds_are_kernels(method: str, kernel: object, expected:
         ),
         (2.0, TypeError, "kernel is to be a family such as 'gauss', .*, not of the type float$"),
         (["gauss"], TypeError, "kernel is to be a family such as 'gauss', .*, not of the type list$"),
+        (
+            {"family": "gauss", "length_scales": [1, 2, 3]},
+            ValueError,
+            r"kernel.length_scales must have the shape \[d\] = \[2\], not \[3\]: one number for each axis$",
+        ),
+        (
+            {"family": "gauss", "length_scales": 2},
+            ValueError,
+            r"kernel.length_scales must .* not \[\]: one number for each axis; one for all of them is length_scale$",
+        ),
+        (
+            Kernel("gauss", length_scales=[1]),
+            ValueError,
+            r"kernel.length_scales must have the shape \[d\] = \[2\], not \[1\]: one number for each axis$",
+        ),
+        (
+            {"family": "gauss", "length_scales": [1, np.nan]},
+            ValueError,
+            r"kernel.length_scales\[1\] is nan, and only finite numbers can be sent$",
+        ),
+        (
+            {"family": "gauss", "length_scales": ["1", "2"]},
+            TypeError,
+            r"kernel.length_scales has text \(<U1\); only real numbers can be sent$",
+        ),
     ],
     ids=repr,
 )
@@ -575,6 +642,112 @@ def test_a_kernel_is_checked_where_it_is_written() -> None:
     assert Kernel("gauss", length_scale=2) == Kernel(KernelFamily.GAUSS, length_scale=np.float32(2))
     assert hash(Kernel("gauss")) == hash(Kernel("gauss", variance=None))
     assert isinstance(Kernel("gauss").family, KernelFamily)
+
+
+def test_length_scales_are_part_of_what_a_kernel_is() -> None:
+    scales = np.array([1.0, 2.0])
+    kernel = Kernel("gauss", length_scales=scales)
+    scales[:] = 7
+    assert kernel.length_scales == (1.0, 2.0)
+    assert kernel == Kernel("gauss", length_scales=range(1, 3)) != Kernel("gauss", length_scales=[2, 1])
+    assert hash(kernel) == hash(Kernel("gauss", length_scales=np.array([1, 2], dtype="f4")))
+    assert Kernel("gauss", length_scales=UNSET) == Kernel("gauss")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        kernel.length_scales = None  # type: ignore[misc]
+    with pytest.raises(ValueError, match=r"^kernel.length_scales must have the shape \[d\], not \[1, 2\]; np.ravel\("):
+        Kernel("gauss", length_scales=[[1, 2]])
+    with pytest.raises(ValueError, match=r"^kernel.length_scales\[0\] is inf"):
+        Kernel("gauss", length_scales=[np.inf, 1])
+    with pytest.raises(
+        TypeError, match=r"^Kernel\(\) has no parameter 'lengthscales'; did you mean 'length_scales'\?$"
+    ):
+        Kernel("gauss", lengthscales=[1, 2])  # type: ignore[call-arg]
+
+
+# What is free
+
+FREE = [{"parameter": "length_scales", "min": 0.1, "max": 10.0}, {"parameter": "alpha", "min": 1e-6, "max": 1.0}]
+OF_ONE_AXIS = {"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 10.0}
+VARIED: dict[str, tuple[Any, list[dict[str, Any]]]] = {
+    "dictionary": ({"length_scales": (0.1, 10), "alpha": (1e-6, 1)}, FREE),
+    "dictionary with None": ({"length_scales": [0.1, 10], "nu": None, "alpha": (1e-6, 1), "variance": UNSET}, FREE),
+    "members": (
+        {gramian.SelectionParameter.LENGTH_SCALES: np.array([0.1, 10]), gramian.SelectionParameter.ALPHA: (1e-6, 1)},
+        FREE,
+    ),
+    "other mapping": (MappingProxyType({"length_scales": Foreign([0.1, 10]), "alpha": (1e-6, np.float64(1))}), FREE),
+    "another order": ({"alpha": (1e-6, 1), "length_scales": (0.1, 10)}, FREE[::-1]),
+    "list": (FREE, FREE),
+    "tuple with an axis": (({**OF_ONE_AXIS, "axis": np.int64(1)}, {**FREE[1], "axis": None}), [OF_ONE_AXIS, FREE[1]]),
+    "iterator": (iter([{**FREE[0], "max": Fraction(10)}]), FREE[:1]),
+    "generated": (
+        [
+            models.FreeParameter(parameter=gramian.SelectionParameter.LENGTH_SCALES, min_=0.1, max_=10.0, axis=1),
+            gramian.FreeParameter(parameter=gramian.SelectionParameter.ALPHA, min_=1e-6, max_=1.0),
+        ],
+        [OF_ONE_AXIS, FREE[1]],
+    ),
+    "nothing": ([], []),
+    "nothing by name": ({}, []),
+}
+
+
+@pytest.mark.parametrize(("vary", "expected"), VARIED.values(), ids=VARIED.keys())
+def test_what_is_free_may_be_a_dictionary_or_a_list(vary: object, expected: object) -> None:
+    assert sent("select_model", vary=vary)["vary"] == expected
+
+
+@pytest.mark.parametrize(
+    ("vary", "kind", "message"),
+    [
+        (
+            {"lenght_scales": (1, 2)},
+            TypeError,
+            r"vary has no 'lenght_scales', but .*'length_scales'.*; did you mean 'length_scales'\?$",
+        ),
+        (
+            {"alpha": 1},
+            ValueError,
+            r"vary.alpha must have the shape \[bounds\] = \[2\], not \[\]: the least and the greatest$",
+        ),
+        ({"alpha": (1, 2, 3)}, ValueError, r"vary.alpha must .* not \[3\]: the least and the greatest$"),
+        ({"alpha": (1, np.inf)}, ValueError, r"vary.alpha\[1\] is inf, and only finite numbers can be sent$"),
+        ({"alpha": ("1", "2")}, TypeError, r"vary.alpha has text"),
+        (
+            "alpha",
+            TypeError,
+            r"vary is to be a mapping such as {'alpha': \(1e-6, 1\)}, or a list, not of the type str$",
+        ),
+        (0.5, TypeError, r"vary is to be a mapping such as .*, not of the type float$"),
+        (["alpha"], TypeError, r"vary\[0\] is to be a mapping such as {'parameter': .*}, not of the type str$"),
+        ([FREE[0], {"parameter": "alpha", "min": 1}], TypeError, r"vary\[1\].max is missing$"),
+        ([{"min": 1, "max": 2}], TypeError, r"vary\[0\].parameter is missing$"),
+        ([{**FREE[0], "parameter": "scale"}], ValueError, r"vary\[0\].parameter is 'scale', which is none of "),
+        ([{**FREE[0], "axis": 0.5}], ValueError, r"vary\[0\].axis is to be a whole number, not 0.5$"),
+        ([{**FREE[0], "min": np.nan}], ValueError, r"vary\[0\].min is nan, and only finite numbers can be sent$"),
+        ([{**FREE[0], "least": 1}], TypeError, r"vary\[0\] has no 'least', but 'parameter', 'axis', 'min', 'max'"),
+    ],
+    ids=repr,
+)
+def test_other_things_than_bounds_are_refused_by_name(vary: object, kind: type[Exception], message: str) -> None:
+    with pytest.raises(kind, match=rf"^{message}"):
+        sent("select_model", vary=vary)
+
+
+def test_a_selection_takes_words_and_whole_numbers() -> None:
+    body = sent("select_model", criterion=gramian.SelectionCriterion.LEAVE_ONE_OUT, restarts=np.int8(5), seed=7.0)
+    assert (body["criterion"], body["restarts"], body["seed"]) == ("leave_one_out", 5, 7)
+    for families in ["gauss", KernelFamily.GAUSS, ["gauss"], np.array(["gauss"])]:
+        assert sent("select_model", families=families)["families"] == ["gauss"]
+    assert sent("select_model", families=("matern", "gauss"))["families"] == ["matern", "gauss"]
+    with pytest.raises(ValueError, match=r"^criterion is 'leave_one', .*; did you mean 'leave_one_out'\?$"):
+        sent("select_model", criterion="leave_one")
+    with pytest.raises(ValueError, match=r"^families\[1\] is 'gaus', .*; did you mean 'gauss'\?$"):
+        sent("select_model", families=["matern", "gaus"])
+    with pytest.raises(ValueError, match=r"^restarts is to be a whole number, not 0.5$"):
+        sent("select_model", restarts=0.5)
+    with pytest.raises(TypeError, match=r"^select_model\(\) has no parameter 'queries'"):
+        sent("select_model", queries=CIRCLE)
 
 
 # Geometries
@@ -618,10 +791,16 @@ def test_a_geometry_may_be_of_another_cloud(method: str) -> None:
 @every_method
 @pytest.mark.parametrize("absent", [None, UNSET], ids=repr)
 def test_none_is_as_absent_everywhere(method: str, absent: object) -> None:
-    names = ["queries", "kernel", "noise_variances", "solver", "duplicates"]
-    names += {"interpolate": ["derivatives"], "posterior": ["include"], "normals": ["surface", "orientation"]}.get(
-        method, []
-    )
+    names = ["kernel", "noise_variances", "solver", "duplicates"]
+    names += ["queries"] if method in QUERYING else []
+    names += {
+        "interpolate": ["derivatives"],
+        "interpolate_batch": ["derivatives", "deviations", "mean"],
+        "posterior": ["include"],
+        "posterior_batch": ["include", "samples", "quantiles", "threshold", "mean"],
+        "select_model": ["criterion", "vary", "families", "restarts", "seed", "mean"],
+        "normals": ["surface", "orientation"],
+    }.get(method, [])
     names += ["geometry"] if method in OPERATORS else []
     assert sent(method, **dict.fromkeys(names, absent), alpha=None) == sent(method)
     if method in OPERATORS:

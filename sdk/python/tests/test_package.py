@@ -20,7 +20,8 @@ import pytest
 import scipy.sparse
 
 import gramian
-from gramian import Cloud, Geometry, Kernel, KernelFamily
+from gramian import Cloud, Geometry, InterpolationBatch, Kernel, KernelFamily, PosteriorBatch
+from gramian.answers import Answer
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
 from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
@@ -38,6 +39,37 @@ OPERATIONS: dict[str, Callable[[Cloud], object]] = {
         include=["variance", "observation_variance", "covariance", "gradients", "log_marginal_likelihood"],
         kernel={"family": "gauss", "length_scale": 2.0},
         alpha=1e-6,
+    ),
+    "interpolate_batch": lambda cloud: cloud.interpolate_batch(
+        lists(cloud), QUERIES, derivatives=2, deviations=True, mean="linear", kernel=GAUSS
+    ),
+    "posterior_batch": lambda cloud: cloud.posterior_batch(
+        lists(cloud),
+        QUERIES,
+        include=["variance", "covariance", "gradients", "gradient_variances", "log_marginal_likelihood"],
+        samples={"count": 4, "seed": 1},
+        quantiles=[0.1, 0.5, 0.9],
+        threshold=0.5,
+        mean="constant",
+        kernel=GAUSS,
+        alpha=1e-6,
+    ),
+    "posterior_batch of one list": lambda cloud: cloud.posterior_batch(
+        lists(cloud)[:1], QUERIES[:1], include="log_marginal_likelihood", samples=1, quantiles=[0.5], kernel=GAUSS
+    ),
+    "select_model": lambda cloud: cloud.select_model(
+        np.sin(3 * squares(cloud)),
+        vary=[
+            {"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10},
+            {"parameter": "nu", "min": 0.5, "max": 2.5},
+        ],
+        families=["matern", "gauss"],
+        kernel={"family": "matern", "length_scales": [1, 2]},
+        mean="linear",
+        seed=1,
+    ),
+    "select_model with noise": lambda cloud: cloud.select_model(
+        squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points)
     ),
     "posterior with noise": lambda cloud: cloud.posterior(
         squares(cloud), noise_variances=np.linspace(0.1, 0.2, cloud.n_points), include=["variance"]
@@ -66,6 +98,11 @@ def squares(cloud: Cloud) -> Array:
     return np.square(cloud.points[:, 0])
 
 
+def lists(cloud: Cloud) -> Array:
+    assert cloud.points is not None
+    return np.vstack([squares(cloud), cloud.points.T])
+
+
 def members(answer: object) -> dict[str, object]:
     assert dataclasses.is_dataclass(answer)
     return {field.name: getattr(answer, field.name) for field in dataclasses.fields(answer)}
@@ -74,7 +111,11 @@ def members(answer: object) -> dict[str, object]:
 @pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS.keys())
 def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], object], circle: Array) -> None:
     formats: list[Format] = ["safetensors", "json"]
-    binary, text = (members(operation(gramian.Client(format=format_).cloud(circle))) for format_ in formats)
+    binary, text = (operation(gramian.Client(format=format_).cloud(circle)) for format_ in formats)
+    assert_equal(members(binary), members(text))
+
+
+def assert_equal(binary: dict[str, object], text: dict[str, object]) -> None:
     assert binary.keys() == text.keys()
     for name, value in binary.items():
         other = text[name]
@@ -91,6 +132,8 @@ def test_safetensors_and_json_give_equal_answers(operation: Callable[[Cloud], ob
                 assert (matrix != other_matrix).nnz == 0
         elif name == "fit":
             assert repr(value) == repr(other)
+        elif isinstance(value, Answer):
+            assert_equal(members(value), members(other))
         else:
             assert value == other, name
 
@@ -140,6 +183,148 @@ def test_measured_values_need_no_parameters(client: gramian.Client) -> None:
     assert gradient.gradient_deviations is not None
     assert gradient.gradient_deviations.shape == (300, 3)
     assert sphere.surface_gradient(values, kernel="matern").gradient_deviations is None
+
+
+def test_a_batch_answers_what_each_list_alone_does(client: gramian.Client) -> None:
+    random = np.random.default_rng(4)
+    points, queries = random.uniform(-1, 1, size=(60, 2)), random.uniform(-1, 1, size=(7, 2))
+    cloud = client.cloud(points)
+    values = np.stack([np.sin(3 * points[:, 0]), points[:, 1] + 2, 5 * points[:, 0] * points[:, 1]])
+    values += 0.05 * random.normal(size=(3, 60))
+    for fit in [gramian.ValuesFit(mean="linear"), gramian.ValuesFit(kernel=GAUSS, alpha=1e-4), gramian.ValuesFit()]:
+        answer = cloud.interpolate_batch(values, queries, derivatives=2, deviations=True, **fit)
+        assert_shapes(answer, values=(3, 7), gradients=(3, 7, 2), hessians=(3, 7, 2, 2))
+        assert_shapes(answer, value_deviations=(7,), gradient_deviations=(7, 2), hessian_deviations=(7, 2, 2))
+        for i, of_one in enumerate(values):
+            single = cloud.interpolate(of_one, queries, derivatives=2, deviations=True, **answer.fit)
+            assert_row(answer, i, single, "values", "gradients", "hessians")
+            for name in ["value_deviations", "gradient_deviations", "hessian_deviations"]:
+                np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
+            mean = single.diagnostics.mean_coefficients
+            if isinstance(mean, gramian.Unset):
+                assert answer.mean_coefficients is None
+            else:
+                assert_shapes(answer, mean_coefficients=(3, len(mean)))
+                assert answer.mean_coefficients is not None
+                np.testing.assert_allclose(answer.mean_coefficients[i], mean, rtol=1e-9)
+
+
+def test_so_does_a_batch_of_posteriors(client: gramian.Client) -> None:
+    random = np.random.default_rng(5)
+    points, queries = random.uniform(-1, 1, size=(50, 2)), random.uniform(-1, 1, size=(6, 2))
+    cloud = client.cloud(points)
+    values = np.stack([np.sin(3 * points[:, 0]), np.cos(points[:, 1])]) + 0.05 * random.normal(size=(2, 50))
+    answer = cloud.posterior_batch(
+        values, queries, include=list(gramian.PosteriorQuantity), samples=4, quantiles=[0.1, 0.5, 0.9], threshold=0.5
+    )
+    assert_shapes(answer, means=(2, 6), gradients=(2, 6, 2), samples=(2, 4, 6), quantiles=(2, 3, 6))
+    assert_shapes(answer, exceedance_probabilities=(2, 6), log_marginal_likelihoods=(2,), mean_coefficients=(2, 1))
+    assert_shapes(answer, variances=(6,), observation_variances=(6,), covariance=(6, 6), gradient_variances=(6, 2))
+    assert answer.log_marginal_likelihoods is not None
+    for i, of_one in enumerate(values):
+        single = cloud.posterior(
+            of_one,
+            queries,
+            include=list(gramian.PosteriorQuantity),
+            quantiles=[0.1, 0.5, 0.9],
+            threshold=0.5,
+            **answer.fit,
+        )
+        assert_row(answer, i, single, "means", "gradients", "quantiles", "exceedance_probabilities")
+        for name in ["variances", "observation_variances", "covariance", "gradient_variances"]:
+            np.testing.assert_allclose(getattr(answer, name), getattr(single, name), rtol=1e-9, err_msg=name)
+        assert answer.log_marginal_likelihoods[i] == pytest.approx(single.log_marginal_likelihood, rel=1e-9)
+    plain = cloud.posterior_batch(values, queries, kernel=GAUSS)
+    assert [name for name, value in members(plain).items() if value is not None] == ["means", "diagnostics", "fit"]
+
+
+def assert_shapes(answer: object, **shapes: tuple[int, ...]) -> None:
+    assert {name: getattr(answer, name).shape for name in shapes} == shapes
+
+
+def assert_row(answer: object, i: int, single: object, *names: str) -> None:
+    for name in names:
+        np.testing.assert_allclose(getattr(answer, name)[i], getattr(single, name), atol=1e-9, rtol=1e-9, err_msg=name)
+
+
+def test_batches_are_dense(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    methods: list[Callable[..., InterpolationBatch | PosteriorBatch]] = [cloud.interpolate_batch, cloud.posterior_batch]
+    for method in methods:
+        with pytest.raises(gramian.Problem) as caught:
+            method(circle.T, solver="local")
+        assert (caught.value.slug, caught.value.pointer) == ("unsupported-by-solver", "/solver")
+        assert method(circle.T, solver="auto").diagnostics.solver is gramian.SolverUsed.DENSE
+
+
+def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
+    random = np.random.default_rng(6)
+    points = random.uniform(-1, 1, size=(70, 2))
+    values = np.sin(4 * points[:, 0]) + 0.1 * random.normal(size=70)  # whatever the second coordinate is
+    cloud = client.cloud(points)
+    vary: gramian.Bounds = {"length_scales": (0.05, 50), "variance": (0.01, 100), "alpha": (1e-6, 1)}
+    found = cloud.select_model(values, vary=vary, families=["gauss", "matern"], kernel="gauss", alpha=1e-2)
+    assert found.converged
+    assert found.evaluations > 1
+    assert not isinstance(found.kernel.length_scales, gramian.Unset)
+    assert found.kernel.length_scales[0] < 1 < 5 < found.kernel.length_scales[1]
+    assert found.alpha is not None
+    assert np.sqrt(found.alpha) == pytest.approx(0.1, rel=0.3)
+    assert found.mean_coefficients is None
+    assert_shapes(found, gradient=(3,))
+    assert_shapes(found.path, alphas=found.path.scores.shape)
+    assert_shapes(found.leave_one_out, means=(70,), variances=(70,), log_predictive_densities=(70,))
+    assert np.all(np.diff(found.path.alphas) > 0)
+    assert np.nanmax(found.path.scores) <= found.score + 1e-6
+    assert [entry.family for entry in found.families] == [KernelFamily.GAUSS, KernelFamily.MATERN]
+    assert found.score == max(entry.score for entry in found.families if isinstance(entry.score, float))
+    assert found.diagnostics.alpha == 1e-2
+    answer = cloud.posterior(values, include="log_marginal_likelihood", **found.fit)
+    assert answer.log_marginal_likelihood == pytest.approx(found.score, rel=1e-9)
+    errors = (values - found.leave_one_out.means) / np.sqrt(found.leave_one_out.variances)
+    densities = -0.5 * errors**2 - 0.5 * np.log(2 * np.pi * found.leave_one_out.variances)
+    np.testing.assert_allclose(found.leave_one_out.log_predictive_densities, densities, rtol=1e-9)
+    others = client.cloud(points[1:]).posterior(values[1:], points[:1], include="observation_variance", **found.fit)
+    assert others.observation_variances is not None
+    assert others.means[0] == pytest.approx(found.leave_one_out.means[0], abs=1e-6)
+    assert others.observation_variances[0] == pytest.approx(found.leave_one_out.variances[0], rel=1e-6)
+
+
+def test_a_selection_tries_every_smoothness_within_bounds(client: gramian.Client) -> None:
+    random = np.random.default_rng(7)
+    points = random.uniform(-1, 1, size=(40, 2))
+    values = np.abs(points[:, 0]) + 0.05 * random.normal(size=40)
+    cloud = client.cloud(points)
+    for criterion in gramian.SelectionCriterion:
+        found = cloud.select_model(
+            values, vary={"nu": (0.5, 2.5), "length_scale": (0.1, 10)}, kernel="matern", alpha=0.01, criterion=criterion
+        )
+        assert [entry.nu for entry in found.families] == [0.5, 1.5, 2.5]
+        assert np.isnan(found.gradient).tolist() == [True, False]
+        if criterion is gramian.SelectionCriterion.LEAVE_ONE_OUT:
+            assert found.score == pytest.approx(found.leave_one_out.log_predictive_densities.sum(), rel=1e-9)
+    noise = cloud.select_model(values, noise_variances=np.full(40, 0.0025))
+    assert (noise.alpha, noise.path.alphas.shape, noise.path.scores.shape) == (None, (0,), (0,))
+    assert "alpha" not in noise.fit
+
+
+def test_a_selection_is_refused_by_name(client: gramian.Client, circle: Array) -> None:
+    cloud = client.cloud(circle)
+    refusals: dict[str, Callable[[], object]] = {
+        "/vary/0": lambda: cloud.select_model(circle[:, 0], vary={"alpha": (1, 0.1)}),
+        "/vary/1": lambda: cloud.select_model(circle[:, 0], vary={"nu": (0.5, 1.5), "epsilon": (0.1, 1)}),
+        "/restarts": lambda: cloud.select_model(circle[:, 0], restarts=101),
+        "/families/1": lambda: cloud.select_model(circle[:, 0], families=["gauss", "gauss"]),
+        "/duplicates": lambda: cloud.select_model(circle[:, 0], duplicates="merge"),
+        "/vary/0/axis": lambda: cloud.select_model(
+            circle[:, 0], vary=[{"parameter": "alpha", "axis": 0, "min": 0.1, "max": 1}]
+        ),
+        "/solver": lambda: cloud.select_model(circle[:, 0], solver="local"),
+    }
+    for pointer, refused in refusals.items():
+        with pytest.raises(gramian.Problem) as caught:
+            refused()
+        assert caught.value.pointer == pointer
 
 
 def test_an_entry_without_meaning_is_nan(client: gramian.Client, circle: Array) -> None:
@@ -463,3 +648,29 @@ def test_the_generated_client_serves_asyncio(client: gramian.Client, circle: Arr
 
 def test_a_server_without_keys_takes_any(circle: Array) -> None:
     assert gramian.Client(api_key="secret").cloud(circle).n_points == 8
+
+
+@pytest.mark.parametrize("format_", ["safetensors", "json"])
+def test_every_axis_may_have_a_length_scale_of_its_own(format_: Format, circle: Array) -> None:
+    scales = np.array([2.0, 0.5])
+    cloud, scaled = (gramian.Client(format=format_).cloud(points) for points in [circle, circle / scales])
+    queries = np.array([[0.3, -0.2], [1.5, 0.1]])
+    answer = cloud.interpolate(circle[:, 0], queries, derivatives=2, kernel=Kernel("matern", length_scales=scales))
+    single = scaled.interpolate(circle[:, 0], queries / scales, derivatives=2, kernel=Kernel("matern", length_scale=1))
+    np.testing.assert_allclose(answer.values, single.values, rtol=1e-9)
+    assert answer.gradients is not None
+    assert single.gradients is not None
+    np.testing.assert_allclose(answer.gradients * scales, single.gradients, atol=1e-9)
+    used = answer.diagnostics.kernel
+    assert (used.length_scale, used.length_scales) == (gramian.UNSET, [2.0, 0.5])
+    again = cloud.interpolate(circle[:, 0], queries, kernel=used, alpha=answer.diagnostics.alpha)
+    np.testing.assert_array_equal(again.values, answer.values)
+    assert repr(used) == "KernelUsed(family='matern', variance=1.0, length_scales=[2.0, 0.5], nu=2.5)"
+    refused: list[gramian.KernelLike] = [
+        Kernel("gauss", length_scale=1, length_scales=scales),
+        {"family": "gauss", "length_scales": [1, 0]},
+    ]
+    for kernel in refused:
+        with pytest.raises(gramian.Problem) as caught:
+            cloud.normals(kernel=kernel)
+        assert caught.value.pointer == "/kernel/length_scales"

@@ -33,9 +33,11 @@ CHOICES: dict[str, dict[str, Any]] = {
     "noise": {"alpha": 0.02},
     "noise of each": {"alpha": np.linspace(0.01, 0.03, 200)},
     "kernel": {"kernel": gramian.Kernel("gauss", length_scale=0.4), "alpha": 0.01, "mean": "constant"},
+    "length scales": {"kernel": gramian.Kernel("gauss", length_scales=[0.3, 1]), "alpha": 0.01},
     "linear": {"mean": "linear", "duplicates": "merge"},
     "local": {"solver": "local"},
     "local with a kernel": {"solver": "local", "kernel": {"family": "matern", "length_scale": 0.5}, "alpha": 0.01},
+    "local with length scales": {"solver": "local", "kernel": gramian.Kernel("matern", length_scales=[0.3, 1])},
     "local with noise of each": {"solver": "local", "alpha": np.linspace(0.01, 0.03, 200)},
 }
 every_choice = pytest.mark.parametrize("choices", CHOICES.values(), ids=CHOICES.keys())
@@ -91,11 +93,13 @@ def test_shapes_are_those_of_a_gaussian_process_of_sklearn() -> None:
             ours.predict(QUERIES, return_std=True, return_cov=True)
 
 
-def test_numbers_are_those_of_a_gaussian_process_of_sklearn() -> None:
+@pytest.mark.parametrize("scales", [1.0, [1.0, 0.5]], ids=["one", "one for each feature"])
+def test_numbers_are_those_of_a_gaussian_process_of_sklearn(scales: Any) -> None:
     y = np.column_stack([Y, X[:, 0]])
-    ours = KernelRegressor(gramian.Kernel("gauss", length_scale=1), alpha=0.01).fit(X, y)
+    given = {"length_scale": scales} if isinstance(scales, float) else {"length_scales": scales}
+    ours = KernelRegressor(gramian.Kernel("gauss", **given), alpha=0.01).fit(X, y)
     # The service has φ = exp(−r²), sklearn exp(−r²/2).
-    theirs = GaussianProcessRegressor(RBF(np.sqrt(0.5)), alpha=0.01, optimizer=None).fit(X, y)
+    theirs = GaussianProcessRegressor(RBF(np.sqrt(0.5) * np.asarray(scales)), alpha=0.01, optimizer=None).fit(X, y)
     np.testing.assert_allclose(ours.predict(QUERIES), theirs.predict(QUERIES), atol=1e-10)
     for wanted in ["return_std", "return_cov"]:
         found, expected = (model.predict(QUERIES, **{wanted: True})[1] for model in [ours, theirs])

@@ -16,7 +16,7 @@ from typing import Any, Literal, get_args, get_type_hints
 import attrs
 import pytest
 
-from gramian import fit, rest
+from gramian import fit, rest, selection
 from gramian.rest import api, models
 from gramian.rest.types import File, Response, Unset
 
@@ -131,7 +131,18 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
 
 @pytest.mark.parametrize(
     "alias",
-    [fit.Family, fit.Solver, fit.Duplicates, fit.Surface, fit.Orientation, fit.Mean, fit.Quantity, fit.Deviations],
+    [
+        fit.Family,
+        fit.Solver,
+        fit.Duplicates,
+        fit.Surface,
+        fit.Orientation,
+        fit.Mean,
+        fit.Quantity,
+        fit.Deviations,
+        selection.Criterion,
+        selection.Parameter,
+    ],
     ids=str,
 )
 def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:
@@ -139,3 +150,7 @@ def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> N
     assert used in ([], [models.SolverUsed])  # what an answer says of its solver can be sent back
     assert typing.get_origin(strings) is Literal
     assert set(get_args(strings)) == {member.value for member in enumeration}
+
+
+def test_what_may_be_free_is_the_enumeration() -> None:
+    assert set(selection.Bounds.__annotations__) == {member.value for member in models.SelectionParameter}

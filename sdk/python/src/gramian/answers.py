@@ -1,9 +1,9 @@
 """Answers: arrays with the shapes documented here, and what the service says of them.
 
-n is the number of points of the cloud, d their dimension, m the number of queries; L is the unit of the coordinates
-and V that of the values. Arrays keep the order of the request, are read-only views of the answer's bytes (`.copy()`
-them to change them), and have NaN where there is no meaningful number; `degenerate` then says why. Answers can be
-pickled and used by several threads. `repr` shows arrays by their shapes.
+n is the number of points of the cloud, d their dimension, m the number of queries and k that of lists of values; L is
+the unit of the coordinates and V that of the values. Arrays keep the order of the request, are read-only views of the
+answer's bytes (`.copy()` them to change them), and have NaN where there is no meaningful number; `degenerate` then says
+why. Answers can be pickled and used by several threads. `repr` shows arrays by their shapes.
 """
 
 from __future__ import annotations
@@ -12,8 +12,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from .describe import described
-from .fit import Fit, OperatorFit, ValuesFit, fit_used, operator_fit_used, values_fit_used
-from .rest.models import Degenerate, Diagnostics, SurfaceUsed
+from .fit import (
+    Fit,
+    OperatorFit,
+    ValuesFit,
+    batch_fit_used,
+    fit_used,
+    operator_fit_used,
+    selected_fit,
+    values_fit_used,
+)
+from .rest.models import Degenerate, Diagnostics, FamilyScore, KernelUsed, SurfaceUsed
 from .sparse import csr_matrices
 from .tensors import Array, Members
 
@@ -137,6 +146,253 @@ class Posterior(Answer):
             log_marginal_likelihood=members.fields.get("log_marginal_likelihood"),
             diagnostics=diagnostics,
             fit=values_fit_used(diagnostics, members.request),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InterpolationBatch(Answer):
+    """Functions through lists of values (close to them, if `alpha` > 0), at the queries. Deviations are those of each.
+
+    Attributes
+    ----------
+    values
+        `[k, m]`, V. For each list u at each query.
+    gradients
+        `[k, m, d]`, V/L. For each list ∇u, with `derivatives` of 1 or 2.
+    hessians
+        `[k, m, d, d]`, V/L². For each list D²u, with `derivatives` of 2.
+    value_deviations
+        `[m]`, V. Standard deviation of any of the functions given its values, with `deviations`.
+    gradient_deviations
+        `[m, d]`, V/L. Of the components of any ∇u.
+    hessian_deviations
+        `[m, d, d]`, V/L². Of the entries of any D²u.
+    mean_coefficients
+        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
+        if it is zero.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    values: Array
+    gradients: Array | None
+    hessians: Array | None
+    value_deviations: Array | None
+    gradient_deviations: Array | None
+    hessian_deviations: Array | None
+    mean_coefficients: Array | None
+    diagnostics: Diagnostics
+    fit: ValuesFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/interpolation/batch`."""
+        diagnostics = members.diagnostics
+        m, d = diagnostics.n_queries, diagnostics.dimension
+        mean_coefficients = members.optional_arrays("mean_coefficients")
+        return cls(
+            values=members.array("values", m),
+            gradients=members.optional("gradients", m, d),
+            hessians=members.optional("hessians", m, d, d),
+            value_deviations=members.optional("value_deviations"),
+            gradient_deviations=members.optional("gradient_deviations", d),
+            hessian_deviations=members.optional("hessian_deviations", d, d),
+            mean_coefficients=mean_coefficients,
+            diagnostics=diagnostics,
+            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosteriorBatch(Answer):
+    """Gaussian processes given lists of values, at the queries. What was not asked for is None.
+
+    What depends on the values has a row for each list; the rest they share.
+
+    Attributes
+    ----------
+    means
+        `[k, m]`, V.
+    variances
+        `[m]`, V². Of any of the latent functions, no noise added; ≥ 0.
+    observation_variances
+        `[m]`, V². Of a new, noisy observation of any of them.
+    covariance
+        `[m, m]`, V². Of any of the latent functions between queries.
+    gradients
+        `[k, m, d]`, V/L. Of the means.
+    gradient_variances
+        `[m, d]`, V²/L². Of the components of any latent function's gradient.
+    samples
+        `[k, count, m]`, V. Joint draws of each latent function.
+    quantiles
+        `[k, q, m]`, V. Of each latent function.
+    exceedance_probabilities
+        `[k, m]`. That a new, noisy observation exceeds `threshold`.
+    log_marginal_likelihoods
+        `[k]`. −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π of each list.
+    mean_coefficients
+        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
+        if it is zero.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    means: Array
+    variances: Array | None
+    observation_variances: Array | None
+    covariance: Array | None
+    gradients: Array | None
+    gradient_variances: Array | None
+    samples: Array | None
+    quantiles: Array | None
+    exceedance_probabilities: Array | None
+    log_marginal_likelihoods: Array | None
+    mean_coefficients: Array | None
+    diagnostics: Diagnostics
+    fit: ValuesFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/posterior/batch`."""
+        diagnostics = members.diagnostics
+        m, d = diagnostics.n_queries, diagnostics.dimension
+        mean_coefficients = members.optional_arrays("mean_coefficients")
+        return cls(
+            means=members.array("means", m),
+            variances=members.optional("variances"),
+            observation_variances=members.optional("observation_variances"),
+            covariance=members.optional("covariance", m),
+            gradients=members.optional("gradients", m, d),
+            gradient_variances=members.optional("gradient_variances", d),
+            samples=members.optional_arrays("samples", m),
+            quantiles=members.optional_arrays("quantiles", m),
+            exceedance_probabilities=members.optional("exceedance_probabilities", m),
+            log_marginal_likelihoods=members.optional("log_marginal_likelihoods"),
+            mean_coefficients=mean_coefficients,
+            diagnostics=diagnostics,
+            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AlphaPath(Answer):
+    """The criterion over alpha, all else being as it was selected. Without entries if there are `noise_variances`.
+
+    Attributes
+    ----------
+    alphas
+        `[a]`, V², ascending.
+    scores
+        `[a]`. NaN where the matrix is not positive definite.
+    """
+
+    alphas: Array
+    scores: Array
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads it from the answer of `/v1/model-selection`."""
+        return cls(alphas=members.column("path", "alpha"), scores=members.column("path", "score"))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LeaveOneOut(Answer):
+    """What each value is predicted to be from all others, with what was selected.
+
+    Attributes
+    ----------
+    means
+        `[n]`, V. The predictions, in the order of the points.
+    variances
+        `[n]`, V². Of the values predicted, their noise included.
+    log_predictive_densities
+        `[n]`. Logarithms of the densities, 1/V, of the values under their predictions.
+    """
+
+    means: Array
+    variances: Array
+    log_predictive_densities: Array
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads it from the answer of `/v1/model-selection`."""
+        left_out = members.within("leave_one_out")
+        return cls(
+            means=left_out.array("means"),
+            variances=left_out.array("variances"),
+            log_predictive_densities=left_out.array("log_predictive_densities"),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelSelection(Answer):
+    """The kernel and the noise that explain values best.
+
+    Attributes
+    ----------
+    kernel
+        The kernel that was selected.
+    alpha
+        V². The variance of the noise that was selected; None with `noise_variances`.
+    mean_coefficients
+        `[p]`. The mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None if it is zero.
+    score
+        The criterion there; greater is better.
+    gradient
+        A number for each entry of `vary`, in its order: the derivative of the score in the logarithm of what is free;
+        for `length_scales` without an axis in that of a factor of all; NaN for `nu`, which takes steps.
+    converged
+        Whether no slope is left to follow within the bounds.
+    evaluations
+        How often the criterion was evaluated.
+    families
+        The families that were tried, each `nu` of `matern` by itself, with their best scores.
+    path
+        The criterion over alpha: `path.alphas` and `path.scores`.
+    leave_one_out
+        Each value predicted from all others: `means`, `variances` and `log_predictive_densities`.
+    diagnostics
+        Of the fit that the search began with.
+    fit
+        What was selected: `cloud.posterior(values, **answer.fit)` uses it.
+    """
+
+    kernel: KernelUsed
+    alpha: float | None
+    mean_coefficients: Array | None
+    score: float
+    gradient: Array
+    converged: bool
+    evaluations: int
+    families: tuple[FamilyScore, ...]
+    path: AlphaPath
+    leave_one_out: LeaveOneOut
+    diagnostics: Diagnostics
+    fit: ValuesFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/model-selection`."""
+        fields, diagnostics = members.fields, members.diagnostics
+        kernel, alpha = KernelUsed.from_dict(fields["kernel"]), fields.get("alpha")
+        return cls(
+            kernel=kernel,
+            alpha=alpha,
+            mean_coefficients=members.optional("mean_coefficients"),
+            score=fields["score"],
+            gradient=members.array("gradient"),
+            converged=fields["converged"],
+            evaluations=fields["evaluations"],
+            families=tuple(FamilyScore.from_dict(entry) for entry in fields["families"]),
+            path=AlphaPath.read(members),
+            leave_one_out=LeaveOneOut.read(members),
+            diagnostics=diagnostics,
+            fit=selected_fit(values_fit_used(diagnostics, members.request), kernel, alpha),
         )
 
 

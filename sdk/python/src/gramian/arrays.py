@@ -18,7 +18,17 @@ Sizes: TypeAlias = Mapping[str, int]
 
 AnyArray: TypeAlias = npt.NDArray[Any]
 
-ROWS = {"points": "points", "queries": "points", "normals": "normals"}
+NUMBERS = {
+    "n": "one number for each point of the cloud",
+    "d": "one number for each axis",
+    "bounds": "the least and the greatest",
+}
+"""What the numbers of an array with one axis are."""
+
+ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
+"""What takes one number where these take many."""
+
+ROWS = {"points": "points", "queries": "points", "normals": "normals", "values": "lists of values"}
 """What the rows of an array with two axes are."""
 
 KINDS = {"c": "complex numbers", "b": "truth values", "S": "bytes", "U": "text", "M": "dates", "m": "durations"}
@@ -131,26 +141,31 @@ def _check_shape(name: str, array: AnyArray, axes: Sequence[str], sizes: Sizes) 
         return
     known = [str(axis if length is None else length) for axis, length in zip(axes, wanted, strict=True)]
     shape = f"[{', '.join(axes)}]" + (f" = [{', '.join(known)}]" if known != list(axes) else "")
-    raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}{_advice(name, array, wanted)}")
+    raise ValueError(f"{name} must have the shape {shape}, not {list(array.shape)}{_advice(name, array, axes, wanted)}")
 
 
-def _advice(name: str, array: AnyArray, wanted: Sequence[int | None]) -> str:
+def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[int | None]) -> str:
     """Says what may have been meant."""
     if array.size == 0:
         return ": it is empty"
+    field = name.rpartition(".")[2]
     if len(wanted) == 1:
         if array.ndim < 2:
-            one_for_all = "; one for all of them is alpha" if array.ndim == 0 and "noise" in name else ""
-            return f": one number for each point of the cloud{one_for_all}"
+            one = ONE_FOR_ALL.get(field) if array.ndim == 0 else None
+            one_for_all = f"; one for all of them is {one}" if one else ""
+            return f": {NUMBERS[axes[0]]}{one_for_all}" if axes[0] in NUMBERS else ""
         return f"; np.ravel({name}) is flat" if max(array.shape) == array.size else ""
-    rows = ROWS.get(name.rpartition(".")[2], "points")
+    rows = ROWS.get(field, "points")
     if array.ndim == 1:
-        one = f"np.reshape({name}, (1, -1)) is one of {len(array)} coordinates"
+        one = f"np.reshape({name}, (1, -1)) is one of {len(array)}"
+        if axes[1] != "d":
+            return f": rows are {rows}; {one}"
+        one += " coordinates"
         line = f"np.reshape({name}, (-1, 1)) are {len(array)} on a line"
         likely = {1: line, len(array): one}.get(wanted[1] or 0, f"{line}, {one}")
         return f": rows are {rows}; {likely}"
-    length, d = wanted
-    transposed = array.ndim == 2 and d in (None, array.shape[0]) and length in (None, array.shape[1])
+    length, width = wanted
+    transposed = array.ndim == 2 and width in (None, array.shape[0]) and length in (None, array.shape[1])
     return f": rows are {rows}" + (f"; it looks transposed, send {name}.T" if transposed else "")
 
 

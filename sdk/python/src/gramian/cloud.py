@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from .batches import BatchesOnCloud
 from .operators import OperatorsOnCloud
+from .selection import SelectionOnCloud
 from .surface import SurfaceOfCloud
 from .values import ValuesOfCloud
 
 
-class Cloud(ValuesOfCloud, SurfaceOfCloud, OperatorsOnCloud):
+class Cloud(ValuesOfCloud, BatchesOnCloud, SelectionOnCloud, SurfaceOfCloud, OperatorsOnCloud):
     """Points that the service keeps under an id, and what can be asked about them.
 
     The id is a hash of the points (and normals, if given), so it is the same whenever and wherever they are posted. The

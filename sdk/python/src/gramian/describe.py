@@ -33,6 +33,8 @@ def in_words(value: object) -> str:
         return f"{type(value).__name__}{list(cast(Any, value).shape)}"
     if isinstance(value, Enum):
         return repr(value.value)
+    if isinstance(value, tuple) and all(isinstance(entry, float) for entry in value):
+        return repr(value)  # length scales, which are few
     if isinstance(value, tuple | list):
         shown = [in_words(entry) for entry in value[:MAX_SHOWN]]
         left_out = [f"… {len(value)} entries"] if len(value) > MAX_SHOWN else []

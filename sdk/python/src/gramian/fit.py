@@ -28,6 +28,7 @@ from .rest.models import (
     SurfaceChoice,
 )
 from .rest.types import Unset
+from .tensors import Array
 
 if TYPE_CHECKING:
     from .registration import RegisteredCloud
@@ -62,7 +63,7 @@ Quantity: TypeAlias = (
 @suggest_names
 @dataclass(frozen=True, init=False, repr=False)
 class Kernel:
-    """A radial kernel `k(x, y) = variance · φ(|x − y|²/length_scale²)`.
+    """A kernel `k(x, y) = variance · φ(r²)`, `r = |x − y|/length_scale` or `r² = Σ (x_c − y_c)²/length_scales_c²`.
 
     What is None is chosen by the service. `Client.kernels()` lists the families with their formulas.
 
@@ -72,6 +73,8 @@ class Kernel:
         What determines φ.
     length_scale
         ℓ, unit of the coordinates; chosen from the cloud if absent.
+    length_scales
+        `[d]`, instead: a length scale for each axis, in the units of the coordinates.
     variance
         The factor of φ, unit of the values squared; 1 if absent.
     epsilon
@@ -85,10 +88,13 @@ class Kernel:
     --------
     >>> gramian.Kernel("gauss", length_scale=np.float32(2))
     Kernel(family='gauss', length_scale=2.0)
+    >>> gramian.Kernel("matern", length_scales=np.array([1, 0.5]))
+    Kernel(family='matern', length_scales=(1.0, 0.5))
     """
 
     family: KernelFamily
     length_scale: float | None
+    length_scales: tuple[float, ...] | None
     variance: float | None
     epsilon: float | None
     nu: float | None
@@ -99,17 +105,19 @@ class Kernel:
         family: Family,
         *,
         length_scale: Number | None = None,
+        length_scales: npt.ArrayLike | Unset | None = None,
         variance: Number | None = None,
         epsilon: Number | None = None,
         nu: Number | None = None,
         smoothness: Whole | Unset | None = None,
     ) -> None:
         """Takes the parameters, of which the family allows some; see the attributes."""
-        numbers = {"length_scale": length_scale, "variance": variance, "epsilon": epsilon, "nu": nu}
-        given: dict[str, Any] = normalise(
-            {"family": family, **numbers, "smoothness": smoothness}, KERNEL, path="kernel."
-        )
+        scales = {"length_scale": length_scale, "length_scales": length_scales}
+        numbers = {"variance": variance, "epsilon": epsilon, "nu": nu, "smoothness": smoothness}
+        given: dict[str, Any] = normalise({"family": family, **scales, **numbers}, KERNEL, path="kernel.")
         given["family"] = KernelFamily(given["family"])
+        if "length_scales" in given:
+            given["length_scales"] = tuple(given["length_scales"].tolist())
         for name in KERNEL:
             object.__setattr__(self, name, given.get(name))
 
@@ -122,6 +130,7 @@ class KernelFields(TypedDict, total=False):
 
     family: Required[Family]
     length_scale: Number | None
+    length_scales: npt.ArrayLike | None
     variance: Number | None
     epsilon: Number | None
     nu: Number | None
@@ -243,10 +252,30 @@ def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
 
 def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
     """Returns that of values, with the mean if there is one; their local solver takes a kernel as the other does."""
-    fit, mean = cast("ValuesFit", _numbers_used(diagnostics, request)), diagnostics.mean_coefficients
-    if not isinstance(mean, Unset):
-        fit["mean"] = MeanChoice.CONSTANT if len(mean) == 1 else MeanChoice.LINEAR
+    mean = diagnostics.mean_coefficients
+    return _with_mean(_numbers_used(diagnostics, request), 0 if isinstance(mean, Unset) else len(mean))
+
+
+def batch_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any], mean_coefficients: Array | None) -> ValuesFit:
+    """Returns that of many lists of values, whose means have a row each."""
+    fit = _numbers_used(diagnostics, request)
+    return _with_mean(fit, 0 if mean_coefficients is None else mean_coefficients.shape[-1])
+
+
+def selected_fit(start: ValuesFit, kernel: KernelUsed, alpha: float | None) -> ValuesFit:
+    """Returns the fit that a search ended with, from that which it began with."""
+    fit = start.copy()
+    fit["kernel"] = kernel
+    if alpha is not None:
+        fit["alpha"] = alpha
     return fit
+
+
+def _with_mean(fit: Fit, n_coefficients: int) -> ValuesFit:
+    values_fit = cast("ValuesFit", fit)
+    if n_coefficients:
+        values_fit["mean"] = MeanChoice.CONSTANT if n_coefficients == 1 else MeanChoice.LINEAR
+    return values_fit
 
 
 def _numbers_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:

@@ -10,6 +10,7 @@
 | a truth | `bool`, of Python or NumPy |
 | a kernel | a family, a mapping, `Kernel`, or as an answer or `Client.kernels()` says it: `diagnostics.kernel` |
 | a geometry | `Geometry`, a mapping, another `Cloud`, or as an answer says it: `diagnostics.geometry` |
+| what is free | a mapping from parameters to their bounds, or a list of mappings with `parameter`, `min` and `max` |
 
 Numbers are sent as float64 and as they are: complex numbers, truth values, text, masked entries, NaN and infinity are
 refused by name and place, and so are integers that float64 does not have. What is a question of the mathematics, such
@@ -20,19 +21,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeAlias
 
 from .arrays import Sizes, as_array
 from .rest.models import (
     Diagnostics,
     DuplicatePolicy,
+    FreeParameter,
     GeometryInclude,
     KernelDescription,
     KernelFamily,
     MeanChoice,
     OrientationChoice,
     PosteriorQuantity,
+    SelectionCriterion,
+    SelectionParameter,
     SolverChoice,
     SolverUsed,
     SurfaceChoice,
@@ -55,7 +59,7 @@ def normalise(
     fields
         What was given, by name.
     rules
-        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
     sizes
         The lengths of the axes of arrays, by name, as far as they are known: n points, d coordinates.
     path
@@ -149,6 +153,33 @@ def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     return {**normalise({"family": None, **value}, KERNEL, sizes, f"{name}."), **later}
 
 
+def bounds(name: str, value: object, sizes: Sizes) -> dict[str, float]:  # noqa: ARG001
+    """The rule for the least and the greatest."""
+    least, greatest = as_array(name, value, ["bounds"], {"bounds": 2}).tolist()
+    return {"min": least, "max": greatest}
+
+
+def vary(name: str, value: object, sizes: Sizes) -> list[dict[str, object]]:
+    """The rule for what is free: bounds by name, or a list of parameters."""
+    if isinstance(value, Mapping):
+        free: Mapping[str, Any] = normalise(value, BOUNDS, sizes, f"{name}.")
+        return [{"parameter": str(parameter), **limits} for parameter, limits in free.items()]
+    if not isinstance(value, Iterable) or isinstance(value, str):
+        kind = type(value).__name__
+        raise TypeError(f"{name} is to be a mapping such as {{'alpha': (1e-6, 1)}}, or a list, not of the type {kind}")
+    return [free_parameter(f"{name}[{i}]", entry, sizes) for i, entry in enumerate(value)]
+
+
+def free_parameter(name: str, value: object, sizes: Sizes) -> dict[str, object]:
+    """The rule for an entry of such a list."""
+    if isinstance(value, FreeParameter):
+        value = {"parameter": value.parameter, "axis": value.axis, "min": value.min_, "max": value.max_}
+    if not isinstance(value, Mapping):
+        kind, example = type(value).__name__, {"parameter": "alpha", "min": 1e-6, "max": 1}
+        raise TypeError(f"{name} is to be a mapping such as {example}, not of the type {kind}")
+    return normalise({"parameter": None, "min": None, "max": None, **value}, FREE_PARAMETER, sizes, f"{name}.")
+
+
 def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
     """The rule for the surface of an operator."""
     if isinstance(value, Diagnostics):
@@ -189,12 +220,13 @@ def duration(name: str, value: object, sizes: Sizes) -> float:
     return seconds
 
 
-REQUIRED = frozenset({"points", "values", "family"})
+REQUIRED = frozenset({"points", "values", "family", "parameter", "min", "max"})
 """The fields that cannot be absent."""
 
 KERNEL: Mapping[str, Rule] = {
     "family": word(*KernelFamily),
     "length_scale": number,
+    "length_scales": array("d"),
     "variance": number,
     "epsilon": number,
     "nu": number,
@@ -210,6 +242,15 @@ FIT: Mapping[str, Rule] = {
 }
 
 GEOMETRY: Mapping[str, Rule] = {**FIT, "cloud": cloud, "surface": word(*SurfaceChoice)}
+
+BOUNDS: Mapping[str, Rule] = {parameter.value: bounds for parameter in SelectionParameter}
+
+FREE_PARAMETER: Mapping[str, Rule] = {
+    "parameter": word(*SelectionParameter),
+    "axis": whole,
+    "min": number,
+    "max": number,
+}
 
 REQUEST: Mapping[str, Rule] = {
     **FIT,
@@ -227,10 +268,21 @@ REQUEST: Mapping[str, Rule] = {
     "surface": word(*SurfaceChoice),
     "orientation": word(*OrientationChoice),
     "geometry": geometry,
+    "criterion": word(*SelectionCriterion),
+    "vary": vary,
+    "families": words(*KernelFamily),
+    "restarts": whole,
+    "seed": whole,
 }
 
 GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
 """Those of normals and curvatures, and of values and operators that may have deviations."""
+
+BATCH: Mapping[str, Rule] = {**REQUEST, "values": array("k", "n")}
+"""Those of many lists of values."""
+
+GEOMETRIC_BATCH: Mapping[str, Rule] = {**GEOMETRIC, "values": array("k", "n")}
+"""Those of many lists of values that may have deviations."""
 
 CLIENT: Mapping[str, Rule] = {
     "timeout": duration,

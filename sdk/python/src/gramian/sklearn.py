@@ -32,14 +32,15 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     """Gaussian-process regression by the service, which learns kernel, noise and mean from the values.
 
     Predictions have the shapes and the meaning of scikit-learn's `GaussianProcessRegressor`. Each column of a `y` of
-    the shape `[n, k]` is fitted by itself. Kernels depend on distances in X: scale features of different units.
+    the shape `[n, k]` is fitted by itself. Kernels depend on distances in X: scale features of different units, or
+    give a kernel with a length scale for each.
 
     Parameters
     ----------
     kernel : str, dict or Kernel, optional
-        A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or
-        `kernel_` of another regressor. If absent, learned from the values by their likelihood; with one that is given
-        nothing is learned.
+        A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)`, with `length_scales` one for
+        each feature, or as a dictionary), or `kernel_` of another regressor. If absent, learned from the values by
+        their likelihood; with one that is given nothing is learned.
     alpha : float or array_like, `[n]`, optional
         The variance of the noise, of all samples or of each, in the unit of `y` squared. If absent, learned where the
         kernel is, else 1e-10.

@@ -118,6 +118,14 @@ class Members:
             return self.tensors[name]
         return _frozen(np.stack([_filled(rows, entry) for rows in self.fields[name]]))
 
+    def column(self, name: str, member: str) -> Array:
+        """Returns a member of each object in a list, NaN where it is null."""
+        return _frozen(_filled([entry.get(member) for entry in self.fields[name]], ()))
+
+    def within(self, name: str) -> Members:
+        """Returns the members of an object in the answer, which is JSON in every format."""
+        return Members({}, self.fields[name], self.request)
+
     def integers(self, name: str) -> Integers:
         """Returns a list of whole numbers."""
         if name in self.tensors:
@@ -127,6 +135,10 @@ class Members:
     def optional(self, name: str, *entry: int) -> Array | None:
         """Returns an array, or None if the answer has no such member."""
         return self.array(name, *entry) if name in self.tensors or name in self.fields else None
+
+    def optional_arrays(self, name: str, *entry: int) -> Array | None:
+        """Returns a stack of arrays, or None if the answer has no such member."""
+        return self.arrays(name, *entry) if name in self.tensors or name in self.fields else None
 
 
 def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
