@@ -1,6 +1,7 @@
 //! What the benchmarks share: rounds and clouds.
 
 #![allow(dead_code, reason = "each benchmark takes what it needs")]
+#![allow(clippy::disallowed_methods, reason = "nothing waits for a stopwatch")]
 
 #[path = "../../tests/common/mod.rs"]
 pub mod common;

@@ -34,7 +34,7 @@ impl Walk {
         let mut methods = Vec::new();
         let mut scatter = [0.0f64; 3];
         for alpha in alphas() {
-            let factor = factorize(&self.points, self.kernel, alpha);
+            let factor = factorize(&self.points, self.kernel.clone(), alpha);
             let u = fit(&factor, &self.values);
             let weights = u.solution.weights.iter().map(|w| w * w).sum::<f64>().sqrt();
             let misfit = alpha * weights / largest(&self.values);

@@ -66,7 +66,7 @@ impl<'a> Case<'a> {
         let points = Cloud::new(numbers(&expected["points"]), dimension).unwrap();
         let queries = Cloud::new(numbers(&expected["queries"]), dimension).unwrap();
         let alpha = expected["alpha"].as_str().unwrap().parse().unwrap();
-        let factor = factorize(&points, kernel, alpha);
+        let factor = factorize(&points, kernel.clone(), alpha);
         assert_eq!(factor.method(), Method::Cholesky, "{}", reached.case);
         let values = numbers(&expected["values"]);
         Self { expected, reached, kernel, alpha, points, values, queries, factor, failures: Vec::new() }
@@ -169,7 +169,7 @@ impl<'a> Case<'a> {
             let query = Cloud::new(coordinates.drain(left_out * d..(left_out + 1) * d).collect(), d).unwrap();
             let mut values = self.values.clone();
             values.remove(left_out);
-            let factor = factorize(&Cloud::new(coordinates, d).unwrap(), self.kernel, self.alpha);
+            let factor = factorize(&Cloud::new(coordinates, d).unwrap(), self.kernel.clone(), self.alpha);
             let u = fit(&factor, &values);
             means.extend(u.at(&query, JetOrder::Value, &Unobserved).unwrap().values());
             found.extend(variances(&factor, &query, &Unobserved).unwrap().latent);

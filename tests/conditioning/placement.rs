@@ -59,8 +59,8 @@ fn a_cloud_at_a_million_is_answered_as_at_the_origin() {
     assert_ne!(near[0], points);
     for (family, length_scale, alpha) in cases() {
         let kernel = kernel(family, length_scale);
-        let found = answers(&far[0], &far[1], kernel, alpha, &values);
-        let expected = answers(&near[0], &near[1], kernel, alpha, &values);
+        let found = answers(&far[0], &far[1], kernel.clone(), alpha, &values);
+        let expected = answers(&near[0], &near[1], kernel.clone(), alpha, &values);
         for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
             assert_eq!(found, expected, "{family:?}, α = {alpha}, answer {index}");
         }

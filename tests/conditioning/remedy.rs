@@ -11,7 +11,7 @@ use crate::support::*;
 
 /// The least α that the refusal of variances names, and the check that it suffices.
 fn check_remedy(points: &Cloud, kernel: Kernel, what: &str) {
-    let factor = factorize(points, kernel, 0.0);
+    let factor = factorize(points, kernel.clone(), 0.0);
     assert_eq!(factor.method(), Method::PivotedCholesky, "{what}");
     let refusal = variances(&factor, points, &Unobserved).unwrap_err();
     let NumericsError::NotPositiveDefinite { reason: NotDefinite::NeedsCholesky { point }, minimum_alpha } =
@@ -23,7 +23,7 @@ fn check_remedy(points: &Cloud, kernel: Kernel, what: &str) {
     // 4 n ε ‖K‖₁, which is at most 4 n² ε k₀.
     let n = points.n_points() as f64;
     assert!(minimum_alpha > 0.0 && minimum_alpha <= 4.01 * n * n * EPS * kernel.at_zero(), "{what}");
-    let remedied = factorize(points, kernel, minimum_alpha);
+    let remedied = factorize(points, kernel.clone(), minimum_alpha);
     assert_eq!(remedied.method(), Method::Cholesky, "{what}");
     let latent = variances(&remedied, points, &Unobserved).unwrap().latent;
     // At a point known to within α the variance is at most α, beside the rounding of k₀.

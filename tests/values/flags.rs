@@ -12,13 +12,13 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::noise::estimate_noise;
 use gramian::numerics::points::sampling::Sampling as Spacings;
-use gramian::numerics::selection::{Noise, Observed, learn};
+use gramian::numerics::selection::{Learned, Noise, Observed, learn};
 use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::surface::operators::{Doubts, Judged, laplace_beltrami, surface_gradient};
+use gramian::numerics::surface::operators::{Judged, laplace_beltrami, surface_gradient};
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -101,13 +101,23 @@ impl Request {
         let at = Cloud::new(queries.concat(), 3).unwrap();
         let spacings = Spacings::of(&cloud, &Unobserved)?;
 
-        let (interpolant, factor) = self.function(&cloud, &spacings, &values)?;
+        let (noise, mean) = (Noise::Unknown, Mean::Constant);
+        let observed = Observed { cloud: &cloud, sampling: &spacings, values: &values, noise, mean };
+        let learned = learn(observed, &Unobserved)?;
+        let (interpolant, factor) = self.function(&cloud, &spacings, &values, &learned)?;
+        let learned = Some(&learned).filter(|_| self.asked != Asked::Nothing);
         let surface = self.surface(&cloud, &spacings)?;
         let geometry = Geometry::of(&surface, &at, &GeometryRequest::CURVATURES, &Unobserved)?;
         let truth: Vec<(Jet, Truth)> =
             queries.iter().map(|&x| (self.field.at(x), self.shape.truth(x))).collect();
-        let judged =
-            |found| Judged { geometry: &geometry, interpolant: &interpolant, factor, queries: &at, found };
+        let judged = |found| Judged {
+            geometry: &geometry,
+            interpolant: &interpolant,
+            factor,
+            queries: &at,
+            found,
+            learned,
+        };
         let mut counts = Counts::default();
 
         let found = surface_gradient(&geometry, &interpolant, &at, &Unobserved)?;
@@ -127,15 +137,13 @@ impl Request {
         cloud: &Arc<Cloud>,
         spacings: &Spacings,
         values: &[f64],
+        learned: &Learned,
     ) -> Result<(Interpolant, f64), NumericsError> {
         let (family, length_scale) = match self.asked {
             Asked::Nothing => {
-                let (noise, mean) = (Noise::Unknown, Mean::Constant);
-                let learned =
-                    learn(Observed { cloud, sampling: spacings, values, noise, mean }, &Unobserved)?;
                 let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
                 let solver = solver(cloud, kernel, learned.ratio)?;
-                let interpolant = Interpolant::fit_with_mean(solver, values, mean, &Unobserved)?;
+                let interpolant = Interpolant::fit_with_mean(solver, values, Mean::Constant, &Unobserved)?;
                 return Ok((interpolant, learned.variance));
             }
             Asked::Family(family) => (family, family.length_scale_of_values(spacings.scales())),
@@ -175,16 +183,13 @@ impl Counts {
         operator: usize,
         (found, exact): (&[f64], &[f64]),
         geometry: &Geometry,
-        doubts: &Doubts,
+        doubts: &[usize],
     ) {
         let m = geometry.n_queries();
         let k = found.len() / m;
         let mut is_flagged = geometry.is_null().to_vec();
         geometry.degenerate().iter().for_each(|entry| is_flagged[entry.query] = true);
-        match doubts {
-            Doubts::TooRough => is_flagged.fill(true),
-            Doubts::Uncertain(queries) => queries.iter().for_each(|&query| is_flagged[query] = true),
-        }
+        doubts.iter().for_each(|&query| is_flagged[query] = true);
         let mean_square = exact.iter().map(|t| t * t).sum::<f64>() / m as f64;
         for query in 0..m {
             let both = found[query * k..][..k].iter().zip(&exact[query * k..][..k]);

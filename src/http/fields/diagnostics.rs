@@ -156,7 +156,8 @@ pub enum DegenerateReason {
     VanishingGradient,
     /// The points around the query do not confirm its curvatures; the number is served.
     UnderResolved,
-    /// The deviation of what is served is more than a quarter of its root mean square over the queries; the number is served.
+    /// What is served of values is off by more than a fifth of its root mean square over the queries, as far as the values say, or the kernel has no
+    /// such derivatives; the number is served.
     Uncertain,
     /// The kernel's cusp at the points shows in the curvatures, which may be off by factors; the number is served.
     KernelTooRough,

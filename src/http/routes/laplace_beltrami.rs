@@ -196,15 +196,27 @@ impl Operation for LaplaceBeltramiRequest {
         let mut degenerate = surface.degenerate();
         let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let judged = Judged { geometry, interpolant: &interpolant, factor, queries, found: &values };
-        let (doubts, of_values) = if work.request.has_deviations {
+        let learned = fits.learned_beside(&work.values, observer)?;
+        let judged = Judged {
+            geometry,
+            interpolant: &interpolant,
+            factor,
+            queries,
+            found: &values,
+            learned: learned.as_ref(),
+        };
+        let mut of_values = None;
+        if work.request.has_deviations {
             let found = laplace_beltrami_deviations(geometry, &interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            (judged.by_deviations(&found), Some(surface.known_per_query(found, &[m])))
-        } else {
-            (judged.laplace_beltrami(observer).map_err(refused)?, None)
-        };
-        surface.flag_doubts(doubts, &mut degenerate);
+            surface.flag_uncertain(&judged.by_deviations(&found), &mut degenerate);
+            of_values = Some(surface.known_per_query(found, &[m]));
+        }
+        // Deviations of a kernel that was learned say all of it.
+        if learned.is_some() || !work.request.has_deviations {
+            let uncertain = judged.laplace_beltrami(observer).map_err(refused)?;
+            surface.flag_uncertain(&uncertain, &mut degenerate);
+        }
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
             value_deviations: of_values,

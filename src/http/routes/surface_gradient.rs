@@ -184,15 +184,27 @@ impl Operation for SurfaceGradientRequest {
         let mut degenerate = surface.degenerate();
         let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let judged = Judged { geometry, interpolant: &interpolant, factor, queries, found: &gradients };
-        let (doubts, of_gradients) = if work.request.has_deviations {
+        let learned = fits.learned_beside(&work.values, observer)?;
+        let judged = Judged {
+            geometry,
+            interpolant: &interpolant,
+            factor,
+            queries,
+            found: &gradients,
+            learned: learned.as_ref(),
+        };
+        let mut of_gradients = None;
+        if work.request.has_deviations {
             let found = surface_gradient_deviations(geometry, &interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            (judged.by_deviations(&found), Some(surface.known_per_query(found, &[m, d])))
-        } else {
-            (judged.surface_gradient(observer).map_err(refused)?, None)
-        };
-        surface.flag_doubts(doubts, &mut degenerate);
+            surface.flag_uncertain(&judged.by_deviations(&found), &mut degenerate);
+            of_gradients = Some(surface.known_per_query(found, &[m, d]));
+        }
+        // Deviations of a kernel that was learned say all of it.
+        if learned.is_some() || !work.request.has_deviations {
+            let uncertain = judged.surface_gradient(observer).map_err(refused)?;
+            surface.flag_uncertain(&uncertain, &mut degenerate);
+        }
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
             gradient_deviations: of_gradients,

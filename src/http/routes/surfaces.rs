@@ -19,8 +19,9 @@ use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
+use crate::numerics::selection::learning_flops;
 use crate::numerics::solver::choose::{
-    Asked, MAX_OFFSETS, Offsets, deviations_price, n_entries_per_row, work_price,
+    Asked, MAX_OFFSETS, Offsets, deviations_price, judging_price, n_entries_per_row, work_price,
 };
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
@@ -153,8 +154,10 @@ pub fn plan_applied(
     if has_deviations {
         work = work.and(deviations_price(n_values, of_operator));
         n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
-    } else if surface.is_some() {
-        work = work.and(deviations_price(n_values, of_operator.min(JUDGED_FUNCTIONALS)));
+    }
+    if surface.is_some() {
+        work = work.and(judging_price(n_values, of_operator.min(JUDGED_FUNCTIONALS)));
+        work.flops += learning_flops(n_values);
     }
     let cost = Cost {
         work,

@@ -18,6 +18,8 @@ use crate::numerics::function::moving::MovingAnswer;
 use crate::numerics::kernel::Family;
 use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::sampling::Sampling;
+use crate::numerics::selection::{Learned, Noise, Observed, learn};
 use crate::numerics::solver::choose::AutoLocal;
 use crate::numerics::solver::trend::{Mean, Trend};
 use crate::numerics::solver::{Method, Solution, Solver};
@@ -26,7 +28,6 @@ use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use crate::numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
 use crate::numerics::surface::local::LocalSurface;
-use crate::numerics::surface::operators::Doubts;
 use crate::numerics::surface::served::ServedBy;
 use crate::numerics::surface::signature::SignatureSurface;
 use crate::store::key::ValuesKey;
@@ -57,6 +58,30 @@ impl Fits {
     /// Those of [`Solution::of`] as a [`Problem`].
     pub fn interpolant(&self, values: &[f64], observer: &JobObserver) -> Result<Interpolant, Problem> {
         self.main.interpolant(&self.app, values, self.main.plan.mean, observer)
+    }
+
+    /// What is learned from the values, where the kernel is given and they were not asked.
+    ///
+    /// # Errors
+    /// Those of [`learn`] as a [`Problem`].
+    pub fn learned_beside(&self, values: &[f64], observer: &JobObserver) -> Result<Option<Learned>, Problem> {
+        let FitPlan { stored, fitted, merge, is_learned, mean, .. } = &self.main.plan;
+        if *is_learned {
+            return Ok(None);
+        }
+        let refused = |error| self.main.refused(error);
+        let sampling = match stored.sampling().filter(|_| merge.is_none()) {
+            Some(sampling) => sampling.clone(),
+            None => Arc::new(Sampling::of(fitted, observer).map_err(refused)?),
+        };
+        let observed = Observed {
+            cloud: fitted,
+            sampling: &sampling,
+            values: &self.main.merged(values),
+            noise: Noise::Unknown,
+            mean: if *mean == Mean::Linear { Mean::Linear } else { Mean::Constant },
+        };
+        learn(observed, observer).map(Some).map_err(refused)
     }
 
     /// The function through the constant 1, without a mean: what the quality of a fit without values is judged by.
@@ -329,17 +354,14 @@ impl SurfaceGeometry {
     }
 
     /// Flags queries, unless they are flagged already, where what was found of values is doubtful.
-    pub fn flag_doubts(&self, doubts: Doubts, degenerate: &mut Vec<Degenerate>) {
-        let (m, is_null) = (self.geometry.n_queries(), self.geometry.is_null());
-        let mut is_flagged = is_null.to_vec();
+    pub fn flag_uncertain(&self, queries: &[usize], degenerate: &mut Vec<Degenerate>) {
+        let mut is_flagged = vec![false; self.geometry.n_queries()];
         degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
-        let (reason, queries) = match doubts {
-            Doubts::TooRough => (DegenerateReason::KernelTooRough, (0..m).collect()),
-            Doubts::Uncertain(queries) => (DegenerateReason::Uncertain, queries),
-        };
-        for query in queries.into_iter().filter(|&query| !is_flagged[query]) {
-            let gradient_norm = self.geometry.gradient_norms()[query];
-            degenerate.push(Degenerate { query, reason, gradient_norm });
+        for &query in queries {
+            if !std::mem::replace(&mut is_flagged[query], true) {
+                let gradient_norm = self.geometry.gradient_norms()[query];
+                degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
+            }
         }
         degenerate.sort_by_key(|entry| entry.query);
     }

@@ -17,6 +17,7 @@ use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::trend::{Basis, Trend};
 use crate::numerics::solver::{Solution, Solver};
 use crate::numerics::sums::jets::check_smooth_at;
 use crate::numerics::sums::nodes::Nodes;
@@ -66,6 +67,21 @@ impl JetFunctional {
         Cow::Owned(found)
     }
 
+    /// Of a mean.
+    pub(super) fn of_mean(&self, trend: &Trend, queries: &Cloud) -> f64 {
+        let value = if self.of_value == 0.0 { 0.0 } else { trend.at(queries.point(self.query)) };
+        self.of_value * value + dot(&self.of_gradient, &trend.gradient())
+    }
+
+    /// Of each function of a mean, at the query's place: they are linear.
+    pub(super) fn on_mean(&self, basis: &Basis, x: &[f64]) -> Vec<f64> {
+        let mut functions = vec![0.0; basis.n_functions()];
+        basis.at(x, &mut functions);
+        functions.iter_mut().for_each(|f| *f *= self.of_value);
+        basis.add_slopes(&self.of_gradient, &mut functions);
+        functions
+    }
+
     fn has_hessian(&self) -> bool {
         !self.of_hessian.is_empty()
     }
@@ -75,8 +91,12 @@ impl JetFunctional {
     }
 
     /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
-    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`. Of a functional that is stretched as the kernel is.
-    fn prior_variance(&self, kernel: &Kernel) -> f64 {
+    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
+    pub(crate) fn prior_variance(&self, kernel: &Kernel) -> f64 {
+        self.stretched(kernel).prior_variance_of_stretched(kernel)
+    }
+
+    fn prior_variance_of_stretched(&self, kernel: &Kernel) -> f64 {
         let [value, slope, bend] = kernel.profile_at_zero();
         let (v, inverse_square) = (kernel.variance(), kernel.inverse_square_length());
         let first = 2.0 * slope * inverse_square;
@@ -116,7 +136,7 @@ pub(crate) fn deviations(
     let (n, kernel) = (solver.n_points(), solver.kernel());
     solver.cloud().check_same_dimension(queries)?;
     check_smooth_at(solver.cloud(), kernel, queries)?;
-    let nodes = Nodes::of(solver.cloud());
+    let covariances = Covariant::of(solver.cloud(), kernel);
     let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
     let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];
     let mut found = Vec::with_capacity(functionals.len());
@@ -124,10 +144,7 @@ pub(crate) fn deviations(
         observer.checkpoint()?;
         observer.enter(Stage::Evaluate);
         let columns = &mut buffer[..n * block.len()];
-        columns.par_chunks_exact_mut(n).zip(block).for_each(|(column, functional)| {
-            let (x, functional) = (queries.point(functional.query), &*functional.stretched(kernel));
-            nodes.dispatch(Covariances { nodes: &nodes, kernel, functional, x, column });
-        });
+        covariances.fill(block, queries, columns);
         observer.enter(Stage::Solve);
         solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()))?;
         let variance = |(column, functional): (&[f64], &JetFunctional)| {
@@ -136,13 +153,33 @@ pub(crate) fn deviations(
                 let h = mean.unexplained_of(functional, queries.point(functional.query), column);
                 mean.product(&h, &h)
             });
-            (functional.stretched(kernel).prior_variance(kernel) - explained).max(0.0)
-                + unexplained.unwrap_or(0.0)
+            (functional.prior_variance(kernel) - explained).max(0.0) + unexplained.unwrap_or(0.0)
         };
         let variances = columns.par_chunks_exact(n).zip(block).map(variance);
         found.extend(variances.map(|variance| (factor * variance).sqrt()).collect::<Vec<f64>>());
     }
     Ok(found)
+}
+
+/// Covariances of functionals with the values at the points of a cloud.
+pub(crate) struct Covariant<'a> {
+    nodes: Nodes,
+    kernel: &'a Kernel,
+}
+
+impl<'a> Covariant<'a> {
+    pub(crate) fn of(cloud: &Cloud, kernel: &'a Kernel) -> Self {
+        Self { nodes: Nodes::of(cloud), kernel }
+    }
+
+    /// `F k(·, x_j)` for all j, a column `[n]` for each functional; whether the kernel has the derivatives is for the caller to know.
+    pub(crate) fn fill(&self, functionals: &[JetFunctional], queries: &Cloud, columns: &mut [f64]) {
+        let Self { nodes, kernel } = self;
+        columns.par_chunks_exact_mut(nodes.n_points()).zip(functionals).for_each(|(column, functional)| {
+            let (x, functional) = (queries.point(functional.query), &*functional.stretched(kernel));
+            nodes.dispatch(Covariances { nodes, kernel, functional, x, column });
+        });
+    }
 }
 
 /// `F k(·, x_j)` for all j: with D = x − x_j, `v[cφ + 2φ′/ℓ² (g·D + tr A) + 4φ″/ℓ⁴ DᵀAD]`, all of it as the kernel stretches it.

@@ -41,10 +41,7 @@ impl<'a> MeanVariance<'a> {
 
     /// h of a functional at a position.
     pub(super) fn unexplained_of(&self, functional: &JetFunctional, x: &[f64], column: &[f64]) -> Vec<f64> {
-        let mut functions = vec![0.0; self.basis.n_functions()];
-        self.basis.at(x, &mut functions);
-        functions.iter_mut().for_each(|f| *f *= functional.of_value);
-        self.basis.add_slopes(&functional.of_gradient, &mut functions);
+        let mut functions = functional.on_mean(self.basis, x);
         let whitened = self.whitened.chunks_exact(self.n_points);
         functions.iter_mut().zip(whitened).for_each(|(h, o)| *h -= dot(o, column));
         functions

@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod deviations;
+pub(crate) mod errors;
 pub(crate) mod functionals;
 pub mod interpolant;
 mod mean_variance;

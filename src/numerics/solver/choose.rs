@@ -317,6 +317,14 @@ pub fn samples_price(n_queries: usize, n_draws: usize) -> Price {
     Price { n_bytes, flops: m * m * (m / 3.0 + 2.0 * count) }
 }
 
+/// What judging answers of an operator by so many functionals takes: their weights, and the covariances of another process with all values.
+pub fn judging_price(n_points: usize, n_functionals: usize) -> Price {
+    let (n, k) = (n_points as f64, n_functionals as f64);
+    let columns = n_points.saturating_mul(3 * n_functionals + VARIANCES_AT_ONCE + 5);
+    let n_bytes = columns.saturating_mul(size_of::<f64>());
+    Price { n_bytes, flops: n * n * (4.0 * k + 60.0) }
+}
+
 /// Bytes of a functional of jets as it waits for its turn.
 const BYTES_PER_FUNCTIONAL: usize = 400;
 

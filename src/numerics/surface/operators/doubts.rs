@@ -1,36 +1,35 @@
 //! Answers of operators that the values do not bear out.
 //!
-//! Two things say so. Deviations that leave little of what is found: at the rim, far from the points, between points that are too few for the
-//! kernel. And values that contradict it: by themselves they have the variance `YᵀPY/(n − p)` (Rasmussen and Williams 2006, sec. 5.4.1),
-//! P the inverse of `K + N` without the p functions of the mean, and where that is many times what the kernel says, there is noise
-//! that nobody has told, or a kernel far too smooth. Deviations as judged here are those of the values' own variance.
+//! A kernel that is learned is the one that the values want, and its deviations say how far off answers are. A kernel that is given may be none that the
+//! values want: too wide for what they show, with less noise than they have, or about 0 where they have an offset. There, errors are those of the answers
+//! that are served if the values come from the process that would have been learned.
 
 use super::super::geometry::Geometry;
 use super::deviations::Applied;
 use super::{Operator, regular};
 use crate::numerics::error::NumericsError;
-use crate::numerics::function::functionals::{deviations, has_variance};
+use crate::numerics::function::errors::{Process, errors_under};
+use crate::numerics::function::functionals::{JetFunctional, deviations, has_variance};
 use crate::numerics::function::interpolant::Interpolant;
+use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::thinning::thinned_points;
+use crate::numerics::selection::Learned;
 
-/// Functionals whose deviations are found: what they take is little beside a factorization of as many points as need them.
-pub const JUDGED_FUNCTIONALS: usize = 128;
+/// Functionals whose errors are found: what they take is little beside a factorization of as many points as need them.
+pub const JUDGED_FUNCTIONALS: usize = 256;
 
-/// Deviations beyond this share of the root mean square of what is found leave little of it: an error of half of that is two deviations.
-const UNCERTAIN: f64 = 0.25;
+/// Queries that are judged themselves whose errors another may have: the greatest of them.
+const AROUND: usize = 4;
 
-/// What is doubtful about an operator on values.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Doubts {
-    /// Everything: the process has no derivatives of this order.
-    TooRough,
-    /// These queries, ascending.
-    Uncertain(Vec<usize>),
-}
+/// Deviations beyond this share of the root mean square of what there is leave little of it: an error of half of that is two and a half of them.
+const UNCERTAIN: f64 = 0.2;
+
+/// Halvings of an interval of 52 binary digits: to three digits.
+const STEPS: usize = 16;
 
 /// What there is to judge: an operator on a function, of which kernel and noise are `factor` times those of the solver.
 #[derive(Clone, Copy)]
@@ -41,42 +40,41 @@ pub struct Judged<'a> {
     pub queries: &'a Cloud,
     /// What was found, `[m, k]`.
     pub found: &'a [f64],
+    /// What is learned from the values, where the kernel is given.
+    pub learned: Option<&'a Learned>,
 }
 
 impl Judged<'_> {
-    /// Judges `∇_M u`; see [`Judged::laplace_beltrami`].
+    /// The queries, ascending, at which little is left of `∇_M u`; see [`Judged::laplace_beltrami`].
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::Cancelled`].
-    pub fn surface_gradient(self, observer: &dyn Observer) -> Result<Doubts, NumericsError> {
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn surface_gradient(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         self.judge(Operator::SurfaceGradient, observer)
     }
 
-    /// Judges `Δ_M u` by the deviations at queries that are spread as all are, [`JUDGED_FUNCTIONALS`] of them at most, of which each of the others has
-    /// that of the nearest. Without a Cholesky factor nothing is known, and nothing doubtful.
+    /// The queries, ascending, at which little is left of `Δ_M u`: by the errors at queries that are spread as all are, [`JUDGED_FUNCTIONALS`] of them at
+    /// most; each of the others has the greatest of those around. All of them for a kernel whose process has no second derivatives.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::Cancelled`].
-    pub fn laplace_beltrami(self, observer: &dyn Observer) -> Result<Doubts, NumericsError> {
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn laplace_beltrami(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         self.judge(Operator::LaplaceBeltrami, observer)
     }
 
-    /// Judges by deviations that are known, `[m, k]`.
-    pub fn by_deviations(self, deviations: &[f64]) -> Doubts {
-        let own = overdispersion(self.interpolant, self.factor).sqrt();
+    /// The queries, ascending, at which deviations that are known leave little, `[m, k]`.
+    pub fn by_deviations(self, deviations: &[f64]) -> Vec<usize> {
         let k = self.n_components();
-        let of = |query: usize| own * norm(&deviations[query * k..][..k]);
-        Doubts::Uncertain(self.doubtful(regular(self.geometry).map(|query| (query, of(query)))))
+        let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
+        let most = self.most(regular(self.geometry).map(of));
+        regular(self.geometry).map(of).filter(|(_, d)| *d > most).map(|(query, _)| query).collect()
     }
 
-    fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Doubts, NumericsError> {
-        let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
-        if !has_variance(solver.kernel(), operator.order()) {
-            return Ok(Doubts::TooRough);
-        }
+    fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         let regular: Vec<usize> = regular(self.geometry).collect();
-        if regular.is_empty() {
-            return Ok(Doubts::Uncertain(regular));
+        let has_derivatives = has_variance(self.interpolant.solver.kernel(), operator.order());
+        if regular.is_empty() || !has_derivatives {
+            return Ok(regular);
         }
         let k = self.n_components();
         let places = self.queries.select(&regular);
@@ -85,38 +83,75 @@ impl Judged<'_> {
         let applied = Applied { geometry, interpolant, factor, queries };
         let functionals: Vec<_> =
             chosen.iter().flat_map(|&at| applied.functionals(operator, regular[at])).collect();
-        let of_chosen = match deviations((solver, solution, factor), queries, &functionals, observer) {
-            Ok(found) => found,
-            Err(NumericsError::NotPositiveDefinite { .. }) => return Ok(Doubts::Uncertain(Vec::new())),
-            Err(error) => return Err(error),
-        };
-        let own = overdispersion(interpolant, factor).sqrt();
-        let of_chosen: Vec<f64> = of_chosen.chunks_exact(k).map(|of| own * norm(of)).collect();
+        let errors = self.errors(&functionals, observer)?;
+        let errors: Vec<f64> = errors.chunks_exact(k).map(norm).collect();
+        let most = self.most(chosen.iter().map(|&at| regular[at]).zip(errors.iter().copied()));
         let coarse = places.select(&chosen);
         let near = Neighbours::of(&coarse);
-        let nearest = |at: usize| near.nearest(&coarse, places.point(at), 1)[0].point;
-        let all = regular.iter().enumerate().map(|(at, &query)| (query, of_chosen[nearest(at)]));
-        Ok(Doubts::Uncertain(self.doubtful(all)))
+        let is_doubtful = |at: usize| {
+            let around = near.nearest(&coarse, places.point(at), AROUND);
+            let count = if around[0].squared_distance == 0.0 { 1 } else { AROUND };
+            around.iter().take(count).any(|n| errors[n.point] > most)
+        };
+        Ok((0..regular.len()).filter(|&at| is_doubtful(at)).map(|at| regular[at]).collect())
+    }
+
+    fn errors(
+        &self,
+        functionals: &[JetFunctional],
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        let Self { interpolant, factor, queries, .. } = *self;
+        let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
+        if let Some(learned) = self.learned {
+            let Learned { family, length_scale, ratio, variance, ref trend } = *learned;
+            let kernel = Kernel::new(family, length_scale, variance)?;
+            let process = Process { kernel: &kernel, noise: ratio * variance, trend: trend.as_ref() };
+            return errors_under(&process, interpolant, queries, functionals, observer);
+        }
+        match deviations((solver, solution, factor), queries, functionals, observer) {
+            // The fallback has no variances, but it has weights.
+            Err(NumericsError::NotPositiveDefinite { .. }) => {
+                let kernel = solver.kernel().with_variance(solver.kernel().variance() * factor)?;
+                let noise = factor * solver.regularization().at(0);
+                let process = Process { kernel: &kernel, noise, trend: solution.trend.as_ref() };
+                errors_under(&process, interpolant, queries, functionals, observer)
+            }
+            found => found,
+        }
     }
 
     fn n_components(&self) -> usize {
         self.found.len() / self.queries.n_points()
     }
 
-    /// Queries whose deviation leaves little.
-    fn doubtful(&self, deviations: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
+    /// The deviation that leaves little of what there is, from deviations at some queries.
+    ///
+    /// Squares of what was found are those of what there is and of the errors. Where errors differ as much as they do between points of
+    /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982).
+    fn most(&self, deviations: impl Iterator<Item = (usize, f64)>) -> f64 {
         let k = self.n_components();
-        let norms: Vec<f64> =
-            regular(self.geometry).map(|query| norm(&self.found[query * k..][..k])).collect();
-        let least = UNCERTAIN * norm(&norms) / (norms.len() as f64).sqrt();
-        deviations.filter(|(_, deviation)| *deviation > least).map(|(query, _)| query).collect()
+        let squared = |(query, deviation): (usize, f64)| {
+            (norm(&self.found[query * k..][..k]).powi(2), deviation * deviation)
+        };
+        let squares: Vec<(f64, f64)> = deviations.map(squared).collect();
+        UNCERTAIN * spread_beside_errors(&squares).sqrt()
     }
 }
 
-/// The variance that the values have by themselves over that of the kernel, 1 at least.
-fn overdispersion(interpolant: &Interpolant, factor: f64) -> f64 {
-    let solution = &interpolant.solution;
-    let n_functions = solution.trend.as_ref().map_or(0, |trend| trend.of_coordinates().len());
-    let n_free = interpolant.solver.n_points().saturating_sub(n_functions).max(1);
-    (solution.energy / (n_free as f64 * factor)).max(1.0)
+/// s² of f² and e².
+fn spread_beside_errors(squares: &[(f64, f64)]) -> f64 {
+    let n = squares.len() as f64;
+    let excess = |s: f64| squares.iter().map(|(found, error)| found / (s + error)).sum::<f64>() - n;
+    let mut most = squares.iter().map(|(found, _)| found).sum::<f64>() / n;
+    let mut least = most * f64::EPSILON;
+    if least == 0.0 || excess(least) <= 0.0 {
+        return 0.0;
+    }
+    // It falls, and is negative at the mean of f². By halves of the logarithm.
+    for _ in 0..STEPS {
+        let middle = (least * most).sqrt();
+        if excess(middle) > 0.0 { least = middle } else { most = middle }
+    }
+    least
 }

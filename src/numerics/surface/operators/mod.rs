@@ -29,7 +29,7 @@ use crate::numerics::solver::trend::{Basis, Mean};
 use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
 pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
-pub use doubts::{Doubts, JUDGED_FUNCTIONALS, Judged};
+pub use doubts::{JUDGED_FUNCTIONALS, Judged};
 pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
