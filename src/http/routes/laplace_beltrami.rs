@@ -209,7 +209,8 @@ impl Operation for LaplaceBeltramiRequest {
         if work.request.has_deviations {
             let found = laplace_beltrami_deviations(geometry, &interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            surface.flag_uncertain(&judged.by_deviations(&found), &mut degenerate);
+            let uncertain = judged.by_deviations(&found).map_err(refused)?;
+            surface.flag_uncertain(&uncertain, &mut degenerate);
             of_values = Some(surface.known_per_query(found, &[m]));
         }
         // Deviations of a kernel that was learned say all of it.

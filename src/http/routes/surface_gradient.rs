@@ -197,7 +197,8 @@ impl Operation for SurfaceGradientRequest {
         if work.request.has_deviations {
             let found = surface_gradient_deviations(geometry, &interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            surface.flag_uncertain(&judged.by_deviations(&found), &mut degenerate);
+            let uncertain = judged.by_deviations(&found).map_err(refused)?;
+            surface.flag_uncertain(&uncertain, &mut degenerate);
             of_gradients = Some(surface.known_per_query(found, &[m, d]));
         }
         // Deviations of a kernel that was learned say all of it.

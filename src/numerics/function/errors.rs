@@ -14,7 +14,8 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::trend::{Basis, Trend};
+use crate::numerics::solver::choose::JUDGED_AT_ONCE;
+use crate::numerics::solver::trend::Trend;
 use crate::numerics::sums::many::values_of_each;
 use crate::numerics::sums::regularization::Regularization;
 
@@ -30,6 +31,21 @@ pub(crate) struct Process<'a> {
 /// # Errors
 /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
 pub(crate) fn errors_under(
+    process: &Process<'_>,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let mut found = Vec::with_capacity(functionals.len());
+    for block in functionals.chunks(JUDGED_AT_ONCE) {
+        found.extend(errors_of_block(process, interpolant, queries, block, observer)?);
+    }
+    Ok(found)
+}
+
+/// The same of as many as are held at once.
+fn errors_of_block(
     process: &Process<'_>,
     interpolant: &Interpolant,
     queries: &Cloud,
@@ -75,16 +91,83 @@ fn weights_on_values(
     Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
     solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, functionals.len()));
     let Some(trend) = &interpolant.solution.trend else { return Ok(weights) };
-    let basis: &Basis = trend.basis();
-    let of_values = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
-    let columns = basis.columns(solver.cloud());
-    weights.par_chunks_exact_mut(n).zip(functionals).for_each(|(row, functional)| {
-        let exact = functional.on_mean(basis, queries.point(functional.query));
-        let excess: Vec<f64> =
-            columns.chunks_exact(n).zip(&exact).map(|(function, exact)| dot(function, row) - exact).collect();
-        for (functional, excess) in of_values.chunks_exact(n).zip(&excess) {
-            row.iter_mut().zip(functional).for_each(|(weight, f)| *weight -= excess * f);
-        }
-    });
+    let basis = trend.basis();
+    let exact = |at: usize| {
+        let functional: &JetFunctional = &functionals[at];
+        Some(functional.on_mean(basis, queries.point(functional.query)))
+    };
+    basis.make_exact(solver, &mut weights, exact).ok_or(NumericsError::MeanNotDetermined)?;
     Ok(weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::numerics::function::functionals::{deviations, has_variance};
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::solver::trend::Mean;
+    use crate::numerics::solver::{Solver, System};
+    use crate::numerics::testing::{all_families, fibonacci_sphere};
+
+    const ALPHA: f64 = 1e-2;
+
+    fn fit(kernel: &Kernel, mean: Mean) -> Interpolant {
+        let cloud = Arc::new(fibonacci_sphere(60));
+        let values: Vec<f64> = cloud.points().map(|x| 3.0 + (2.0 * x[0]).sin() - x[2]).collect();
+        let system = System::new(cloud, kernel.clone(), Regularization::Uniform(ALPHA)).unwrap();
+        let solver = Arc::new(Solver::dense(system, &Unobserved).unwrap());
+        Interpolant::fit_with_mean(solver, &values, mean, &Unobserved).unwrap()
+    }
+
+    fn functionals() -> (Cloud, Vec<JetFunctional>) {
+        let queries = Cloud::new(vec![0.3, 0.8, 0.5, 0.0, 0.0, 1.1], 3).unwrap();
+        let of = |query| {
+            let bend = JetFunctional::second_derivative(query, 3, (0, 1));
+            [JetFunctional::value(query, 3), JetFunctional::derivative(query, &[0.6, 0.0, -0.8]), bend]
+        };
+        (queries, [of(0), of(1)].concat())
+    }
+
+    /// Kriging is unbiased whatever the mean is, so that errors are its deviations, and those do not depend on the coefficients.
+    #[test]
+    fn under_its_own_process_errors_are_the_deviations() {
+        let (queries, functionals) = functionals();
+        for family in all_families() {
+            let kernel = Kernel::new(family, 1.3, 2.0).unwrap();
+            if !has_variance(&kernel, 2) {
+                continue;
+            }
+            for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
+                let u = fit(&kernel, mean);
+                let process = Process { kernel: &kernel, noise: ALPHA, trend: u.solution.trend.as_ref() };
+                let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
+                let of = (&*u.solver, &*u.solution, 1.0);
+                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap();
+                for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
+                    // Terms of the size of what is not known beforehand cancel to rounding.
+                    let prior = functional.prior_variance(&kernel);
+                    assert!((a * a - b * b).abs() <= 1e-11 * prior, "{family:?}, {mean:?}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_that_nobody_told_and_means_that_are_left_out_show() {
+        let (queries, functionals) = functionals();
+        let kernel = Kernel::new(crate::numerics::kernel::Family::Gauss, 0.8, 1.0).unwrap();
+        let (u, with_mean) = (fit(&kernel, Mean::Zero), fit(&kernel, Mean::Constant));
+        let errors = |noise, trend| {
+            let process = Process { kernel: &kernel, noise, trend };
+            errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap()
+        };
+        let told = errors(ALPHA, None);
+        let untold = errors(100.0 * ALPHA, None);
+        let about = errors(ALPHA, with_mean.solution.trend.as_ref());
+        assert!(told.iter().zip(&untold).all(|(a, b)| b > a));
+        // The value far from all points goes to 0 instead of the mean, which is about 3.
+        assert!(about[0] > told[0], "{about:?} {told:?}");
+    }
 }

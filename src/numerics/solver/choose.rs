@@ -9,6 +9,7 @@ use crate::numerics::points::monomials::n_stencil_nodes;
 use crate::numerics::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
 use crate::numerics::points::quadric::{n_coefficients, n_quadric_neighbours};
 use crate::numerics::points::thinning::n_coarse;
+use crate::numerics::sums::many::QUERIES_PER_BLOCK;
 
 /// Why a solver was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -317,12 +318,17 @@ pub fn samples_price(n_queries: usize, n_draws: usize) -> Price {
     Price { n_bytes, flops: m * m * (m / 3.0 + 2.0 * count) }
 }
 
+/// Functionals whose weights, covariances and images are held at once: a pass over all pairs for each block.
+pub(crate) const JUDGED_AT_ONCE: usize = 64;
+
 /// What judging answers of an operator by so many functionals takes: their weights, and the covariances of another process with all values.
 pub fn judging_price(n_points: usize, n_functionals: usize) -> Price {
     let (n, k) = (n_points as f64, n_functionals as f64);
-    let columns = n_points.saturating_mul(3 * n_functionals + VARIANCES_AT_ONCE + 5);
-    let n_bytes = columns.saturating_mul(size_of::<f64>());
-    Price { n_bytes, flops: n * n * (4.0 * k + 60.0) }
+    let n_blocks = n_functionals.div_ceil(JUDGED_AT_ONCE) as f64;
+    let columns = n_points.saturating_mul(3 * n_functionals.min(JUDGED_AT_ONCE) + QUERIES_PER_BLOCK + 5);
+    let n_bytes =
+        columns.saturating_mul(size_of::<f64>()).saturating_add(n_functionals * BYTES_PER_FUNCTIONAL);
+    Price { n_bytes, flops: n * n * (4.0 * k + 40.0 * n_blocks) }
 }
 
 /// Bytes of a functional of jets as it waits for its turn.

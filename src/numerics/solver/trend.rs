@@ -6,6 +6,7 @@
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatMut, Side};
+use rayon::prelude::*;
 
 use super::Solver;
 use crate::numerics::error::NumericsError;
@@ -85,6 +86,27 @@ impl Basis {
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
         let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]))?;
         Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
+    }
+
+    /// Turns rows that weigh what the mean leaves of the values, `[rows, n]`, into those that weigh the values: with `exact` what a row is to be on each
+    /// of the functions, `row − (row F − exact)(FᵀWF)⁻¹FᵀW`. A row without that is left as it is. `None` if the points do not tell the functions apart.
+    pub(crate) fn make_exact(
+        &self,
+        solver: &Solver,
+        rows: &mut [f64],
+        exact: impl Fn(usize) -> Option<Vec<f64>> + Sync,
+    ) -> Option<()> {
+        let n = solver.n_points();
+        let (of_values, columns) = (self.functionals(solver)?, self.columns(solver.cloud()));
+        rows.par_chunks_mut(n).enumerate().for_each(|(index, row)| {
+            let Some(exact) = exact(index) else { return };
+            let found = columns.chunks_exact(n).map(|function| dot(function, row));
+            let excess: Vec<f64> = found.zip(&exact).map(|(found, exact)| found - exact).collect();
+            for (functional, excess) in of_values.chunks_exact(n).zip(&excess) {
+                row.iter_mut().zip(functional).for_each(|(entry, f)| *entry -= excess * f);
+            }
+        });
+        Some(())
     }
 
     /// The functions at the points of a cloud, one column for each: `[n, p]` column by column.

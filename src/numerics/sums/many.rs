@@ -12,7 +12,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::parallelism;
 
 /// Queries whose kernel values are held at once.
-const QUERIES_PER_BLOCK: usize = 256;
+pub(crate) const QUERIES_PER_BLOCK: usize = 256;
 
 /// `Σ_j λ_ij k(x, z_j)` of k sets of weights `[k, r]` at queries `[m, d]`: `[k, m]`.
 ///

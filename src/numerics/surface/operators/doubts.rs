@@ -31,6 +31,9 @@ const UNCERTAIN: f64 = 0.2;
 /// Halvings of an interval of 52 binary digits: to three digits.
 const STEPS: usize = 16;
 
+/// Queries that what is expected beforehand counts like.
+const N_BEFOREHAND: usize = 4;
+
 /// What there is to judge: an operator on a function, of which kernel and noise are `factor` times those of the solver.
 #[derive(Clone, Copy)]
 pub struct Judged<'a> {
@@ -63,11 +66,16 @@ impl Judged<'_> {
     }
 
     /// The queries, ascending, at which deviations that are known leave little, `[m, k]`.
-    pub fn by_deviations(self, deviations: &[f64]) -> Vec<usize> {
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidKernelParameter`] for a process beyond float64.
+    pub fn by_deviations(self, deviations: &[f64]) -> Result<Vec<usize>, NumericsError> {
         let k = self.n_components();
         let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
-        let most = self.most(regular(self.geometry).map(of));
-        regular(self.geometry).map(of).filter(|(_, d)| *d > most).map(|(query, _)| query).collect()
+        let operator = if k == 1 { Operator::LaplaceBeltrami } else { Operator::SurfaceGradient };
+        let some: Vec<usize> = regular(self.geometry).take(JUDGED_FUNCTIONALS / k).collect();
+        let most = self.most(regular(self.geometry).map(of), &self.functionals(operator, &some))?;
+        Ok(regular(self.geometry).map(of).filter(|(_, d)| *d > most).map(|(query, _)| query).collect())
     }
 
     fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
@@ -79,13 +87,11 @@ impl Judged<'_> {
         let k = self.n_components();
         let places = self.queries.select(&regular);
         let chosen = thinned_points(&places, (JUDGED_FUNCTIONALS / k).max(1));
-        let Self { geometry, interpolant, factor, queries, .. } = self;
-        let applied = Applied { geometry, interpolant, factor, queries };
-        let functionals: Vec<_> =
-            chosen.iter().flat_map(|&at| applied.functionals(operator, regular[at])).collect();
+        let judged: Vec<usize> = chosen.iter().map(|&at| regular[at]).collect();
+        let functionals = self.functionals(operator, &judged);
         let errors = self.errors(&functionals, observer)?;
         let errors: Vec<f64> = errors.chunks_exact(k).map(norm).collect();
-        let most = self.most(chosen.iter().map(|&at| regular[at]).zip(errors.iter().copied()));
+        let most = self.most(judged.into_iter().zip(errors.iter().copied()), &functionals)?;
         let coarse = places.select(&chosen);
         let near = Neighbours::of(&coarse);
         let is_doubtful = |at: usize| {
@@ -96,6 +102,23 @@ impl Judged<'_> {
         Ok((0..regular.len()).filter(|&at| is_doubtful(at)).map(|at| regular[at]).collect())
     }
 
+    fn functionals(&self, operator: Operator, judged: &[usize]) -> Vec<JetFunctional> {
+        let Self { geometry, interpolant, factor, queries, .. } = *self;
+        let applied = Applied { geometry, interpolant, factor, queries };
+        judged.iter().flat_map(|&query| applied.functionals(operator, query)).collect()
+    }
+
+    /// The kernel of the process that the values come from.
+    fn kernel(&self) -> Result<Kernel, NumericsError> {
+        match self.learned {
+            Some(learned) => Kernel::new(learned.family, learned.length_scale, learned.variance),
+            None => {
+                let kernel = self.interpolant.solver.kernel();
+                kernel.with_variance(kernel.variance() * self.factor)
+            }
+        }
+    }
+
     fn errors(
         &self,
         functionals: &[JetFunctional],
@@ -104,17 +127,15 @@ impl Judged<'_> {
         let Self { interpolant, factor, queries, .. } = *self;
         let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
         if let Some(learned) = self.learned {
-            let Learned { family, length_scale, ratio, variance, ref trend } = *learned;
-            let kernel = Kernel::new(family, length_scale, variance)?;
-            let process = Process { kernel: &kernel, noise: ratio * variance, trend: trend.as_ref() };
+            let Learned { ratio, variance, ref trend, .. } = *learned;
+            let process = Process { kernel: &self.kernel()?, noise: ratio * variance, trend: trend.as_ref() };
             return errors_under(&process, interpolant, queries, functionals, observer);
         }
         match deviations((solver, solution, factor), queries, functionals, observer) {
             // The fallback has no variances, but it has weights.
             Err(NumericsError::NotPositiveDefinite { .. }) => {
-                let kernel = solver.kernel().with_variance(solver.kernel().variance() * factor)?;
                 let noise = factor * solver.regularization().at(0);
-                let process = Process { kernel: &kernel, noise, trend: solution.trend.as_ref() };
+                let process = Process { kernel: &self.kernel()?, noise, trend: solution.trend.as_ref() };
                 errors_under(&process, interpolant, queries, functionals, observer)
             }
             found => found,
@@ -128,14 +149,21 @@ impl Judged<'_> {
     /// The deviation that leaves little of what there is, from deviations at some queries.
     ///
     /// Squares of what was found are those of what there is and of the errors. Where errors differ as much as they do between points of
-    /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982).
-    fn most(&self, deviations: impl Iterator<Item = (usize, f64)>) -> f64 {
-        let k = self.n_components();
+    /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982). A few queries may all
+    /// lie where there is nothing: what the process has beforehand counts like [`N_BEFOREHAND`] more.
+    fn most(
+        &self,
+        deviations: impl Iterator<Item = (usize, f64)>,
+        functionals: &[JetFunctional],
+    ) -> Result<f64, NumericsError> {
+        let (k, kernel) = (self.n_components(), self.kernel()?);
+        let beforehand: f64 = functionals.iter().map(|functional| functional.prior_variance(&kernel)).sum();
+        let beforehand = (beforehand * k as f64 / functionals.len().max(1) as f64, 0.0);
         let squared = |(query, deviation): (usize, f64)| {
             (norm(&self.found[query * k..][..k]).powi(2), deviation * deviation)
         };
-        let squares: Vec<(f64, f64)> = deviations.map(squared).collect();
-        UNCERTAIN * spread_beside_errors(&squares).sqrt()
+        let squares = deviations.map(squared).chain([beforehand; N_BEFOREHAND]);
+        Ok(UNCERTAIN * spread_beside_errors(&squares.collect::<Vec<_>>()).sqrt())
     }
 }
 

@@ -201,21 +201,14 @@ fn with_mean(
     if mean == Mean::Zero {
         return Ok(matrix);
     }
-    let (cloud, n, m) = (solver.cloud(), solver.n_points(), geometry.n_queries());
-    let basis = Basis::of(mean, cloud);
-    let of_values = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
-    let columns = basis.columns(cloud);
-    let is_null = geometry.is_null();
-    matrix.par_chunks_mut(n).enumerate().filter(|(index, _)| !is_null[index % m]).for_each(|(index, row)| {
+    let (basis, m) = (Basis::of(mean, solver.cloud()), geometry.n_queries());
+    let exact = |index: usize| {
         let (component, query) = (index / m, index % m);
         let mut exact = vec![0.0; basis.n_functions()];
         basis.add_slopes(&on_coordinates(geometry, operator, component, query), &mut exact);
-        let found = columns.chunks_exact(n).map(|function| dot(function, row));
-        let excess: Vec<f64> = found.zip(&exact).map(|(found, exact)| found - exact).collect();
-        for (functional, excess) in of_values.chunks_exact(n).zip(&excess) {
-            row.iter_mut().zip(functional).for_each(|(entry, f)| *entry -= excess * f);
-        }
-    });
+        Some(exact).filter(|_| !geometry.is_null()[query])
+    };
+    basis.make_exact(solver, &mut matrix, exact).ok_or(NumericsError::MeanNotDetermined)?;
     Ok(matrix)
 }
 
