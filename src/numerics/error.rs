@@ -23,6 +23,8 @@ pub enum NumericsError {
     LengthMismatch { expected: usize, found: usize },
     #[error("kernel parameter {parameter} {requirement}")]
     InvalidKernelParameter { parameter: &'static str, requirement: &'static str },
+    #[error("kernel parameter length_scales[{axis}] {requirement}")]
+    InvalidLengthScale { axis: usize, requirement: &'static str },
     #[error("{parameter} {requirement}")]
     InvalidRegularization { parameter: &'static str, requirement: &'static str, point: Option<usize> },
     #[error("vary[{entry}] {requirement}")]

@@ -32,6 +32,17 @@ pub trait Observer: Sync {
     }
 }
 
+/// Work beside that of a request: it ends when nobody waits any more, and its stages are nobody's.
+pub struct Beside<'a>(pub &'a dyn Observer);
+
+impl Observer for Beside<'_> {
+    fn enter(&self, _stage: Stage) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
 /// Nobody watches and nothing is cancelled.
 pub struct Unobserved;
 

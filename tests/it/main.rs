@@ -16,6 +16,7 @@ mod connections;
 mod contention;
 mod contract;
 mod docs;
+mod doubts;
 mod ending;
 mod examples;
 mod fits;

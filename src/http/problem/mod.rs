@@ -204,6 +204,10 @@ impl Problem {
             E::InvalidKernelParameter { parameter, .. } => {
                 at(Slug::InvalidRequest, &format!("{}/{parameter}", pointers.kernel))
             }
+            E::InvalidLengthScale { axis, .. } => {
+                let list = format!("{}/length_scales", pointers.kernel);
+                at(Slug::InvalidRequest, &Pointers::entry(&list, axis))
+            }
             E::InvalidRegularization { point: None, .. } => at(Slug::InvalidRequest, pointers.regularization),
             E::InvalidRegularization { point: Some(point), .. } => {
                 at(Slug::InvalidRequest, &Pointers::entry(pointers.regularization, point))

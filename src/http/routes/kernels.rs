@@ -24,11 +24,11 @@ pub struct KernelParameter {
 pub struct KernelDescription {
     /// The name in a kernel object.
     family: KernelFamily,
-    /// φ as a function of r = |x − y|/length_scale; the kernel is variance · φ.
+    /// φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel is variance · φ.
     formula: &'static str,
     /// How smooth functions fitted with it are.
     smoothness: &'static str,
-    /// Parameters beside `length_scale` and `variance`.
+    /// Parameters beside `length_scale`, or `length_scales`, and `variance`.
     parameters: Vec<KernelParameter>,
     /// The greatest dimension in which it is positive definite; absent if every one.
     #[serde(skip_serializing_if = "Option::is_none")]

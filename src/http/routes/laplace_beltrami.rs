@@ -196,27 +196,23 @@ impl Operation for LaplaceBeltramiRequest {
         let mut degenerate = surface.degenerate();
         let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let learned = fits.learned_beside(&work.values, observer)?;
-        let judged = Judged {
-            geometry,
-            interpolant: &interpolant,
-            factor,
-            queries,
-            found: &values,
-            learned: learned.as_ref(),
-        };
+        let learned = fits.learned_beside(&work.values, observer);
+        let interpolant = &interpolant;
+        let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
         let mut of_values = None;
         if work.request.has_deviations {
-            let found = laplace_beltrami_deviations(geometry, &interpolant, factor, queries, observer)
+            let found = laplace_beltrami_deviations(geometry, interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            let uncertain = judged.by_deviations(&found).map_err(refused)?;
-            surface.flag_uncertain(&uncertain, &mut degenerate);
+            let uncertain = judged.by_deviations(&found);
+            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
             of_values = Some(surface.known_per_query(found, &[m]));
         }
         // Deviations of a kernel that was learned say all of it.
-        if learned.is_some() || !work.request.has_deviations {
-            let uncertain = judged.laplace_beltrami(observer).map_err(refused)?;
-            surface.flag_uncertain(&uncertain, &mut degenerate);
+        if !matches!(learned, Ok(None)) || !work.request.has_deviations {
+            let uncertain = learned.and_then(|learned| {
+                Judged { learned: learned.as_ref(), ..judged }.laplace_beltrami(observer)
+            });
+            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
         }
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),

@@ -184,27 +184,23 @@ impl Operation for SurfaceGradientRequest {
         let mut degenerate = surface.degenerate();
         let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let learned = fits.learned_beside(&work.values, observer)?;
-        let judged = Judged {
-            geometry,
-            interpolant: &interpolant,
-            factor,
-            queries,
-            found: &gradients,
-            learned: learned.as_ref(),
-        };
+        let learned = fits.learned_beside(&work.values, observer);
+        let interpolant = &interpolant;
+        let judged = Judged { geometry, interpolant, factor, queries, found: &gradients, learned: None };
         let mut of_gradients = None;
         if work.request.has_deviations {
-            let found = surface_gradient_deviations(geometry, &interpolant, factor, queries, observer)
+            let found = surface_gradient_deviations(geometry, interpolant, factor, queries, observer)
                 .map_err(refused)?;
-            let uncertain = judged.by_deviations(&found).map_err(refused)?;
-            surface.flag_uncertain(&uncertain, &mut degenerate);
+            let uncertain = judged.by_deviations(&found);
+            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
             of_gradients = Some(surface.known_per_query(found, &[m, d]));
         }
         // Deviations of a kernel that was learned say all of it.
-        if learned.is_some() || !work.request.has_deviations {
-            let uncertain = judged.surface_gradient(observer).map_err(refused)?;
-            surface.flag_uncertain(&uncertain, &mut degenerate);
+        if !matches!(learned, Ok(None)) || !work.request.has_deviations {
+            let uncertain = learned.and_then(|learned| {
+                Judged { learned: learned.as_ref(), ..judged }.surface_gradient(observer)
+            });
+            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
         }
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),

@@ -156,7 +156,7 @@ pub fn plan_applied(
         n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
     }
     if surface.is_some() {
-        work = work.and(judging_price(n_values, of_operator.min(JUDGED_FUNCTIONALS)));
+        work = work.and(judging_price((n_values, d), m, of_operator.min(JUDGED_FUNCTIONALS)));
         work.flops += learning_flops(n_values);
     }
     let cost = Cost {

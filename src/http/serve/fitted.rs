@@ -15,7 +15,8 @@ use crate::http::wire::write::array::Array;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::function::moving::MovingAnswer;
-use crate::numerics::kernel::Family;
+use crate::numerics::kernel::{Family, Kernel};
+use crate::numerics::observer::Beside;
 use crate::numerics::patches::PatchKernel;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::sampling::Sampling;
@@ -63,25 +64,27 @@ impl Fits {
     /// What is learned from the values, where the kernel is given and they were not asked.
     ///
     /// # Errors
-    /// Those of [`learn`] as a [`Problem`].
-    pub fn learned_beside(&self, values: &[f64], observer: &JobObserver) -> Result<Option<Learned>, Problem> {
-        let FitPlan { stored, fitted, merge, is_learned, mean, .. } = &self.main.plan;
+    /// Those of [`learn`].
+    pub fn learned_beside(
+        &self,
+        values: &[f64],
+        observer: &JobObserver,
+    ) -> Result<Option<Learned>, NumericsError> {
+        let FitPlan { stored, fitted, merge, is_learned, .. } = &self.main.plan;
         if *is_learned {
             return Ok(None);
         }
-        let refused = |error| self.main.refused(error);
-        let sampling = match stored.sampling().filter(|_| merge.is_none()) {
+        let observer = Beside(observer);
+        // In the coordinates of a kernel that stretches them: what it says of the axes is not judged.
+        let stretched = self.main.kernel().and_then(|kernel| kernel.stretched_cloud(fitted));
+        let cloud = stretched.as_ref().unwrap_or(fitted);
+        let sampling = match stored.sampling().filter(|_| merge.is_none() && stretched.is_none()) {
             Some(sampling) => sampling.clone(),
-            None => Arc::new(Sampling::of(fitted, observer).map_err(refused)?),
+            None => Arc::new(Sampling::of(cloud, &observer)?),
         };
-        let observed = Observed {
-            cloud: fitted,
-            sampling: &sampling,
-            values: &self.main.merged(values),
-            noise: Noise::Unknown,
-            mean: if *mean == Mean::Linear { Mean::Linear } else { Mean::Constant },
-        };
-        learn(observed, observer).map(Some).map_err(refused)
+        let values = &self.main.merged(values);
+        let (noise, mean) = (Noise::Unknown, Mean::Constant);
+        learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &observer).map(Some)
     }
 
     /// The function through the constant 1, without a mean: what the quality of a fit without values is judged by.
@@ -163,6 +166,14 @@ impl Fitted {
             .map_err(|error| self.refused(error))?;
         app.prepared.keep_solution(self.plan.key, key, interpolant.solution.clone());
         Ok(interpolant)
+    }
+
+    /// That of a fit with one.
+    fn kernel(&self) -> Option<&Kernel> {
+        match &self.plan.model {
+            FitModel::Dense { kernel, .. } | FitModel::Moving { kernel, .. } => Some(kernel),
+            FitModel::Local(_) => None,
+        }
     }
 
     /// Values at the points that are factorized: means over merged duplicates.
@@ -353,17 +364,31 @@ impl SurfaceGeometry {
         self.geometry.degenerate().iter().map(entry).collect()
     }
 
-    /// Flags queries, unless they are flagged already, where what was found of values is doubtful.
-    pub fn flag_uncertain(&self, queries: &[usize], degenerate: &mut Vec<Degenerate>) {
-        let mut is_flagged = vec![false; self.geometry.n_queries()];
+    /// Flags queries, unless they are flagged already, where what was found of values is doubtful: all of them where nobody can tell.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn flag_uncertain(
+        &self,
+        judged: Result<Vec<usize>, NumericsError>,
+        degenerate: &mut Vec<Degenerate>,
+    ) -> Result<(), NumericsError> {
+        let m = self.geometry.n_queries();
+        let queries = match judged {
+            Err(NumericsError::Cancelled) => return Err(NumericsError::Cancelled),
+            Err(_) => (0..m).collect(),
+            Ok(queries) => queries,
+        };
+        let mut is_flagged = self.geometry.is_null().to_vec();
         degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
-        for &query in queries {
+        for query in queries {
             if !std::mem::replace(&mut is_flagged[query], true) {
                 let gradient_norm = self.geometry.gradient_norms()[query];
                 degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
             }
         }
         degenerate.sort_by_key(|entry| entry.query);
+        Ok(())
     }
 
     /// Deviations per query, null where there is no answer, and where those of the surface are not known.

@@ -20,9 +20,12 @@ use crate::numerics::sums::many::values_of_each;
 use crate::numerics::sums::regularization::Regularization;
 
 /// What values come from: covariance, variance of the noise, which where each point has its own is the least, and mean.
+///
+/// Covariance and noise are `factor` times those that are named, so that values of any size have numbers.
 pub(crate) struct Process<'a> {
     pub(crate) kernel: &'a Kernel,
     pub(crate) noise: f64,
+    pub(crate) factor: f64,
     pub(crate) trend: Option<&'a Trend>,
 }
 
@@ -63,7 +66,9 @@ fn errors_of_block(
     let means: Option<Vec<f64>> = process.trend.map(|trend| cloud.points().map(|x| trend.at(x)).collect());
     let noise: Vec<f64> = match solver.regularization() {
         Regularization::Uniform(_) => vec![process.noise; n],
-        Regularization::PerPoint(given) => given.iter().map(|given| given.max(process.noise)).collect(),
+        Regularization::PerPoint(given) => {
+            given.iter().map(|given| (given / process.factor).max(process.noise)).collect()
+        }
     };
     let error = |at: usize| {
         let functional = &functionals[at];
@@ -75,7 +80,9 @@ fn errors_of_block(
             (Some(trend), Some(means)) => functional.of_mean(trend, queries) - dot(means, own),
             _ => 0.0,
         };
-        (spread.max(0.0) + of_noise + bias * bias).sqrt()
+        // Rounding may make it negative; what is no number stays none.
+        let spread = if spread < 0.0 { 0.0 } else { spread };
+        (process.factor * (spread + of_noise) + bias * bias).sqrt()
     };
     Ok((0..functionals.len()).into_par_iter().map(error).collect())
 }
@@ -141,7 +148,8 @@ mod tests {
             }
             for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
                 let u = fit(&kernel, mean);
-                let process = Process { kernel: &kernel, noise: ALPHA, trend: u.solution.trend.as_ref() };
+                let process =
+                    Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
                 let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
                 let of = (&*u.solver, &*u.solution, 1.0);
                 let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap();
@@ -160,7 +168,7 @@ mod tests {
         let kernel = Kernel::new(crate::numerics::kernel::Family::Gauss, 0.8, 1.0).unwrap();
         let (u, with_mean) = (fit(&kernel, Mean::Zero), fit(&kernel, Mean::Constant));
         let errors = |noise, trend| {
-            let process = Process { kernel: &kernel, noise, trend };
+            let process = Process { kernel: &kernel, noise, factor: 1.0, trend };
             errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap()
         };
         let told = errors(ALPHA, None);

@@ -126,7 +126,7 @@ pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] at points of the cloud; [`NumericsError::NotPositiveDefinite`]
-/// without a Cholesky factor; [`NumericsError::Cancelled`].
+/// without a Cholesky factor; [`NumericsError::Overflow`] where one has no number; [`NumericsError::Cancelled`].
 pub(crate) fn deviations(
     (solver, solution, factor): (&Solver, &Solution, f64),
     queries: &Cloud,
@@ -153,12 +153,17 @@ pub(crate) fn deviations(
                 let h = mean.unexplained_of(functional, queries.point(functional.query), column);
                 mean.product(&h, &h)
             });
-            (functional.prior_variance(kernel) - explained).max(0.0) + unexplained.unwrap_or(0.0)
+            let variance = functional.prior_variance(kernel) - explained;
+            // What is no number stays none.
+            (if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0)
         };
         let variances = columns.par_chunks_exact(n).zip(block).map(variance);
         found.extend(variances.map(|variance| (factor * variance).sqrt()).collect::<Vec<f64>>());
     }
-    Ok(found)
+    match found.iter().position(|deviation| !deviation.is_finite()) {
+        Some(at) => Err(NumericsError::Overflow { query: functionals[at].query }),
+        None => Ok(found),
+    }
 }
 
 /// Covariances of functionals with the values at the points of a cloud.

@@ -53,7 +53,7 @@ impl Kernel {
         let refuse =
             |parameter, requirement| Err(NumericsError::InvalidKernelParameter { parameter, requirement });
         if !LENGTH_SCALES.contains(&length_scale) {
-            return refuse("length_scale", "must be positive, between 1e-140 and 1e140");
+            return refuse("length_scale", LENGTH_SCALE);
         }
         if !(1e-140..=1e140).contains(&variance) {
             return refuse("variance", "must be positive, between 1e-140 and 1e140");
@@ -68,11 +68,12 @@ impl Kernel {
     /// With a length scale for each axis, `[d]`.
     ///
     /// # Errors
-    /// Those of [`Kernel::new`] for each of them; [`NumericsError::InvalidKernelParameter`] for none at all.
+    /// [`NumericsError::InvalidLengthScale`] with the axis; those of [`Kernel::new`]; [`NumericsError::InvalidKernelParameter`] for none at all.
     pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self, NumericsError> {
-        if let Some(&wrong) = length_scales.iter().find(|length_scale| !LENGTH_SCALES.contains(length_scale))
+        if let Some(axis) =
+            length_scales.iter().position(|length_scale| !LENGTH_SCALES.contains(length_scale))
         {
-            Self::new(family, wrong, variance).map_err(of_axis)?;
+            return Err(NumericsError::InvalidLengthScale { axis, requirement: LENGTH_SCALE });
         }
         let shortest = length_scales.iter().copied().reduce(f64::min).ok_or(AXES_MISMATCH)?;
         let kernel = Self::new(family, shortest, variance)?;
@@ -164,12 +165,9 @@ impl Kernel {
         self.axes.is_some()
     }
 
-    /// Points in coordinates in which all axes are alike.
-    pub(crate) fn stretched_cloud(&self, cloud: &Cloud) -> Cloud {
-        match &self.axes {
-            None => cloud.clone(),
-            Some(axes) => cloud.stretched(axes.factors()),
-        }
+    /// Points in coordinates in which all axes are alike; `None` where they are.
+    pub fn stretched_cloud(&self, cloud: &Cloud) -> Option<Cloud> {
+        self.factors().map(|factors| cloud.stretched(factors))
     }
 
     /// Bytes held on the heap.
@@ -192,15 +190,8 @@ impl Kernel {
 /// Their squares and inverse squares are well inside float64.
 const LENGTH_SCALES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
-/// What is wrong with a length scale, said of one of several.
-fn of_axis(error: NumericsError) -> NumericsError {
-    match error {
-        NumericsError::InvalidKernelParameter { parameter: "length_scale", requirement } => {
-            NumericsError::InvalidKernelParameter { parameter: "length_scales", requirement }
-        }
-        other => other,
-    }
-}
+/// What is asked of them.
+const LENGTH_SCALE: &str = "must be positive, between 1e-140 and 1e140";
 
 /// What is wrong with as many length scales as there are.
 const AXES_MISMATCH: NumericsError = NumericsError::InvalidKernelParameter {

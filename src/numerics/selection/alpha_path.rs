@@ -29,7 +29,7 @@ pub(super) const ALPHAS_AT_ONCE: usize = 256;
 /// The noise of the hyperparameters does not count.
 ///
 /// # Errors
-/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite; those of [`Hyperparameters::stretched`];
+/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite; those of [`Hyperparameters::kernel_on`];
 /// [`NumericsError::LengthMismatch`]; [`NumericsError::MeanNotDetermined`]; [`NumericsError::Cancelled`].
 pub fn alpha_path(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
@@ -42,9 +42,9 @@ pub fn alpha_path(
         Regularization::uniform(alpha)?;
     }
     let subject = Subject::of(cloud, values, mean)?;
-    let (cloud, kernel) = at.stretched(cloud)?;
+    let kernel = at.kernel_on(cloud)?;
     let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
-    let spectrum = Spectrum::of(&subject, (&cloud, &kernel), is_restricted, observer)?;
+    let spectrum = Spectrum::of(&subject, (cloud, &kernel), is_restricted, observer)?;
     observer.enter(Stage::Evaluate);
     match criterion {
         Criterion::MarginalLikelihood => spectrum.likelihoods(&subject, alphas, observer),

@@ -17,7 +17,6 @@ use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
-use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::trend::{Trend, solve_gram};
 
 /// What the mean leaves of `W_ii` at least, as a share: less is rounding.
@@ -32,7 +31,6 @@ pub(super) struct Evaluator<'a> {
 
 /// What a factorization says; the evaluator holds the factor.
 pub(super) struct State {
-    cloud: Cloud,
     kernel: Kernel,
     /// Λ, `[n]`.
     weights: Vec<f64>,
@@ -80,14 +78,14 @@ impl<'a> Evaluator<'a> {
     /// The score at some hyperparameters; `None` where the matrix is not positive definite in float64, or the score is not finite.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`]; those of [`Hyperparameters::stretched`].
+    /// [`NumericsError::Cancelled`]; those of [`Hyperparameters::kernel_on`].
     pub(super) fn score(
         &mut self,
         at: &Hyperparameters,
         observer: &dyn Observer,
     ) -> Result<Option<State>, NumericsError> {
-        let (cloud, kernel) = at.stretched(self.subject.cloud)?;
-        if !self.matrices.factorize((&cloud, &kernel), &at.noise, observer)? {
+        let kernel = at.kernel_on(self.subject.cloud)?;
+        if !self.matrices.factorize((self.subject.cloud, &kernel), &at.noise, observer)? {
             return Ok(None);
         }
         observer.checkpoint()?;
@@ -100,7 +98,6 @@ impl<'a> Evaluator<'a> {
         self.matrices.solve_whitened(&mut columns);
         let weights = columns.split_off(p * n);
         let mut state = State {
-            cloud,
             kernel,
             weights,
             of_mean: columns,
@@ -148,7 +145,7 @@ impl<'a> Evaluator<'a> {
             left: &state.weights,
             right: &right,
         };
-        let kernel = (&state.cloud, &state.kernel);
+        let kernel = (self.subject.cloud, &state.kernel);
         let sums = contract(kernel, &weights, space.per_axis(), self.matrices.is_alone, observer)?;
         Ok(space.gradient(at, &sums, weights.trace()))
     }

@@ -5,8 +5,8 @@
 //! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
 //! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
 //!
-//! That is [`learn`], for whoever says nothing. [`select`] searches the best hyperparameters of all values by a [`Criterion`], in n³ flops for every
-//! evaluation; [`alpha_path`] looks at many α for one kernel, and [`leave_one_out`] predicts each value from all others.
+//! That is [`learn`], for whoever says nothing. [`select()`] searches the best hyperparameters of all values by a [`Criterion`], in n³ flops for every
+//! evaluation; [`alpha_path()`] looks at many α for one kernel, and [`leave_one_out()`] predicts each value from all others.
 
 mod alpha_path;
 mod contraction;

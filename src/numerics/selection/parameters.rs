@@ -27,41 +27,18 @@ impl Hyperparameters {
         Self { family: kernel.family(), length_scales, variance: kernel.variance(), noise }
     }
 
-    /// The kernel.
+    /// The kernel on a cloud.
     ///
     /// # Errors
-    /// Those of [`Kernel::new`] and [`Kernel::of_axes`].
-    pub fn kernel(&self) -> Result<Kernel, NumericsError> {
-        match self.length_scales[..] {
+    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::InvalidLengthScale`], also for neither one nor d length scales;
+    /// [`NumericsError::KernelNotPositiveDefinite`].
+    pub fn kernel_on(&self, cloud: &Cloud) -> Result<Kernel, NumericsError> {
+        let kernel = match self.length_scales[..] {
             [length_scale] => Kernel::new(self.family, length_scale, self.variance),
             ref length_scales => Kernel::of_axes(self.family, length_scales, self.variance),
-        }
-    }
-
-    /// The cloud and the kernel that have these covariances: with a length scale for each axis, the cloud in units of them and ℓ = 1.
-    ///
-    /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`]; [`NumericsError::KernelNotPositiveDefinite`]; [`NumericsError::DimensionMismatch`] for neither one
-    /// nor d length scales; [`NumericsError::CoordinateTooLarge`] in units that are too small.
-    pub fn stretched(&self, cloud: &Cloud) -> Result<(Cloud, Kernel), NumericsError> {
-        let d = cloud.dimension();
-        let (stretched, length_scale) = match self.length_scales[..] {
-            [length_scale] => (cloud.clone(), length_scale),
-            ref scales if scales.len() == d => {
-                for &scale in scales {
-                    Kernel::new(self.family, scale, self.variance)?;
-                }
-                let scaled =
-                    cloud.coordinates().iter().zip(scales.iter().cycle()).map(|(x, scale)| x / scale);
-                (Cloud::new(scaled.collect(), d)?, 1.0)
-            }
-            ref scales => {
-                return Err(NumericsError::DimensionMismatch { expected: d, found: scales.len() });
-            }
-        };
-        let kernel = Kernel::new(self.family, length_scale, self.variance)?;
-        kernel.check_dimension(d)?;
-        Ok((stretched, kernel))
+        }?;
+        kernel.check_dimension(cloud.dimension())?;
+        Ok(kernel)
     }
 
     /// α, if every point has the same noise.

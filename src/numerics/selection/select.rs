@@ -67,7 +67,7 @@ pub struct Selected {
 /// The start is moved into the bounds first. What is found is the same for any number of threads but for rounding.
 ///
 /// # Errors
-/// [`NumericsError::InvalidVariation`] with the entry; those of [`Hyperparameters::stretched`]; [`NumericsError::LengthMismatch`] of values or noise;
+/// [`NumericsError::InvalidVariation`] with the entry; those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`] of values or noise;
 /// [`NumericsError::MeanNotDetermined`]; [`NumericsError::NotPositiveDefinite`] if the matrix is that at no start; [`NumericsError::Cancelled`].
 pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
     let Selection { cloud, vary, start, .. } = *selection;
@@ -80,7 +80,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
         let base = Hyperparameters { family, ..start.clone() };
         let space = Space::of(&base, vary, cloud.dimension())?;
         // What cannot be at the start is refused by name, not searched.
-        space.at(&space.start()).stretched(cloud)?;
+        space.at(&space.start()).kernel_on(cloud)?;
         spaces.push(space);
     }
     observer.enter(Stage::Factor);

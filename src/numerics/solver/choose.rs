@@ -322,13 +322,22 @@ pub fn samples_price(n_queries: usize, n_draws: usize) -> Price {
 pub(crate) const JUDGED_AT_ONCE: usize = 64;
 
 /// What judging answers of an operator by so many functionals takes: their weights, and the covariances of another process with all values.
-pub fn judging_price(n_points: usize, n_functionals: usize) -> Price {
+pub fn judging_price((n_points, dimension): (usize, usize), n_queries: usize, n_functionals: usize) -> Price {
     let (n, k) = (n_points as f64, n_functionals as f64);
     let n_blocks = n_functionals.div_ceil(JUDGED_AT_ONCE) as f64;
-    let columns = n_points.saturating_mul(3 * n_functionals.min(JUDGED_AT_ONCE) + QUERIES_PER_BLOCK + 5);
-    let n_bytes =
-        columns.saturating_mul(size_of::<f64>()).saturating_add(n_functionals * BYTES_PER_FUNCTIONAL);
-    Price { n_bytes, flops: n * n * (4.0 * k + 40.0 * n_blocks) }
+    let of_mean = 5 * (dimension + 1);
+    let columns =
+        n_points.saturating_mul(3 * n_functionals.min(JUDGED_AT_ONCE) + QUERIES_PER_BLOCK + of_mean);
+    let numbers = columns.saturating_add(n_queries.saturating_mul(dimension + 3));
+    let judging = Price {
+        n_bytes: numbers
+            .saturating_mul(size_of::<f64>())
+            .saturating_add(n_functionals * BYTES_PER_FUNCTIONAL),
+        flops: n * n * (4.0 * k + 40.0 * n_blocks) + 1000.0 * n_queries as f64,
+    };
+    // The sampling of a cloud of which nobody has asked it.
+    let (n_bytes, flops) = (sampling_bytes(n_points, dimension), sampling_flops(n_points, dimension));
+    judging.and(Price { n_bytes, flops })
 }
 
 /// Bytes of a functional of jets as it waits for its turn.

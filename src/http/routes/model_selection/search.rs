@@ -234,7 +234,7 @@ impl Work {
             let n_free = if variation.parameter == Parameter::LengthScales { cloud.dimension() } else { 1 };
             gradient[*at] = Some(slopes.by_ref().take(n_free).sum());
         }
-        let kernel = selected.hyperparameters.kernel().map_err(refused)?;
+        let kernel = selected.hyperparameters.kernel_on(cloud).map_err(refused)?;
         let noise = &selected.hyperparameters.noise;
         Ok(ModelSelectionResponse {
             kernel: KernelUsed::from(&kernel),
@@ -283,7 +283,7 @@ fn path(
         return Ok(Vec::new());
     }
     let Selection { cloud, values, mean, criterion, .. } = *selection;
-    let (_, kernel) = at.stretched(cloud)?;
+    let kernel = at.kernel_on(cloud)?;
     let alphas = default_alphas(cloud.n_points(), &kernel, N_ALPHAS);
     let scores = alpha_path((cloud, values, mean), at, &alphas, criterion, observer)?;
     let entry = |(&alpha, score): (&f64, f64)| PathEntry {

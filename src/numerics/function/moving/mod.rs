@@ -85,10 +85,9 @@ pub struct MovingAnswer {
 impl Moving {
     /// Of a system and how its cloud is sampled.
     pub fn new(system: System, sampling: Arc<Sampling>) -> Self {
-        let near = match system.kernel().is_stretched() {
-            false => Near::Sampled(sampling),
-            true => {
-                let cloud = system.kernel().stretched_cloud(system.cloud());
+        let near = match system.kernel().stretched_cloud(system.cloud()) {
+            None => Near::Sampled(sampling),
+            Some(cloud) => {
                 let neighbours = Neighbours::of(&cloud);
                 Near::Stretched(cloud, neighbours)
             }

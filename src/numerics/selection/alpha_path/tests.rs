@@ -23,7 +23,7 @@ fn every_alpha_has_the_score_that_it_has_alone() {
     let random = &mut Random(31);
     let cloud = Cloud::new((0..2 * 70).map(|_| random.uniform()).collect(), 2).unwrap();
     let values: Vec<f64> = cloud.points().map(|x| 5.0 + (4.0 * x[0]).sin() + 0.1 * random.normal()).collect();
-    let (_, kernel) = at(0.0).stretched(&cloud).unwrap();
+    let kernel = at(0.0).kernel_on(&cloud).unwrap();
     // More than are looked at together.
     let alphas = default_alphas(70, &kernel, 300);
     for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {

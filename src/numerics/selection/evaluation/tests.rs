@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::*;
 use crate::numerics::kernel::Family;
 use crate::numerics::observer::Unobserved;
+use crate::numerics::points::cloud::Cloud;
 use crate::numerics::selection::parameters::{Parameter, Variation};
 use crate::numerics::solver::trend::Mean;
 use crate::numerics::solver::{Solution, Solver, System};
@@ -111,8 +112,8 @@ fn slopes_of_many_points_and_of_one_axis_agree_with_differences() {
 
 /// A system that was factorized by the solver.
 fn solved(cloud: &Cloud, values: &[f64], mean: Mean, at: &Hyperparameters) -> (Solver, Solution) {
-    let (cloud, kernel) = at.stretched(cloud).unwrap();
-    let system = System::new(Arc::new(cloud), kernel, at.noise.clone()).unwrap();
+    let kernel = at.kernel_on(cloud).unwrap();
+    let system = System::new(Arc::new(cloud.clone()), kernel, at.noise.clone()).unwrap();
     let solver = Solver::dense(system, &Unobserved).unwrap();
     let solution = Solution::with_mean(&solver, values, mean, &Unobserved).unwrap();
     (solver, solution)

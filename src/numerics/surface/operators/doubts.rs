@@ -4,6 +4,8 @@
 //! values want: too wide for what they show, with less noise than they have, or about 0 where they have an offset. There, errors are those of the answers
 //! that are served if the values come from the process that would have been learned.
 
+use rayon::prelude::*;
+
 use super::super::geometry::Geometry;
 use super::deviations::Applied;
 use super::{Operator, regular};
@@ -15,9 +17,10 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::neighbours::Neighbours;
+use crate::numerics::points::neighbours::{Neighbour, Neighbours};
 use crate::numerics::points::thinning::thinned_points;
 use crate::numerics::selection::Learned;
+use crate::numerics::sums::regularization::Regularization;
 
 /// Functionals whose errors are found: what they take is little beside a factorization of as many points as need them.
 pub const JUDGED_FUNCTIONALS: usize = 256;
@@ -75,7 +78,9 @@ impl Judged<'_> {
         let operator = if k == 1 { Operator::LaplaceBeltrami } else { Operator::SurfaceGradient };
         let some: Vec<usize> = regular(self.geometry).take(JUDGED_FUNCTIONALS / k).collect();
         let most = self.most(regular(self.geometry).map(of), &self.functionals(operator, &some))?;
-        Ok(regular(self.geometry).map(of).filter(|(_, d)| *d > most).map(|(query, _)| query).collect())
+        // Also where there is no number.
+        let is_sure = |(_, deviation): &(usize, f64)| *deviation <= most;
+        Ok(regular(self.geometry).map(of).filter(|of| !is_sure(of)).map(|(query, _)| query).collect())
     }
 
     fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
@@ -94,12 +99,20 @@ impl Judged<'_> {
         let most = self.most(judged.into_iter().zip(errors.iter().copied()), &functionals)?;
         let coarse = places.select(&chosen);
         let near = Neighbours::of(&coarse);
-        let is_doubtful = |at: usize| {
-            let around = near.nearest(&coarse, places.point(at), AROUND);
-            let count = if around[0].squared_distance == 0.0 { 1 } else { AROUND };
-            around.iter().take(count).any(|n| errors[n.point] > most)
+        let is_doubtful = |found: &mut Vec<Neighbour>, at: usize| {
+            observer.checkpoint()?;
+            near.nearest_into(&coarse, places.point(at), AROUND, found);
+            let count = if found[0].squared_distance == 0.0 { 1 } else { found.len() };
+            Ok(!found[..count].iter().all(|n| errors[n.point] <= most))
         };
-        Ok((0..regular.len()).filter(|&at| is_doubtful(at)).map(|at| regular[at]).collect())
+        let doubtful: Vec<bool> =
+            (0..regular.len()).into_par_iter().map_init(Vec::new, is_doubtful).collect::<Result<_, _>>()?;
+        Ok(regular
+            .into_iter()
+            .zip(doubtful)
+            .filter(|(_, is_doubtful)| *is_doubtful)
+            .map(|(query, _)| query)
+            .collect())
     }
 
     fn functionals(&self, operator: Operator, judged: &[usize]) -> Vec<JetFunctional> {
@@ -108,15 +121,19 @@ impl Judged<'_> {
         judged.iter().flat_map(|&query| applied.functionals(operator, query)).collect()
     }
 
-    /// The kernel of the process that the values come from.
-    fn kernel(&self) -> Result<Kernel, NumericsError> {
-        match self.learned {
-            Some(learned) => Kernel::new(learned.family, learned.length_scale, learned.variance),
-            None => {
-                let kernel = self.interpolant.solver.kernel();
-                kernel.with_variance(kernel.variance() * self.factor)
+    /// The kernel of the process that the values come from, and by how much it is scaled. What is learned beside a kernel that stretches coordinates
+    /// is learned in those.
+    fn process(&self) -> Result<(Kernel, f64), NumericsError> {
+        let own = self.interpolant.solver.kernel();
+        let Some(learned) = self.learned else { return Ok((own.clone(), self.factor)) };
+        let kernel = match own.length_scales() {
+            None => Kernel::new(learned.family, learned.length_scale, 1.0)?,
+            Some(axes) => {
+                let scaled = axes.iter().map(|axis| axis / own.length_scale() * learned.length_scale);
+                Kernel::of_axes(learned.family, &scaled.collect::<Vec<f64>>(), 1.0)?
             }
-        }
+        };
+        Ok((kernel, learned.variance))
     }
 
     fn errors(
@@ -124,18 +141,21 @@ impl Judged<'_> {
         functionals: &[JetFunctional],
         observer: &dyn Observer,
     ) -> Result<Vec<f64>, NumericsError> {
-        let Self { interpolant, factor, queries, .. } = *self;
+        let (interpolant, queries) = (self.interpolant, self.queries);
         let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
-        if let Some(learned) = self.learned {
-            let Learned { ratio, variance, ref trend, .. } = *learned;
-            let process = Process { kernel: &self.kernel()?, noise: ratio * variance, trend: trend.as_ref() };
+        let (kernel, factor) = (&self.process()?.0, self.process()?.1);
+        if let Some(Learned { ratio, trend, .. }) = self.learned {
+            let process = Process { kernel, noise: *ratio, factor, trend: trend.as_ref() };
             return errors_under(&process, interpolant, queries, functionals, observer);
         }
         match deviations((solver, solution, factor), queries, functionals, observer) {
             // The fallback has no variances, but it has weights.
             Err(NumericsError::NotPositiveDefinite { .. }) => {
-                let noise = factor * solver.regularization().at(0);
-                let process = Process { kernel: &self.kernel()?, noise, trend: solution.trend.as_ref() };
+                let noise = match solver.regularization() {
+                    Regularization::Uniform(alpha) => *alpha,
+                    Regularization::PerPoint(_) => 0.0,
+                };
+                let process = Process { kernel, noise, factor, trend: solution.trend.as_ref() };
                 errors_under(&process, interpolant, queries, functionals, observer)
             }
             found => found,
@@ -156,14 +176,16 @@ impl Judged<'_> {
         deviations: impl Iterator<Item = (usize, f64)>,
         functionals: &[JetFunctional],
     ) -> Result<f64, NumericsError> {
-        let (k, kernel) = (self.n_components(), self.kernel()?);
-        let beforehand: f64 = functionals.iter().map(|functional| functional.prior_variance(&kernel)).sum();
-        let beforehand = (beforehand * k as f64 / functionals.len().max(1) as f64, 0.0);
-        let squared = |(query, deviation): (usize, f64)| {
-            (norm(&self.found[query * k..][..k]).powi(2), deviation * deviation)
-        };
-        let squares = deviations.map(squared).chain([beforehand; N_BEFOREHAND]);
-        Ok(UNCERTAIN * spread_beside_errors(&squares.collect::<Vec<_>>()).sqrt())
+        let (k, (kernel, factor)) = (self.n_components(), self.process()?);
+        let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(&kernel)).sum();
+        let beforehand = (prior * k as f64 / functionals.len().max(1) as f64).sqrt() * factor.sqrt();
+        let lengths = deviations.map(|(query, error)| (norm(&self.found[query * k..][..k]), error));
+        let lengths: Vec<(f64, f64)> = lengths.chain([(beforehand, 0.0); N_BEFOREHAND]).collect();
+        // In units of the greatest, whose square may have no number. Without one nothing is sure.
+        let unit = lengths.iter().map(|(found, _)| *found).fold(0.0, f64::max);
+        let squared = |&(found, error): &(f64, f64)| ((found / unit).powi(2), (error / unit).powi(2));
+        let squares: Vec<(f64, f64)> = lengths.iter().map(squared).collect();
+        Ok(UNCERTAIN * unit * spread_beside_errors(&squares).sqrt())
     }
 }
 
