@@ -8,6 +8,7 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
+use super::doubts::degenerate;
 use super::surfaces::{
     Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
 };
@@ -193,30 +194,18 @@ impl Operation for LaplaceBeltramiRequest {
         let m = geometry.n_queries();
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
-        let mut degenerate = surface.degenerate();
-        let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let learned = fits.learned_beside(&work.values, observer);
         let interpolant = &interpolant;
+        let deviations = || laplace_beltrami_deviations(geometry, interpolant, factor, queries, observer);
+        let deviations = work.request.has_deviations.then(deviations).transpose();
+        let deviations = deviations.map_err(|error| fits.main.refused(error))?;
         let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
-        let mut of_values = None;
-        if work.request.has_deviations {
-            let found = laplace_beltrami_deviations(geometry, interpolant, factor, queries, observer)
-                .map_err(refused)?;
-            let uncertain = judged.by_deviations(&found);
-            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
-            of_values = Some(surface.known_per_query(found, &[m]));
-        }
-        // Deviations of a kernel that was learned say all of it.
-        if !matches!(learned, Ok(None)) || !work.request.has_deviations {
-            let uncertain = learned.and_then(|learned| {
-                Judged { learned: learned.as_ref(), ..judged }.laplace_beltrami(observer)
-            });
-            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
-        }
+        let judge = |judged: Judged<'_>| judged.laplace_beltrami(observer);
+        let of = (fits, &surface);
+        let degenerate = degenerate(of, &work.values, judged, deviations.as_deref(), judge, observer)?;
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
-            value_deviations: of_values,
+            value_deviations: deviations.map(|found| surface.known_per_query(found, &[m])),
             degenerate,
             diagnostics,
         })

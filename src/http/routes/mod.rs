@@ -2,6 +2,7 @@
 
 pub mod clouds;
 pub mod curvatures;
+mod doubts;
 pub mod interpolation;
 pub mod kernels;
 pub mod laplace_beltrami;

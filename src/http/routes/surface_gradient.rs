@@ -6,6 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
+use super::doubts::degenerate;
 use super::surfaces::{
     Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
 };
@@ -181,30 +182,18 @@ impl Operation for SurfaceGradientRequest {
         let (m, d) = (geometry.n_queries(), geometry.dimension());
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
-        let mut degenerate = surface.degenerate();
-        let refused = |error| fits.main.refused(error);
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
-        let learned = fits.learned_beside(&work.values, observer);
         let interpolant = &interpolant;
+        let deviations = || surface_gradient_deviations(geometry, interpolant, factor, queries, observer);
+        let deviations = work.request.has_deviations.then(deviations).transpose();
+        let deviations = deviations.map_err(|error| fits.main.refused(error))?;
         let judged = Judged { geometry, interpolant, factor, queries, found: &gradients, learned: None };
-        let mut of_gradients = None;
-        if work.request.has_deviations {
-            let found = surface_gradient_deviations(geometry, interpolant, factor, queries, observer)
-                .map_err(refused)?;
-            let uncertain = judged.by_deviations(&found);
-            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
-            of_gradients = Some(surface.known_per_query(found, &[m, d]));
-        }
-        // Deviations of a kernel that was learned say all of it.
-        if !matches!(learned, Ok(None)) || !work.request.has_deviations {
-            let uncertain = learned.and_then(|learned| {
-                Judged { learned: learned.as_ref(), ..judged }.surface_gradient(observer)
-            });
-            surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
-        }
+        let judge = |judged: Judged<'_>| judged.surface_gradient(observer);
+        let of = (fits, &surface);
+        let degenerate = degenerate(of, &work.values, judged, deviations.as_deref(), judge, observer)?;
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
-            gradient_deviations: of_gradients,
+            gradient_deviations: deviations.map(|found| surface.known_per_query(found, &[m, d])),
             degenerate,
             diagnostics,
         })
