@@ -52,7 +52,7 @@ pub(super) struct Found {
 /// definite at the start.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`]; those of [`Hyperparameters::stretched`].
+/// [`NumericsError::Cancelled`]; those of [`Hyperparameters::kernel_on`].
 pub(super) fn descend(
     evaluator: &mut Evaluator<'_>,
     space: &Space,

@@ -80,7 +80,7 @@ pub fn leave_one_out(
 /// The predictions under hyperparameters, from a factorization of its own; 2n³/3 flops.
 ///
 /// # Errors
-/// Those of [`leave_one_out`] and [`Hyperparameters::stretched`].
+/// Those of [`leave_one_out`] and [`Hyperparameters::kernel_on`].
 pub fn leave_one_out_with(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
     at: &Hyperparameters,
