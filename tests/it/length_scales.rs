@@ -103,7 +103,7 @@ async fn every_route_takes_them_and_repeats_what_it_took() {
                 json!({"family": "gauss", "length_scales": [1, 0, 1]}),
                 422,
                 "invalid-request",
-                "/kernel/length_scales",
+                "/kernel/length_scales/1",
             ),
             (
                 json!({"family": "gauss", "length_scale": 1, "length_scales": [1, 1, 1]}),

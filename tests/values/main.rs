@@ -106,7 +106,7 @@ fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
                 "noise {noise}: {all:?}"
             );
         }
-        // Flags that are always up say nothing: without noise half of all is served without one.
-        assert!(noise > 0.0 || all.n_unflagged[1] * 3 > all.n[1], "{all:?}");
+        // Flags that are always up say nothing: without noise a quarter of all is served without one, though a torus of 250 points has none.
+        assert!(noise > 0.0 || all.n_unflagged[1] * 5 > all.n[1], "{all:?}");
     }
 }

@@ -898,12 +898,12 @@ is refused.*/
         pub differentiable_at_points: ::std::string::String,
         ///The name in a kernel object.
         pub family: KernelFamily,
-        ///φ as a function of r = |x − y|/length_scale; the kernel is variance · φ.
+        ///φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel is variance · φ.
         pub formula: ::std::string::String,
         ///The greatest dimension in which it is positive definite; absent if every one.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub max_dimension: ::std::option::Option<u64>,
-        ///Parameters beside `length_scale` and `variance`.
+        ///Parameters beside `length_scale`, or `length_scales`, and `variance`.
         pub parameters: ::std::vec::Vec<KernelParameter>,
         ///How smooth functions fitted with it are.
         pub smoothness: ::std::string::String,

@@ -31,6 +31,9 @@ const AROUND: usize = 4;
 /// Deviations beyond this share of the root mean square of what there is leave little of it: an error of half of that is two and a half of them.
 const UNCERTAIN: f64 = 0.2;
 
+/// Where fewer than this share of the answers seem sure, the rest are those whose errors were taken for too small.
+const BELIEVED: f64 = 0.1;
+
 /// Halvings of an interval of 52 binary digits: to three digits.
 const STEPS: usize = 16;
 
@@ -107,12 +110,10 @@ impl Judged<'_> {
         };
         let doubtful: Vec<bool> =
             (0..regular.len()).into_par_iter().map_init(Vec::new, is_doubtful).collect::<Result<_, _>>()?;
-        Ok(regular
-            .into_iter()
-            .zip(doubtful)
-            .filter(|(_, is_doubtful)| *is_doubtful)
-            .map(|(query, _)| query)
-            .collect())
+        let n_sure = doubtful.iter().filter(|is_doubtful| !**is_doubtful).count();
+        let is_believed = n_sure as f64 >= BELIEVED * regular.len() as f64;
+        let is_left = |&(_, is_doubtful): &(usize, bool)| is_doubtful || !is_believed;
+        Ok(regular.into_iter().zip(doubtful).filter(is_left).map(|(query, _)| query).collect())
     }
 
     fn functionals(&self, operator: Operator, judged: &[usize]) -> Vec<JetFunctional> {
@@ -185,7 +186,8 @@ impl Judged<'_> {
         let unit = lengths.iter().map(|(found, _)| *found).fold(0.0, f64::max);
         let squared = |&(found, error): &(f64, f64)| ((found / unit).powi(2), (error / unit).powi(2));
         let squares: Vec<(f64, f64)> = lengths.iter().map(squared).collect();
-        Ok(UNCERTAIN * unit * spread_beside_errors(&squares).sqrt())
+        // Errors that the process does not expect would count as what there is: it is no more than what the process has beforehand.
+        Ok(UNCERTAIN * (unit * spread_beside_errors(&squares).sqrt()).min(beforehand))
     }
 }
 

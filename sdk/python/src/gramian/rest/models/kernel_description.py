@@ -22,9 +22,10 @@ class KernelDescription:
 
     Attributes:
         family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-        formula (str): φ as a function of r = |x − y|/length_scale; the kernel is variance · φ.
+        formula (str): φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel
+            is variance · φ.
         smoothness (str): How smooth functions fitted with it are.
-        parameters (list[KernelParameter]): Parameters beside `length_scale` and `variance`.
+        parameters (list[KernelParameter]): Parameters beside `length_scale`, or `length_scales`, and `variance`.
         differentiable_at_points (str): Whether it has derivatives at the points of the cloud, as geometry and operators
             need there.
         max_dimension (int | Unset): The greatest dimension in which it is positive definite; absent if every one.
