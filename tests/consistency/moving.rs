@@ -46,7 +46,7 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         let dense = dense.at(&queries, JetOrder::Gradient, &Unobserved).unwrap();
         let deviations: Vec<f64> =
             variances(&solver, &queries, &Unobserved).unwrap().latent.iter().map(|v| v.sqrt()).collect();
-        let request = MovingRequest { order: JetOrder::Gradient, has_variances: true };
+        let request = MovingRequest { order: JetOrder::Gradient, has_variances: true, has_deviations: false };
         let found =
             Moving::new(system(), sampling.clone()).at(&values, &queries, request, &Unobserved).unwrap();
         let m = queries.n_points();

@@ -163,14 +163,27 @@ async fn interpolants_have_deviations_of_all_that_is_asked_for() {
         assert!((a - b).abs() < 1e-9);
     }
     assert!(local.get("gradient_deviations").is_none());
-
     body["solver"] = json!("local");
-    let refused = server.post("/v1/interpolation", &body).await.expect_problem(422, "unsupported-by-solver");
-    assert_eq!(refused["errors"][0]["pointer"], "/include");
-    body["solver"] = json!("dense");
-    body["kernel"] = json!({"family": "matern", "nu": 1.5, "length_scale": 1.0});
-    let refused = server.post("/v1/interpolation", &body).await.expect_problem(422, "kernel-not-smooth");
-    assert_eq!(refused["errors"][0]["pointer"], "/kernel/family");
+    let local = server.post("/v1/interpolation", &body).await.expect_ok();
+    for name in ["value_deviations", "gradient_deviations", "hessian_deviations"] {
+        for (a, b) in numbers(&local[name]).iter().zip(numbers(&answer[name])) {
+            assert!((a - b).abs() < 1e-6 * b, "{name}: {a} and {b}");
+        }
+    }
+    asked["include"] = json!(["gradient_variances"]);
+    let posterior = server.post("/v1/posterior", &asked).await.expect_ok();
+    assert!(posterior.get("gradients").is_none() && posterior.get("variances").is_none());
+    let variances = numbers(&posterior["gradient_variances"]);
+    assert!(!variances.is_empty());
+    for (variance, deviation) in variances.iter().zip(numbers(&local["gradient_deviations"])) {
+        assert!((variance - deviation * deviation).abs() < 1e-12 * variance);
+    }
+    for solver in ["dense", "local"] {
+        body["solver"] = json!(solver);
+        body["kernel"] = json!({"family": "matern", "nu": 1.5, "length_scale": 1.0});
+        let refused = server.post("/v1/interpolation", &body).await.expect_problem(422, "kernel-not-smooth");
+        assert_eq!(refused["errors"][0]["pointer"], "/kernel/family");
+    }
 }
 
 #[tokio::test]

@@ -77,15 +77,20 @@ fn functions_and_their_error_bars_are_those_of_the_stretched_cloud() {
                 assert!(!u.solver.kernel().has_second_derivatives(), "{family:?}");
                 continue;
             };
-            let first = |at: usize| FACTORS[at % 3];
-            let gradients: Vec<f64> = b.gradients.iter().enumerate().map(|(at, g)| g * first(at)).collect();
-            let second = |at: usize| FACTORS[at / 3 % 3] * FACTORS[at % 3];
-            let hessians: Vec<f64> = b.hessians.iter().enumerate().map(|(at, h)| h * second(at)).collect();
-            are_equal(&a.values, &b.values, family, "deviations");
-            are_equal(&a.gradients, &gradients, family, "deviations of gradients");
-            are_equal(&a.hessians, &hessians, family, "deviations of Hessians");
+            have_equal_deviations(&a, &b, family);
         }
     }
+}
+
+/// Of derivatives in coordinates and in stretched ones.
+fn have_equal_deviations(a: &JetDeviations, b: &JetDeviations, family: Family) {
+    let first = |at: usize| FACTORS[at % 3];
+    let gradients: Vec<f64> = b.gradients.iter().enumerate().map(|(at, g)| g * first(at)).collect();
+    let second = |at: usize| FACTORS[at / 3 % 3] * FACTORS[at % 3];
+    let hessians: Vec<f64> = b.hessians.iter().enumerate().map(|(at, h)| h * second(at)).collect();
+    are_equal(&a.values, &b.values, family, "deviations");
+    are_equal(&a.gradients, &gradients, family, "deviations of gradients");
+    are_equal(&a.hessians, &hessians, family, "deviations of Hessians");
 }
 
 #[test]
@@ -94,8 +99,9 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
     let (cloud, queries) = (random_cube(2000, 3, random), random_cube(9, 3, random));
     let [far_cloud, far_queries] = [&cloud, &queries].map(|points| stretched(points, &FACTORS));
     let values = waves(&cloud);
-    let request = MovingRequest { order: JetOrder::Hessian, has_variances: true };
     for family in families_without_kink() {
+        let has_deviations = of_one(family).has_second_derivatives();
+        let request = MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations };
         let at = |kernel: Kernel, cloud: &Cloud, queries: &Cloud| {
             let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
             let system = System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-3)).unwrap();
@@ -107,6 +113,9 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
         are_equal(&a.jets.values(), &b.jets.values(), family, "values");
         are_equal(&a.jets.gradients(), &gradients, family, "gradients");
         are_equal(&a.jets.hessians(), &hessians, family, "Hessians");
+        if let [Some(a), Some(b)] = [&a.deviations, &b.deviations] {
+            have_equal_deviations(a, b, family);
+        }
         let [a, b] = [a, b].map(|answer| answer.variances.unwrap().latent);
         are_equal(&a, &b, family, "variances");
     }

@@ -8,6 +8,7 @@ use crate::http::fields::Diagnostics;
 use crate::http::problem::Problem;
 use crate::http::wire::write::array::Array;
 use crate::numerics::function::batch::{Batch, BatchJets};
+use crate::numerics::function::deviations::JetDeviations;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::function::moving::{Moving, MovingRequest};
 use crate::numerics::function::posterior::{Variances, variances_with_mean};
@@ -20,6 +21,8 @@ pub struct ValuesAt {
     pub jets: Jets,
     /// If asked for.
     pub variances: Option<Variances>,
+    /// If asked for.
+    pub deviations: Option<JetDeviations>,
     pub diagnostics: Diagnostics,
     /// The function, where there is one for all queries.
     pub interpolant: Option<Interpolant>,
@@ -30,6 +33,8 @@ pub struct EachAt {
     pub jets: BatchJets,
     /// If asked for.
     pub variances: Option<Variances>,
+    /// If asked for.
+    pub deviations: Option<JetDeviations>,
     pub diagnostics: Diagnostics,
     pub batch: Batch,
 }
@@ -53,6 +58,8 @@ pub struct ValuesRequest<'a> {
     pub queries: &'a Cloud,
     pub order: JetOrder,
     pub has_variances: bool,
+    /// Deviations of value and derivatives, up to the order.
+    pub has_deviations: bool,
 }
 
 impl Fits {
@@ -90,11 +97,13 @@ impl Fits {
                 Some(found.map_err(refused)?.scaled(self.main.plan.scale))
             }
         };
+        let any = batch.interpolants().next().ok_or_else(Problem::internal)?;
+        let deviations = self.deviations(&any, asked, observer)?;
         let mut diagnostics = self.main.diagnostics(worst, asked.queries.n_points())?;
         // Each list has its own.
         (diagnostics.native_norm_squared, diagnostics.misfit) = (None, None);
         diagnostics.mean_coefficients = None;
-        Ok(EachAt { jets, variances, diagnostics, batch })
+        Ok(EachAt { jets, variances, deviations, diagnostics, batch })
     }
 
     fn around_queries(
@@ -103,7 +112,8 @@ impl Fits {
         asked: ValuesRequest<'_>,
         observer: &JobObserver,
     ) -> Result<ValuesAt, Problem> {
-        let request = MovingRequest { order: asked.order, has_variances: asked.has_variances };
+        let ValuesRequest { order, has_variances, has_deviations, .. } = asked;
+        let request = MovingRequest { order, has_variances, has_deviations };
         let plan = &self.main.plan;
         let values = self.main.merged(asked.values);
         let rest = match &plan.trend {
@@ -117,7 +127,8 @@ impl Fits {
         }
         let diagnostics = self.main.moving_diagnostics(&found, moving.n_neighbours())?;
         let variances = found.variances.map(|variances| variances.scaled(plan.scale));
-        Ok(ValuesAt { jets: found.jets, variances, diagnostics, interpolant: None })
+        let deviations = found.deviations.map(|deviations| deviations.scaled(plan.scale));
+        Ok(ValuesAt { jets: found.jets, variances, deviations, diagnostics, interpolant: None })
     }
 
     fn of_one_function(&self, asked: ValuesRequest<'_>, observer: &JobObserver) -> Result<ValuesAt, Problem> {
@@ -132,7 +143,23 @@ impl Fits {
                 Some(found.map_err(refused)?.scaled(self.main.plan.scale))
             }
         };
+        let deviations = self.deviations(&interpolant, asked, observer)?;
         let diagnostics = self.main.diagnostics(&interpolant.solution, jets.n_queries())?;
-        Ok(ValuesAt { jets, variances, diagnostics, interpolant: Some(interpolant) })
+        Ok(ValuesAt { jets, variances, deviations, diagnostics, interpolant: Some(interpolant) })
+    }
+
+    /// Of a function and its derivatives, if they are asked for; all functions on a cloud have the same.
+    fn deviations(
+        &self,
+        function: &Interpolant,
+        asked: ValuesRequest<'_>,
+        observer: &JobObserver,
+    ) -> Result<Option<JetDeviations>, Problem> {
+        if !asked.has_deviations {
+            return Ok(None);
+        }
+        let (scale, order) = (self.main.plan.scale, asked.order.degree());
+        let found = JetDeviations::of(function, scale, asked.queries, order, observer);
+        found.map(Some).map_err(|error| self.main.refused(error))
     }
 }

@@ -2,7 +2,6 @@
 
 use super::functionals::{JetFunctional, deviations, has_variance};
 use super::interpolant::Interpolant;
-use super::posterior::Variances;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
@@ -19,12 +18,6 @@ pub struct JetDeviations {
 }
 
 impl JetDeviations {
-    /// Of values alone, whose variances are known.
-    pub fn of_values(variances: &Variances) -> Self {
-        let values = variances.latent.iter().map(|variance| variance.sqrt()).collect();
-        Self { values, gradients: Vec::new(), hessians: Vec::new() }
-    }
-
     /// Up to the derivatives of an order, 0 to 2; kernel and noise are `factor` times those of the solver.
     ///
     /// # Errors
@@ -44,8 +37,13 @@ impl JetDeviations {
         }
         let (m, d) = (queries.n_points(), queries.dimension());
         let found = deviations((solver, solution, factor), queries, &functionals(m, d, order), observer)?;
-        let width = found.len() / m;
-        let mut of = Self { values: Vec::with_capacity(m), gradients: Vec::new(), hessians: Vec::new() };
+        Ok(Self::of_packed(&found, d, order))
+    }
+
+    /// From value, derivatives and upper triangle of the Hessian, query by query, as far as the order goes.
+    pub(super) fn of_packed(found: &[f64], d: usize, order: usize) -> Self {
+        let width = [1, 1 + d, 1 + d + d * (d + 1) / 2][order.min(2)];
+        let mut of = Self { values: Vec::new(), gradients: Vec::new(), hessians: Vec::new() };
         for jet in found.chunks_exact(width) {
             let (value, rest) = jet.split_at(1);
             of.values.extend(value);
@@ -55,7 +53,17 @@ impl JetDeviations {
                 of.hessians.extend((0..d * d).map(|at| hessian[upper(at / d, at % d, d)]));
             }
         }
-        Ok(of)
+        of
+    }
+
+    /// For a kernel and noise that are `factor` times as great.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        let root = factor.sqrt();
+        for list in [&mut self.values, &mut self.gradients, &mut self.hessians] {
+            list.iter_mut().for_each(|deviation| *deviation *= root);
+        }
+        self
     }
 }
 

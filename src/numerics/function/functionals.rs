@@ -82,6 +82,10 @@ impl JetFunctional {
         functions
     }
 
+    fn has_derivatives(&self) -> bool {
+        self.has_hessian() || self.of_gradient.iter().any(|g| *g != 0.0)
+    }
+
     fn has_hessian(&self) -> bool {
         !self.of_hessian.is_empty()
     }
@@ -135,7 +139,9 @@ pub(crate) fn deviations(
 ) -> Result<Vec<f64>, NumericsError> {
     let (n, kernel) = (solver.n_points(), solver.kernel());
     solver.cloud().check_same_dimension(queries)?;
-    check_smooth_at(solver.cloud(), kernel, queries)?;
+    if functionals.iter().any(JetFunctional::has_derivatives) {
+        check_smooth_at(solver.cloud(), kernel, queries)?;
+    }
     let covariances = Covariant::of(solver.cloud(), kernel);
     let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
     let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];

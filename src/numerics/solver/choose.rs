@@ -146,8 +146,8 @@ const KRIGED_AT_ONCE: usize = 8;
 const MAX_KRIGING_THREADS: usize = 64;
 
 /// Numbers in the room of a thread: a triangle for each query, and some rows.
-fn numbers_to_krige(dimension: usize) -> usize {
-    KRIGED_AT_ONCE * NEIGHBOURS * (NEIGHBOURS / 2 + 12 + dimension)
+fn numbers_to_krige(dimension: usize, n_deviations: usize) -> usize {
+    KRIGED_AT_ONCE * NEIGHBOURS * (NEIGHBOURS / 2 + 12 + dimension + n_deviations)
 }
 
 /// The sums at the points, two searches and a quadric at each. Jets, normals and quadrics are kept; while they are made, half as
@@ -222,8 +222,8 @@ pub enum Asked {
     Function,
     /// The same as a Gaussian process.
     Posterior { variances: bool, covariance: bool },
-    /// Values, derivatives and variances from the points nearest to each query.
-    Moving,
+    /// Values, derivatives and variances from the points nearest to each query, and so many deviations at each.
+    Moving { n_deviations: usize },
     /// Normals or curvatures.
     Geometry { offsets: Offsets },
     /// Normals and curvatures by local regressions.
@@ -256,13 +256,16 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
             let n_numbers = whitened.saturating_add(numbers_at_point(dimension)).saturating_mul(n_points);
             (flops, n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)))
         }
-        Asked::Moving => {
+        Asked::Moving { n_deviations } => {
             let n_threads = n_queries.div_ceil(KRIGED_AT_ONCE).min(MAX_KRIGING_THREADS);
-            let rooms = n_threads * numbers_to_krige(dimension);
+            let rooms = n_threads * numbers_to_krige(dimension, n_deviations);
             // Searches in many dimensions visit most of the cloud.
             let visited = n.min(5.0 * NEIGHBOURS as f64 * 2f64.powi(dimension.min(60) as i32));
-            let flops = m * (FLOPS_PER_KRIGING + visited * (3.0 * d + 10.0));
-            (flops, rooms.saturating_add(n_points).saturating_add(jets).saturating_add(2 * n_queries))
+            let substituted = 2.0 * n_deviations as f64 * (NEIGHBOURS as f64).powi(2);
+            let flops = m * (FLOPS_PER_KRIGING + substituted + visited * (3.0 * d + 10.0));
+            // What is found, and once more as it is answered.
+            let at_queries = n_queries.saturating_mul(2 + 3 * n_deviations);
+            (flops, rooms.saturating_add(n_points).saturating_add(jets).saturating_add(at_queries))
         }
         Asked::Geometry { offsets } => {
             let flops = 60.0 * n * (n + m) + 30.0 * m * d.powi(3) + offsets.flops(n_queries);
@@ -396,7 +399,8 @@ mod tests {
                 Asked::Posterior { variances: false, covariance: false },
                 Asked::Posterior { variances: true, covariance: false },
                 Asked::Posterior { variances: true, covariance: true },
-                Asked::Moving,
+                Asked::Moving { n_deviations: 0 },
+                Asked::Moving { n_deviations: 10 },
                 Asked::Geometry { offsets: Offsets::Rescues },
                 Asked::Geometry { offsets: Offsets::Confirmations },
                 Asked::Geometry { offsets: Offsets::Everywhere },

@@ -6,7 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::{Work, arrays, checked_order, has_deviations, numbers_per_query, order_of, price_of_deviations};
+use super::{Work, arrays, checked_order, has_deviations, numbers_per_query, price_of_deviations};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -16,12 +16,11 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
-use crate::http::serve::values::{EachAt, ValuesRequest};
+use crate::http::serve::values::EachAt;
 use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::function::deviations::JetDeviations;
 use crate::numerics::solver::choose::{Asked, many_price, work_price};
 use crate::store::Owner;
 
@@ -133,23 +132,9 @@ impl Operation for InterpolationBatchRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<InterpolationBatchResponse, Problem> {
-        let Work { values, queries, derivatives, has_deviations } = work;
-        let asked = ValuesRequest {
-            values: &values,
-            queries: &queries,
-            order: order_of(derivatives),
-            has_variances: false,
-        };
-        let EachAt { jets, diagnostics, batch, .. } = fits.each_at(asked, observer)?;
+        let EachAt { jets, diagnostics, deviations, batch, .. } = fits.each_at(work.asked(), observer)?;
+        let Work { queries, derivatives, .. } = work;
         let (k, m, d) = (batch.solutions.len(), queries.n_points(), queries.dimension());
-        let deviations = match batch.interpolants().next().filter(|_| has_deviations) {
-            None => None,
-            Some(any) => {
-                let (scale, order) = (fits.main.plan.scale, usize::from(derivatives));
-                let found = JetDeviations::of(&any, scale, &queries, order, observer);
-                Some(found.map_err(|error| fits.main.refused(error))?)
-            }
-        };
         let [value_deviations, gradient_deviations, hessian_deviations] =
             arrays(deviations, (m, d), derivatives);
         Ok(InterpolationBatchResponse {

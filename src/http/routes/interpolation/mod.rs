@@ -16,7 +16,7 @@ use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::serve::planner::Planner;
 use crate::http::serve::values::{ValuesAt, ValuesRequest};
 use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
@@ -111,6 +111,18 @@ pub struct Work {
     has_deviations: bool,
 }
 
+impl Work {
+    fn asked(&self) -> ValuesRequest<'_> {
+        ValuesRequest {
+            values: &self.values,
+            queries: &self.queries,
+            order: order_of(self.derivatives),
+            has_variances: false,
+            has_deviations: self.has_deviations,
+        }
+    }
+}
+
 impl Operation for InterpolationRequest {
     type Work = Work;
     type Answer = InterpolationResponse;
@@ -121,16 +133,19 @@ impl Operation for InterpolationRequest {
         let values = Arc::new(std::mem::take(&mut self.values));
         let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
         let has_deviations = has_deviations(self.include);
-        let of_derivatives = DenseOnly { name: "deviations of derivatives", pointer: "/include" };
-        let dense_only = (has_deviations && derivatives > 0).then_some(of_derivatives);
-        let mut main = planner.values_fit(fit, dense_only)?;
+        let mut main = planner.values_fit(fit, None)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let asked = if main.is_moving() { Asked::Moving } else { Asked::Function };
-        let mut work = work_price(asked, n, m, d);
-        if has_deviations && !main.is_moving() {
-            work = work.and(price_of_deviations(n, m, d, derivatives));
-        }
+        let work = match (main.is_moving(), has_deviations) {
+            (true, false) => work_price(Asked::Moving { n_deviations: 0 }, n, m, d),
+            (true, true) => {
+                work_price(Asked::Moving { n_deviations: deviations_per_query(d, derivatives) }, n, m, d)
+            }
+            (false, false) => work_price(Asked::Function, n, m, d),
+            (false, true) => {
+                work_price(Asked::Function, n, m, d).and(price_of_deviations(n, m, d, derivatives))
+            }
+        };
         let n_lists = if has_deviations { 2 } else { 1 };
         let cost = Cost {
             work,
@@ -141,21 +156,8 @@ impl Operation for InterpolationRequest {
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
-        // The dense solver has them with those of derivatives.
-        let has_variances = work.has_deviations && fits.main.stored.of_queries().is_some();
-        let order = order_of(work.derivatives);
-        let asked = ValuesRequest { values: &work.values, queries: &work.queries, order, has_variances };
-        let ValuesAt { jets, diagnostics, interpolant, variances } = fits.values_at(asked, observer)?;
+        let ValuesAt { jets, diagnostics, deviations, .. } = fits.values_at(work.asked(), observer)?;
         let (m, d) = (jets.n_queries(), jets.dimension());
-        let deviations = match (&interpolant, variances) {
-            (Some(u), _) if work.has_deviations => {
-                let (scale, order) = (fits.main.plan.scale, usize::from(work.derivatives));
-                let found = JetDeviations::of(u, scale, &work.queries, order, observer);
-                Some(found.map_err(|error| fits.main.refused(error))?)
-            }
-            (None, Some(variances)) => Some(JetDeviations::of_values(&variances)),
-            (Some(_), _) | (None, None) => None,
-        };
         let [of_values, of_gradients, of_hessians] = arrays(deviations, (m, d), work.derivatives);
         Ok(InterpolationResponse {
             values: Array::new(jets.values(), &[m]),
@@ -191,8 +193,11 @@ fn numbers_per_query(d: usize, derivatives: u8) -> usize {
 
 /// Entries of a Hessian that are equal are counted once.
 fn price_of_deviations(n: usize, m: usize, d: usize, derivatives: u8) -> Price {
-    let per_query = [1, 1 + d, 1 + d + d * (d + 1) / 2][usize::from(derivatives)];
-    deviations_price(n, m.saturating_mul(per_query))
+    deviations_price(n, m.saturating_mul(deviations_per_query(d, derivatives)))
+}
+
+fn deviations_per_query(d: usize, derivatives: u8) -> usize {
+    [1, 1 + d, 1 + d + d * (d + 1) / 2][usize::from(derivatives)]
 }
 
 /// Deviations of values, gradients and Hessians, those that are asked for.

@@ -136,7 +136,7 @@ answer! {
 /// With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
 /// queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
 /// log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
-/// it, without what takes all points or queries together: covariance, samples, gradient_variances and likelihood.
+/// it, without what takes all points or queries together: covariance, samples and likelihood.
 #[utoipa::path(
     post,
     path = "/v1/posterior",

@@ -63,8 +63,7 @@ impl Asked {
         let name = self.include.iter().find_map(|quantity| match quantity {
             Q::Covariance => Some("covariance"),
             Q::LogMarginalLikelihood => Some("log_marginal_likelihood"),
-            Q::GradientVariances => Some("gradient_variances"),
-            Q::Variance | Q::ObservationVariance | Q::Gradients => None,
+            Q::Variance | Q::ObservationVariance | Q::Gradients | Q::GradientVariances => None,
         });
         match (name, self.samples) {
             (Some(name), _) => Some(DenseOnly { name, pointer: "/include" }),
@@ -88,6 +87,11 @@ impl Asked {
                 Err(Problem::invalid_request(format!("/quantiles/{at}"), detail))
             }
         }
+    }
+
+    /// Deviations at each query.
+    fn n_deviations(&self, d: usize) -> usize {
+        if self.wants(Q::GradientVariances) { 1 + d } else { 0 }
     }
 
     /// A new observation's noise is only known if it is the same everywhere.
@@ -122,7 +126,7 @@ impl Asked {
             price = price.and(many_price(n, m, k, if self.wants(Q::Gradients) { d } else { 0 }));
         }
         if self.wants(Q::GradientVariances) {
-            price = price.and(deviations_price(n, m.saturating_mul(1 + d)));
+            price = price.and(deviations_price(n, m.saturating_mul(self.n_deviations(d))));
         }
         if self.samples.is_some() {
             price = price.and(samples_price(m, self.n_samples().saturating_mul(k)));
@@ -160,7 +164,7 @@ impl Work {
         asked.check_noise(&main)?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
         let work = match main.is_moving() {
-            true => work_price(AskedOfSolver::Moving, n, m, d),
+            true => work_price(AskedOfSolver::Moving { n_deviations: asked.n_deviations(d) }, n, m, d),
             false => asked.price(n, m, d, k),
         };
         let n_numbers = planner.check_answer(asked.n_numbers(k, m, d))?;
@@ -169,8 +173,16 @@ impl Work {
         Ok(Plan { main, surface: None, work: work.1, cost: work.0 })
     }
 
-    fn order(&self) -> JetOrder {
-        if self.asked.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value }
+    fn request(&self) -> ValuesRequest<'_> {
+        let has_deviations = self.asked.wants(Q::GradientVariances);
+        let has_gradients = has_deviations || self.asked.wants(Q::Gradients);
+        ValuesRequest {
+            values: &self.values,
+            queries: &self.queries,
+            order: if has_gradients { JetOrder::Gradient } else { JetOrder::Value },
+            has_variances: self.asked.needs_variances(),
+            has_deviations,
+        }
     }
 }
 
@@ -195,6 +207,7 @@ pub struct Found {
 struct Means {
     jets: BatchJets,
     variances: Option<Variances>,
+    deviations: Option<JetDeviations>,
     diagnostics: Diagnostics,
     /// The functions themselves; none where each query has its own.
     functions: Vec<Interpolant>,
@@ -209,15 +222,14 @@ impl Found {
     /// # Errors
     /// What the numerics refuses as a [`Problem`].
     pub fn one(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
-        let Work { values, queries, asked } = &work;
-        let (order, has_variances) = (work.order(), asked.needs_variances());
-        let request = ValuesRequest { values, queries, order, has_variances };
-        let ValuesAt { jets, variances, diagnostics, interpolant } = fits.values_at(request, observer)?;
-        let gradients = if order == JetOrder::Value { Vec::new() } else { jets.gradients() };
+        let request = work.request();
+        let ValuesAt { jets, variances, deviations, diagnostics, interpolant } =
+            fits.values_at(request, observer)?;
+        let gradients = if request.order == JetOrder::Value { Vec::new() } else { jets.gradients() };
         let jets = BatchJets { values: jets.values(), gradients, hessians: Vec::new() };
         let functions = interpolant.into_iter().collect();
         let (leading, mean_coefficients) = (Vec::new(), None);
-        let means = Means { jets, variances, diagnostics, functions, mean_coefficients, leading };
+        let means = Means { jets, variances, deviations, diagnostics, functions, mean_coefficients, leading };
         Self::of(&work, means, fits, observer)
     }
 
@@ -226,21 +238,20 @@ impl Found {
     /// # Errors
     /// What the numerics refuses as a [`Problem`].
     pub fn each(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
-        let Work { values, queries, asked } = &work;
-        let (order, has_variances) = (work.order(), asked.needs_variances());
-        let request = ValuesRequest { values, queries, order, has_variances };
-        let EachAt { jets, variances, diagnostics, batch } = fits.each_at(request, observer)?;
+        let EachAt { jets, variances, deviations, diagnostics, batch } =
+            fits.each_at(work.request(), observer)?;
         let leading = vec![batch.solutions.len()];
         let mean_coefficients = EachAt::mean_coefficients(&batch);
         let functions = batch.interpolants().collect();
-        let means = Means { jets, variances, diagnostics, functions, mean_coefficients, leading };
+        let means = Means { jets, variances, deviations, diagnostics, functions, mean_coefficients, leading };
         Self::of(&work, means, fits, observer)
     }
 
     fn of(work: &Work, means: Means, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
         let (asked, queries, scale) = (&work.asked, &*work.queries, fits.main.plan.scale);
         let (m, d) = (queries.n_points(), queries.dimension());
-        let Means { jets, variances, mut diagnostics, functions, mean_coefficients, leading } = means;
+        let Means { jets, variances, deviations, mut diagnostics, functions, mean_coefficients, leading } =
+            means;
         let refused = |error| fits.main.refused(error);
         let function = || functions.first().ok_or_else(Problem::internal);
         let covariance = match asked.needs_covariance() {
@@ -262,13 +273,8 @@ impl Found {
             }
             (None, _) | (_, None) => None,
         };
-        let gradient_variances = match asked.wants(Q::GradientVariances) {
-            false => None,
-            true => {
-                let found = JetDeviations::of(function()?, scale, queries, 1, observer).map_err(refused)?;
-                Some(Array::new(found.gradients.iter().map(|s| s * s).collect(), &[m, d]))
-            }
-        };
+        let gradient_variances =
+            deviations.map(|found| Array::new(found.gradients.iter().map(|s| s * s).collect(), &[m, d]));
         let mut log_marginal_likelihoods = Vec::new();
         if asked.wants(Q::LogMarginalLikelihood) {
             function()?;

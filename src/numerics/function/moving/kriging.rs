@@ -2,7 +2,8 @@
 //!
 //! With K the covariances of the values at the points N around a query q, noise included, c = k(N, q) and K = LLᵀ, forward
 //! substitution of the values and of c gives `u(q) = (L⁻¹c)·(L⁻¹y)` and the variance `k₀ − |L⁻¹c|²` (simple kriging; Rasmussen and
-//! Williams 2006, alg. 2.1). Derivatives need the weights `Λ = L⁻ᵀL⁻¹y` as well.
+//! Williams 2006, alg. 2.1). Derivatives need the weights `Λ = L⁻ᵀL⁻¹y` as well, and each of their variances a row of its own: with its
+//! covariances `c′` with the values it is the prior's without `|L⁻¹c′|²`.
 
 use pulp::{Simd, WithSimd};
 
@@ -20,7 +21,7 @@ pub(super) const COLUMNS: usize = 4;
 /// fallback of the dense solver stops there as well.
 const DEPENDENT: f64 = 64.0 * f64::EPSILON;
 
-/// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query.
+/// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query, then those of derivatives.
 const N_ROWS: usize = 5;
 const VALUES: usize = 0;
 const CROSS: usize = 1;
@@ -38,9 +39,12 @@ pub(super) struct Parts {
     /// 0, 1 for the gradient, 2 for the Hessian.
     pub order: usize,
     pub variances: bool,
+    /// Derivatives whose variances are asked for: none, those of first order, or with them the upper triangle of those of second.
+    pub n_derivatives: usize,
 }
 
-/// Numbers of a query: those of a jet as sums over the points, `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b`, `Σλφ′`, then three more.
+/// Numbers of a query: those of a jet as sums over the points, `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b`, `Σλφ′`, then three more, and `|L⁻¹c′|²` of the
+/// derivatives.
 pub(super) struct Found {
     /// `|L⁻¹c|²`.
     pub explained: usize,
@@ -56,7 +60,8 @@ impl Found {
         Self { explained: trace + 1, norm_squared: trace + 2, n_dependent: trace + 3 }
     }
 
-    pub(super) const fn n_numbers(&self) -> usize {
+    /// Of the derivatives.
+    pub(super) const fn of_derivatives(&self) -> usize {
         self.n_dependent + 1
     }
 }
@@ -69,13 +74,14 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    pub(super) fn new(dimension: usize, count: usize) -> Self {
+    pub(super) fn new(dimension: usize, count: usize, n_derivatives: usize) -> Self {
         let n = count.next_multiple_of(COLUMNS);
-        let n_registers = triangle(n).next_multiple_of(BLOCK) + N_ROWS * n.next_multiple_of(BLOCK);
+        let n_rows = N_ROWS + n_derivatives;
+        let n_registers = triangle(n).next_multiple_of(BLOCK) + n_rows * n.next_multiple_of(BLOCK);
         let matrix = vec![0.0; (n_registers + 1) * MAX_LANES];
         // On the boundary of a cache line.
         let start = matrix.as_ptr().align_offset(64).min(MAX_LANES);
-        let found = vec![0.0; Found::of(dimension).n_numbers() * MAX_LANES];
+        let found = vec![0.0; (Found::of(dimension).of_derivatives() + n_derivatives) * MAX_LANES];
         Self { matrix, start, found }
     }
 }
@@ -101,7 +107,8 @@ impl WithSimd for Krige<'_> {
         let mut system = Factored { simd, n, below, batch, kernel, matrix };
         system.fill_triangle();
         system.fill_rows(parts.order);
-        system.factorize();
+        system.fill_derivatives(parts);
+        system.factorize(parts.n_derivatives);
         system.sum_up(parts, found);
     }
 }
@@ -256,9 +263,45 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Covariances of the derivatives in units of ℓ with the values: with s = D/ℓ, `2vφ′s_a` and `4vφ″s_as_b + 2vφ′δ_ab`.
+    #[inline(always)]
+    fn fill_derivatives(&mut self, parts: Parts) {
+        let (d, v, inverse) =
+            (self.batch.dimension, self.kernel.variance(), 1.0 / self.kernel.length_scale());
+        if parts.n_derivatives == 0 {
+            return;
+        }
+        let (slopes, bends) = (self.row(SLOPES), self.row(BENDS));
+        for j in 0..self.batch.count {
+            let slope = self.at(slopes + j) * (2.0 * v);
+            let bend = self.at(bends + j) * (4.0 * v);
+            let mut second = N_ROWS + d;
+            for a in 0..d {
+                let step = self.difference(a, j) * inverse;
+                (slope * step).write(self.matrix, self.row(N_ROWS + a) + j);
+                if parts.order < 2 {
+                    continue;
+                }
+                // In this order, as in sum_derivatives.
+                let first = bend * step;
+                for b in a..d {
+                    let along = if a == b { slope } else { self.splat(0.0) };
+                    let entry = first.mul_add(self.difference(b, j) * inverse, along);
+                    entry.write(self.matrix, self.row(second) + j);
+                    second += 1;
+                }
+            }
+        }
+        for derivative in 0..parts.n_derivatives {
+            for j in self.batch.count..self.n {
+                self.splat(0.0).write(self.matrix, self.row(N_ROWS + derivative) + j);
+            }
+        }
+    }
+
     /// Left-looking, in tiles: K = LLᵀ, and below it the right-hand sides times L⁻ᵀ.
     #[inline(always)]
-    fn factorize(&mut self) {
+    fn factorize(&mut self, n_derivatives: usize) {
         for column in (0..self.n).step_by(COLUMNS) {
             // The triangle on the diagonal, row by row.
             for i in column..column + COLUMNS {
@@ -280,6 +323,9 @@ impl<S: Simd> Factored<'_, S> {
                 }
             }
             self.tile::<2>([self.row(VALUES), self.row(CROSS)], column, COLUMNS);
+            for derivative in 0..n_derivatives {
+                self.tile::<1>([self.row(N_ROWS + derivative)], column, COLUMNS);
+            }
         }
     }
 
@@ -357,6 +403,10 @@ impl<S: Simd> Factored<'_, S> {
             self.product(cross, cross).write(found, places.explained);
             self.back_substitute(cross, weights);
             self.product(weights, weights).write(found, places.norm_squared);
+        }
+        for derivative in 0..parts.n_derivatives {
+            let row = self.row(N_ROWS + derivative);
+            self.product(row, row).write(found, places.of_derivatives() + derivative);
         }
         if parts.order > 0 {
             self.back_substitute(values, weights);

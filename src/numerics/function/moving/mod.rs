@@ -18,6 +18,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::deviations::JetDeviations;
+use super::functionals::has_variance;
 use super::posterior::Variances;
 use crate::numerics::error::{NotDefinite, NumericsError};
 use crate::numerics::machine::heap::{arc_payload, block_bytes};
@@ -71,6 +73,8 @@ impl Near {
 pub struct MovingRequest {
     pub order: JetOrder,
     pub has_variances: bool,
+    /// Deviations of all that is asked for, derivatives included.
+    pub has_deviations: bool,
 }
 
 /// What is found there.
@@ -78,6 +82,8 @@ pub struct MovingAnswer {
     pub jets: Jets,
     /// Variances of the latent function, if asked for.
     pub variances: Option<Variances>,
+    /// Of the jets, if asked for.
+    pub deviations: Option<JetDeviations>,
     /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
     pub n_dependent: usize,
 }
@@ -115,7 +121,8 @@ impl Moving {
     ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`]; [`NumericsError::KernelNotSmooth`] if derivatives
-    /// are asked of a kernel with a kink at a point of the cloud; [`NumericsError::NotPositiveDefinite`] with a variance below −τ;
+    /// are asked of a kernel with a kink at a point of the cloud; [`NumericsError::DerivativesVary`] if their deviations are, where the process
+    /// has no such derivatives; [`NumericsError::NotPositiveDefinite`] with a variance below −τ;
     /// [`NumericsError::Overflow`]; [`NumericsError::Cancelled`].
     pub fn at(
         &self,
@@ -138,26 +145,65 @@ impl Moving {
         self.system.cloud().check_same_dimension(queries)?;
         self.system.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Evaluate);
-        let (m, lanes) = (queries.n_points(), set.n_lanes());
-        let layout = Layout::new(request.order, queries.dimension());
+        let (m, d, lanes) = (queries.n_points(), queries.dimension(), set.n_lanes());
+        let layout = Layout::new(request.order, d);
         let width = layout.width();
-        let (mut packed, mut latent) = (vec![0.0; m * width], vec![0.0; m]);
+        let fit =
+            Fit { moving: self, values, queries, request, layout, derivatives: self.derivatives(request)? };
+        // The variance of the value, then deviations of derivatives.
+        let n_sure = 1 + fit.derivatives.len();
+        let (mut packed, mut sure) = (vec![0.0; m * width], vec![0.0; m * n_sure]);
         let n_dependent = AtomicUsize::new(0);
-        let fit = Fit { moving: self, values, queries, request, layout };
-        let slots = packed.par_chunks_mut(lanes * width).zip(latent.par_chunks_mut(lanes));
+        let slots = packed.par_chunks_mut(lanes * width).zip(sure.par_chunks_mut(lanes * n_sure));
         slots.enumerate().try_for_each_init(
-            || Room::new(self, set),
-            |room, (batch, (jets, latent))| {
+            || Room::new(&fit, set),
+            |room, (batch, (jets, sure))| {
                 observer.checkpoint()?;
-                room.put(&fit, batch * lanes, latent.len())?;
-                n_dependent.fetch_add(fit.answer(room, batch * lanes, jets, latent)?, Ordering::Relaxed);
+                room.put(&fit, batch * lanes, sure.len() / n_sure)?;
+                n_dependent.fetch_add(fit.answer(room, batch * lanes, jets, sure)?, Ordering::Relaxed);
                 Ok(())
             },
         )?;
         let jets = Jets::of(layout, packed);
-        let variances = request.has_variances.then(|| clamped(latent));
-        Ok(MovingAnswer { jets, variances, n_dependent: n_dependent.into_inner() })
+        let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
+        let deviations = request.has_deviations.then(|| {
+            let values = sure.iter_mut().step_by(n_sure).zip(&variances.latent);
+            values.for_each(|(slot, variance)| *slot = variance.sqrt());
+            JetDeviations::of_packed(&sure, d, request.order.degree())
+        });
+        let variances = request.has_variances.then_some(variances);
+        Ok(MovingAnswer { jets, variances, deviations, n_dependent: n_dependent.into_inner() })
     }
+
+    /// The derivatives whose deviations are asked for.
+    fn derivatives(&self, request: MovingRequest) -> Result<Vec<Derivative>, NumericsError> {
+        let (kernel, d, order) =
+            (self.system.kernel(), self.system.cloud().dimension(), request.order.degree());
+        if !request.has_deviations || order == 0 {
+            return Ok(Vec::new());
+        }
+        if !has_variance(kernel, order) {
+            return Err(NumericsError::DerivativesVary { order });
+        }
+        let ([_, slope, bend], v) = (kernel.profile_at_zero(), kernel.variance());
+        let unit = |axis: usize| kernel.stretch(axis) / kernel.length_scale();
+        let first = (0..d).map(|a| Derivative { prior_variance: -2.0 * v * slope, unit: unit(a) });
+        let of_pair = |(a, b): (usize, usize)| Derivative {
+            prior_variance: 4.0 * v * bend * if a == b { 3.0 } else { 1.0 },
+            unit: unit(a) * unit(b),
+        };
+        let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
+        let second = pairs.map(of_pair).filter(|_| order == 2);
+        Ok(first.chain(second).collect())
+    }
+}
+
+/// A derivative whose deviation is asked for.
+struct Derivative {
+    /// In units of ℓ.
+    prior_variance: f64,
+    /// What turns its deviation in units of ℓ into one along the axes.
+    unit: f64,
 }
 
 /// Variances that rounding made negative, served as 0.
@@ -174,6 +220,8 @@ struct Fit<'a> {
     queries: &'a Cloud,
     request: MovingRequest,
     layout: Layout,
+    /// Whose deviations are asked for.
+    derivatives: Vec<Derivative>,
 }
 
 /// Room that a thread keeps from one batch to the next.
@@ -186,14 +234,15 @@ struct Room {
 }
 
 impl Room {
-    fn new(moving: &Moving, set: InstructionSet) -> Self {
-        let (dimension, count) = (moving.system.cloud().dimension(), moving.n_neighbours());
+    fn new(fit: &Fit<'_>, set: InstructionSet) -> Self {
+        let (dimension, count) = (fit.queries.dimension(), fit.moving.n_neighbours());
+        let n_derivatives = fit.derivatives.len();
         Self {
             set,
             batch: Batch::new(dimension, count, set.n_lanes()),
-            workspace: Workspace::new(dimension, count),
+            workspace: Workspace::new(dimension, count, n_derivatives),
             nearest: Vec::with_capacity(count + 1),
-            sums: vec![0.0; Found::of(dimension).n_numbers()],
+            sums: vec![0.0; Found::of(dimension).of_derivatives() + n_derivatives],
         }
     }
 
@@ -229,19 +278,19 @@ impl Fit<'_> {
         room: &mut Room,
         first: usize,
         jets: &mut [f64],
-        latent: &mut [f64],
+        sure: &mut [f64],
     ) -> Result<usize, NumericsError> {
         let kernel = self.moving.system.kernel();
-        let order = match self.request.order {
-            JetOrder::Value => 0,
-            JetOrder::Gradient => 1,
-            JetOrder::Hessian | JetOrder::HessianWithMagnitudes => 2,
+        let parts = Parts {
+            order: self.request.order.degree(),
+            variances: self.request.has_variances || self.request.has_deviations,
+            n_derivatives: self.derivatives.len(),
         };
-        let parts = Parts { order, variances: self.request.has_variances };
         room.set.dispatch(Krige { batch: &room.batch, kernel, parts, workspace: &mut room.workspace });
         let places = Found::of(self.queries.dimension());
         let mut n_thinned = 0;
-        for (lane, (jet, variance)) in jets.chunks_exact_mut(self.layout.width()).zip(latent).enumerate() {
+        let slots = jets.chunks_exact_mut(self.layout.width());
+        for (lane, (jet, sure)) in slots.zip(sure.chunks_exact_mut(1 + parts.n_derivatives)).enumerate() {
             let query = first + lane;
             room.read(lane);
             self.layout.finish(kernel, &room.sums, jet);
@@ -252,8 +301,17 @@ impl Fit<'_> {
             }
             n_thinned += usize::from(room.sums[places.n_dependent] > 0.0);
             if parts.variances {
-                *variance = kernel.at_zero() - room.sums[places.explained];
-                self.check_is_rounding(query, *variance, room.sums[places.norm_squared], &room.batch)?;
+                sure[0] = kernel.at_zero() - room.sums[places.explained];
+                self.check_is_rounding(query, sure[0], room.sums[places.norm_squared], &room.batch)?;
+            }
+            let explained = &room.sums[places.of_derivatives()..];
+            for ((slot, of), explained) in sure[1..].iter_mut().zip(&self.derivatives).zip(explained) {
+                let variance = of.prior_variance - explained;
+                // What is no number stays none.
+                *slot = of.unit * if variance < 0.0 { 0.0 } else { variance.sqrt() };
+            }
+            if sure[1..].iter().any(|deviation| !deviation.is_finite()) {
+                return Err(NumericsError::Overflow { query });
             }
         }
         Ok(n_thinned)

@@ -7,7 +7,8 @@ use crate::numerics::solver::Solver;
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::testing::{all_families, fibonacci_sphere};
 
-const EVERYTHING: MovingRequest = MovingRequest { order: JetOrder::Hessian, has_variances: true };
+const EVERYTHING: MovingRequest =
+    MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations: false };
 
 fn system(cloud: &Cloud, family: Family, alpha: f64) -> System {
     let kernel = Kernel::new(family, 0.9, 1.7).unwrap();
@@ -67,6 +68,40 @@ fn a_small_cloud_has_the_dense_posterior_for_every_kernel_and_instruction_set() 
     }
 }
 
+#[test]
+fn a_small_cloud_has_the_dense_deviations_of_derivatives_on_every_instruction_set() {
+    let cloud = fibonacci_sphere(NEIGHBOURS - 1);
+    let values = vec![1.0; NEIGHBOURS - 1];
+    let queries: Vec<f64> = (0..57).map(|i| 1.3 * (0.37 * i as f64).sin()).collect();
+    // One of them at a point, where differences are 0.
+    let queries = Cloud::new([&queries, cloud.point(5)].concat(), 3).unwrap();
+    for family in all_families() {
+        let solver = Arc::new(Solver::dense(system(&cloud, family, 1e-3), &Unobserved).unwrap());
+        let rounding = 100.0 * 127.0 * f64::EPSILON / solver.reciprocal_condition();
+        let dense = Interpolant::fit(solver, &values, &Unobserved).unwrap();
+        let squares = |deviations: &[f64]| deviations.iter().map(|s| s * s).collect::<Vec<f64>>();
+        for order in [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian] {
+            let request = MovingRequest { order, has_variances: false, has_deviations: true };
+            let expected = JetDeviations::of(&dense, 1.0, &queries, order.degree(), &Unobserved);
+            for set in InstructionSet::available() {
+                let moving = moving(system(&cloud, family, 1e-3));
+                let found = moving.at_with(set, &values, &queries, request, &Unobserved);
+                let (Ok(found), Ok(expected)) = (&found, &expected) else {
+                    let kernel = moving.system().kernel();
+                    assert!(kernel.has_kink() || !kernel.has_second_derivatives() && order.degree() == 2);
+                    assert_eq!(found.as_ref().err(), expected.as_ref().err(), "{family:?}");
+                    continue;
+                };
+                let (found, context) =
+                    (found.deviations.as_ref().unwrap(), format!("{family:?}, {}", set.name()));
+                are_close(&squares(&found.values), &squares(&expected.values), rounding, &context);
+                are_close(&squares(&found.gradients), &squares(&expected.gradients), rounding, &context);
+                are_close(&squares(&found.hessians), &squares(&expected.hessians), rounding, &context);
+            }
+        }
+    }
+}
+
 fn are_close(found: &[f64], expected: &[f64], tolerance: f64, context: &str) {
     let largest = expected.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     assert_eq!(found.len(), expected.len());
@@ -122,7 +157,7 @@ fn values_are_met_without_noise_and_variances_lie_between_nothing_and_the_prior(
     let (cloud, values) = spiral();
     for family in all_families() {
         let moving = moving(system(&cloud, family, 0.0));
-        let request = MovingRequest { order: JetOrder::Value, has_variances: true };
+        let request = MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false };
         let found = moving.at(&values, &cloud, request, &Unobserved).unwrap();
         let (k0, variances) = (moving.system().kernel().at_zero(), found.variances.unwrap());
         for (query, value) in values.iter().enumerate() {
@@ -192,7 +227,7 @@ fn a_kink_at_a_point_has_no_gradient() {
     let queries = Cloud::new([&[0.1, 0.2, 0.3], cloud.point(77)].concat(), 3).unwrap();
     let refused = moving.at(&values, &queries, EVERYTHING, &Unobserved).err();
     assert_eq!(refused, Some(NumericsError::KernelNotSmooth { query: 1, point: 77 }));
-    let request = MovingRequest { order: JetOrder::Value, has_variances: false };
+    let request = MovingRequest { order: JetOrder::Value, has_variances: false, has_deviations: false };
     assert!(moving.at(&values, &queries, request, &Unobserved).is_ok());
 }
 

@@ -36,6 +36,17 @@ pub enum JetOrder {
     HessianWithMagnitudes,
 }
 
+impl JetOrder {
+    /// Of the highest derivatives.
+    pub fn degree(self) -> usize {
+        match self {
+            Self::Value => 0,
+            Self::Gradient => 1,
+            Self::Hessian | Self::HessianWithMagnitudes => 2,
+        }
+    }
+}
+
 /// One query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two magnitudes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
