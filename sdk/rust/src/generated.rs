@@ -10601,7 +10601,7 @@ let response = client.compute_interpolation_batch()
 With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
 queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
 log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
-it, without what takes all points or queries together: covariance, samples, gradient_variances and likelihood.
+it, without what takes all points or queries together: covariance, samples and likelihood.
 
 Sends a `POST` request to `/v1/posterior`
 

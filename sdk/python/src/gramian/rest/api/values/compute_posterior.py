@@ -127,8 +127,7 @@ def sync_detailed(
     probabilities of exceedance, joint samples and the
     log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
     query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples, gradient_variances and
-    likelihood.
+    it, without what takes all points or queries together: covariance, samples and likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -169,8 +168,7 @@ def sync(
     probabilities of exceedance, joint samples and the
     log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
     query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples, gradient_variances and
-    likelihood.
+    it, without what takes all points or queries together: covariance, samples and likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -206,8 +204,7 @@ async def asyncio_detailed(
     probabilities of exceedance, joint samples and the
     log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
     query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples, gradient_variances and
-    likelihood.
+    it, without what takes all points or queries together: covariance, samples and likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
@@ -246,8 +243,7 @@ async def asyncio(
     probabilities of exceedance, joint samples and the
     log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
     query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples, gradient_variances and
-    likelihood.
+    it, without what takes all points or queries together: covariance, samples and likelihood.
 
     Args:
         body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
