@@ -222,3 +222,51 @@ async fn what_is_no_batch_or_no_probability_is_refused() {
     body["samples"] = json!({"count": 1_000_000_000u64});
     server.post("/v1/posterior", &body).await.expect_problem(413, "problem-too-large");
 }
+
+#[tokio::test]
+async fn where_nothing_varies_samples_are_the_means_and_zeros_are_told() {
+    let server = Server::start().await;
+    let body = json!({"cloud": {"points": [[0.0], [1000.0]]}, "values": [1, 2], "alpha": 0, "samples": {"count": 3},
+        "kernel": {"family": "gauss", "length_scale": 1.0}});
+    let answer = server.post("/v1/posterior", &body).await.expect_ok();
+    assert_eq!(answer["samples"], json!([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]]));
+    // At points without noise variances are 0 but for rounding, which makes some of them negative.
+    let (points, values) = lists(150, 1);
+    let mut body = json!({"cloud": {"points": points}, "values": values[0], "alpha": 0, "include": ["deviations"],
+        "kernel": {"family": "gauss", "length_scale": 0.3}});
+    for solver in ["dense", "local"] {
+        body["solver"] = json!(solver);
+        let answer = server.post("/v1/interpolation", &body).await.expect_ok();
+        let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+        assert!(
+            warnings.iter().any(|warning| warning["code"] == "variance_clamped"),
+            "{solver}: {warnings:?}"
+        );
+        assert!(numbers(&answer["value_deviations"]).iter().all(|deviation| *deviation >= 0.0));
+    }
+}
+
+#[tokio::test]
+async fn deviations_have_digits_in_every_unit() {
+    let server = Server::start().await;
+    for (unit, variance) in [(1e90_f64, 1.0_f64), (1e-80, 1.0), (1e100, 1e-130), (1e-60, 1e100)] {
+        let points: Vec<[f64; 1]> = [0.0, 0.7, 1.9].map(|x| [x * unit]).to_vec();
+        let body = |solver: &str| {
+            json!({"cloud": {"points": points}, "values": [1, 2, 0], "queries": [[0.4 * unit], [3.0 * unit]],
+                "kernel": {"family": "gauss", "length_scale": unit, "variance": variance}, "alpha": 1e-3 * variance,
+                "derivatives": 2, "include": ["deviations"], "solver": solver})
+        };
+        let dense = server.post("/v1/interpolation", &body("dense")).await.expect_ok();
+        let local = server.post("/v1/interpolation", &body("local")).await.expect_ok();
+        for (name, order) in [("value_deviations", 0), ("gradient_deviations", 1), ("hessian_deviations", 2)]
+        {
+            for (a, b) in numbers(&dense[name]).iter().zip(numbers(&local[name])) {
+                let unit = variance.sqrt() / unit.powi(order);
+                assert!(
+                    (a / b - 1.0).abs() < 1e-9 && (0.01..10.0).contains(&(a / unit)),
+                    "{unit} {name}: {a} {b}"
+                );
+            }
+        }
+    }
+}

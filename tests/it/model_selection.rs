@@ -136,3 +136,100 @@ async fn equal_searches_at_once_find_the_same() {
         assert!((score(answer) - score(&answers[0])).abs() < 1e-6);
     }
 }
+
+#[tokio::test]
+async fn what_no_kernel_explains_has_an_answer_or_a_reason() {
+    let server = Server::start().await;
+    let with = |values: &dyn Fn(usize) -> f64, more: Value| {
+        let mut body = json!({"cloud": {"points": fibonacci_sphere(30)}, "values": (0..30).map(values).collect::<Vec<f64>>()});
+        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        body
+    };
+    // Nothing to explain, and squares that are none.
+    for size in [0.0, 5.0, 1e-165] {
+        for criterion in ["generalized_cross_validation", "marginal_likelihood", "leave_one_out"] {
+            let kernel = json!({"family": "gauss", "length_scale": 1.0});
+            let more = json!({"criterion": criterion, "kernel": kernel, "alpha": 0.1, "mean": "constant"});
+            server.post("/v1/model-selection", &with(&|_| size, more)).await.expect_ok();
+        }
+    }
+    let constant = with(&|_| 5.0, json!({"criterion": "generalized_cross_validation"}));
+    server.post("/v1/model-selection", &constant).await.expect_ok();
+    // Variances at the bounds of what kernels take, and beyond.
+    for size in [3e69, 3e-69] {
+        let body = with(&|i| size * (i as f64).sin(), json!({}));
+        server.post("/v1/model-selection", &body).await.expect_ok();
+    }
+    let body = with(&|i| 1e100 * (i as f64).sin(), json!({}));
+    let refused = server.post("/v1/model-selection", &body).await.expect_problem(422, "invalid-request");
+    assert_eq!(refused["errors"][0]["pointer"], "/values");
+}
+
+#[tokio::test]
+async fn a_point_that_the_mean_hangs_on_is_predicted_by_nothing() {
+    let server = Server::start().await;
+    let points = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [0, 1]];
+    let mut body = json!({"cloud": {"points": points}, "values": [1, 3, 2, 4, 3, 9], "mean": "linear",
+        "kernel": {"family": "matern", "length_scale": 1.0}, "alpha": 0.05});
+    for criterion in ["marginal_likelihood", "generalized_cross_validation"] {
+        body["criterion"] = json!(criterion);
+        let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+        for name in ["means", "variances", "log_predictive_densities"] {
+            let entries = answer["leave_one_out"][name].as_array().unwrap();
+            let is_null: Vec<bool> = entries.iter().map(Value::is_null).collect();
+            assert_eq!(is_null, [false, false, false, false, false, true], "{criterion} {name}");
+        }
+    }
+    body["criterion"] = json!("leave_one_out");
+    let refused = server.post("/v1/model-selection", &body).await.expect_problem(422, "invalid-request");
+    assert_eq!(refused["errors"][0]["pointer"], "/mean");
+}
+
+#[tokio::test]
+async fn bounds_that_meet_are_no_slope_and_noise_is_found_from_a_start_without() {
+    let server = Server::start().await;
+    let mut body = measured(100, 0.3);
+    body["kernel"] = json!({"family": "matern", "nu": 4.5, "length_scale": 1.0});
+    body["mean"] = json!("constant");
+    // The default α is 1e-10 with a kernel given.
+    let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+    let noise = answer["alpha"].as_f64().unwrap().sqrt();
+    assert!((0.22..0.38).contains(&noise), "{noise}");
+    body["vary"] = json!([{"parameter": "length_scale", "min": 0.1, "max": 10},
+        {"parameter": "variance", "min": 0.01, "max": 100}, {"parameter": "alpha", "min": 0.01, "max": 0.01}]);
+    let answer = server.post("/v1/model-selection", &body).await.expect_ok();
+    assert_eq!(answer["converged"], true, "{}", answer["gradient"]);
+    assert!(answer["gradient"][2].as_f64().unwrap() > 1.0);
+}
+
+#[tokio::test]
+async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
+    let server = Server::start().await;
+    let free = |parameter: &str| json!({"parameter": parameter, "min": 0.1, "max": 1});
+    let line: Vec<[f64; 1]> = (0..30).map(|i| [f64::from(i)]).collect();
+    let body = json!({"cloud": {"points": line}, "values": (0..30).map(|i| f64::from(i).sin()).collect::<Vec<f64>>()});
+    for (vary, families, pointer) in [
+        (json!([free("length_scale"), free("length_scales")]), json!(["gauss"]), "/vary/0"),
+        (json!(vec![free("length_scales"); 65]), json!(["gauss"]), "/vary"),
+        (json!([free("variance"), free("nu")]), json!(["gauss"]), "/vary/1"),
+        (
+            json!([{"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 1}]),
+            json!(["gauss"]),
+            "/vary/0/axis",
+        ),
+    ] {
+        let mut body = body.clone();
+        (body["vary"], body["families"]) = (vary, families);
+        let refused = server.post("/v1/model-selection", &body).await.expect_problem(422, "invalid-request");
+        assert_eq!(refused["errors"][0]["pointer"], pointer);
+    }
+    // Where nu varies matern is tried, whatever the start.
+    let mut varied = body.clone();
+    varied["kernel"] = json!({"family": "gauss", "length_scale": 2.0});
+    varied["vary"] = json!([{"parameter": "nu", "min": 0.5, "max": 2.5}]);
+    let answer = server.post("/v1/model-selection", &varied).await.expect_ok();
+    assert_eq!(answer["families"].as_array().unwrap().len(), 4);
+    let many = json!({"cloud": {"points": fibonacci_sphere(5001)}, "values": vec![1.0; 5001]});
+    let refused = server.post("/v1/model-selection", &many).await.expect_problem(413, "problem-too-large");
+    assert_eq!((&refused["limit"], &refused["required"]), (&json!(5000), &json!(5001)));
+}

@@ -1216,11 +1216,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct LeftOut {
         ///The logarithms of the densities of the values under their predictions.
-        pub log_predictive_densities: ::std::vec::Vec<f64>,
-        ///The predictions, in the order of the points.
-        pub means: ::std::vec::Vec<f64>,
+        pub log_predictive_densities: ::std::vec::Vec<::std::option::Option<f64>>,
+        ///The predictions, in the order of the points; null where the mean is not determined without the point.
+        pub means: ::std::vec::Vec<::std::option::Option<f64>>,
         ///The variances of the values predicted, their noise included.
-        pub variances: ::std::vec::Vec<f64>,
+        pub variances: ::std::vec::Vec<::std::option::Option<f64>>,
     }
     impl LeftOut {
         pub fn builder() -> builder::LeftOut {
@@ -1354,7 +1354,7 @@ chosen by the noise of the points of a surface, 1e-3 at least.*/
         ///What to do with points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent.
+        ///Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent, and matern where nu varies.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub families: ::std::vec::Vec<KernelFamily>,
         /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
@@ -1378,8 +1378,9 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
-        /**What is free, and its bounds. Absent: length scale, or that of each axis where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
-alpha) to a hundred times of where the search begins.*/
+        /**What is free, and its bounds; 64 entries at most. Absent: length scale, or that of each axis where `kernel` has them, and variance, from a
+hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a millionth of where it begins, or
+of a millionth of the variance if that is more, to a hundred times the variance.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub vary: ::std::vec::Vec<FreeParameter>,
     }
@@ -1412,7 +1413,7 @@ of all; null for nu, which takes steps.*/
         ///The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_coefficients: ::std::vec::Vec<f64>,
-        ///The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`.
+        ///The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`, and beyond 3,000 points.
         pub path: ::std::vec::Vec<PathEntry>,
         ///The criterion there; greater is better.
         pub score: f64,
@@ -1853,7 +1854,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub struct Samples {
         ///Functions to draw.
         pub count: ::std::num::NonZeroU64,
-        ///Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+        ///Equal seeds give equal draws on processors of one kind, and more of them begin with the same ones; 0 if absent.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub seed: ::std::option::Option<i64>,
     }
@@ -6828,12 +6829,15 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         #[derive(Clone, Debug)]
         pub struct LeftOut {
             log_predictive_densities: ::std::result::Result<
-                ::std::vec::Vec<f64>,
+                ::std::vec::Vec<::std::option::Option<f64>>,
                 ::std::string::String,
             >,
-            means: ::std::result::Result<::std::vec::Vec<f64>, ::std::string::String>,
+            means: ::std::result::Result<
+                ::std::vec::Vec<::std::option::Option<f64>>,
+                ::std::string::String,
+            >,
             variances: ::std::result::Result<
-                ::std::vec::Vec<f64>,
+                ::std::vec::Vec<::std::option::Option<f64>>,
                 ::std::string::String,
             >,
         }
@@ -6851,7 +6855,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         impl LeftOut {
             pub fn log_predictive_densities<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.log_predictive_densities = value
@@ -6865,7 +6869,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
             pub fn means<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.means = value
@@ -6877,7 +6881,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
             pub fn variances<T>(mut self, value: T) -> Self
             where
-                T: ::std::convert::TryInto<::std::vec::Vec<f64>>,
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::option::Option<f64>>>,
                 T::Error: ::std::fmt::Display,
             {
                 self.variances = value
@@ -10635,7 +10639,7 @@ let response = client.compute_posterior_batch()
 Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving one out or by generalized cross-validation: from the
 kernel of the request, or the one that is learned if there is none, and from further starts, by sequential quadratic programming with exact slopes within
 bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value predicted from all others. Every evaluation costs a
-few factorizations.
+few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent with all of them.
 
 Sends a `POST` request to `/v1/model-selection`
 

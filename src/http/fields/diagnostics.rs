@@ -141,6 +141,18 @@ pub struct Diagnostics {
     pub geometry: Option<Box<Diagnostics>>,
 }
 
+impl Diagnostics {
+    /// Says at which queries a variance came out negative within rounding, if at any.
+    pub fn warn_of_clamping(&mut self, queries: &[usize]) {
+        let Some(first) = queries.first() else { return };
+        let detail = format!(
+            "variances came out negative within rounding and are served as 0 (queries: {}, the first of them {first})",
+            queries.len()
+        );
+        self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
+    }
+}
+
 impl Member for Diagnostics {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
         parts.add_json(name, &self)

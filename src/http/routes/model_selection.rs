@@ -14,6 +14,7 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, DuplicatePolicy, Fit, KernelFamily, KernelUsed, MeanChoice, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
@@ -89,12 +90,13 @@ request! {
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub criterion: Option<SelectionCriterion>,
-        /// What is free, and its bounds. Absent: length scale, or that of each axis where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a millionth for
-        /// alpha) to a hundred times of where the search begins.
+        /// What is free, and its bounds; 64 entries at most. Absent: length scale, or that of each axis where `kernel` has them, and variance, from a
+        /// hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a millionth of where it begins, or
+        /// of a millionth of the variance if that is more, to a hundred times the variance.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false)]
         pub vary: Option<Vec<FreeParameter>>,
-        /// Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent.
+        /// Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent, and matern where nu varies.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub families: Option<Vec<KernelFamily>>,
@@ -122,12 +124,12 @@ pub struct PathEntry {
 /// What each value is predicted to be from all others.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct LeftOut {
-    /// The predictions, in the order of the points.
-    pub means: Vec<f64>,
+    /// The predictions, in the order of the points; null where the mean is not determined without the point.
+    pub means: Vec<Option<f64>>,
     /// The variances of the values predicted, their noise included.
-    pub variances: Vec<f64>,
+    pub variances: Vec<Option<f64>>,
     /// The logarithms of the densities of the values under their predictions.
-    pub log_predictive_densities: Vec<f64>,
+    pub log_predictive_densities: Vec<Option<f64>>,
 }
 
 impl Member for LeftOut {
@@ -173,7 +175,7 @@ answer! {
         evaluations: usize,
         /// The families that were tried.
         families: Vec<FamilyScore>,
-        /// The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`.
+        /// The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`, and beyond 3,000 points.
         path: Vec<PathEntry>,
         /// Each value predicted from all others, in closed form.
         leave_one_out: LeftOut,
@@ -187,7 +189,7 @@ answer! {
 /// Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving one out or by generalized cross-validation: from the
 /// kernel of the request, or the one that is learned if there is none, and from further starts, by sequential quadratic programming with exact slopes within
 /// bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value predicted from all others. Every evaluation costs a
-/// few factorizations.
+/// few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent with all of them.
 #[utoipa::path(
     post,
     path = "/v1/model-selection",
@@ -208,6 +210,12 @@ pub async fn select_model(
 /// α of a path.
 const N_ALPHAS: usize = 61;
 
+/// Points of a path at most: nothing looks whether anybody waits while its eigendecomposition is made, some seconds here.
+const MAX_PATH_POINTS: usize = 3000;
+
+/// Points of a selection at most: the same of its factorizations, and a hundred of these take minutes.
+const MAX_POINTS: usize = 5000;
+
 impl Operation for ModelSelectionRequest {
     type Work = Work;
     type Answer = ModelSelectionResponse;
@@ -225,6 +233,13 @@ impl Operation for ModelSelectionRequest {
         let mut main = planner.values_fit(fit, Some(dense_only))?;
         planner.queries(None, &mut [&mut main])?;
         let (n, d) = (main.n_points(), main.stored.cloud.dimension());
+        if n > MAX_POINTS {
+            let problem =
+                Problem::too_large(Slug::ProblemTooLarge, "points of a selection", MAX_POINTS, Some(n));
+            let remedy = "select on a sample of the points, and send what was found with all of them";
+            return Err(problem.at(main.pointers.points).with_remedy(remedy));
+        }
+        search.check_axes_of(d)?;
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
         let cost = Cost { work: search.price((n, d), main.n_length_scales()), n_numbers, n_held: n };
         Ok(Plan { main, surface: None, work: Work { values, search }, cost })

@@ -152,7 +152,7 @@ pub fn plan_applied(
     let mut n_numbers = m.checked_mul(numbers_per_query(d));
     let of_operator = n_numbers.unwrap_or(usize::MAX);
     if has_deviations {
-        work = work.and(deviations_price(n_values, of_operator));
+        work = work.and(deviations_price(n_values, of_operator, d));
         n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
     }
     if surface.is_some() {

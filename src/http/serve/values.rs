@@ -58,8 +58,8 @@ pub struct ValuesRequest<'a> {
     pub queries: &'a Cloud,
     pub order: JetOrder,
     pub has_variances: bool,
-    /// Deviations of value and derivatives, up to the order.
-    pub has_deviations: bool,
+    /// Deviations of value and derivatives that are wanted, up to these.
+    pub deviations: Option<JetOrder>,
 }
 
 impl Fits {
@@ -112,8 +112,10 @@ impl Fits {
         asked: ValuesRequest<'_>,
         observer: &JobObserver,
     ) -> Result<ValuesAt, Problem> {
-        let ValuesRequest { order, has_variances, has_deviations, .. } = asked;
-        let request = MovingRequest { order, has_variances, has_deviations };
+        // It has deviations of what it finds.
+        let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
+        let has_deviations = asked.deviations.is_some();
+        let request = MovingRequest { order, has_variances: asked.has_variances, has_deviations };
         let plan = &self.main.plan;
         let values = self.main.merged(asked.values);
         let rest = match &plan.trend {
@@ -155,11 +157,9 @@ impl Fits {
         asked: ValuesRequest<'_>,
         observer: &JobObserver,
     ) -> Result<Option<JetDeviations>, Problem> {
-        if !asked.has_deviations {
-            return Ok(None);
-        }
-        let (scale, order) = (self.main.plan.scale, asked.order.degree());
-        let found = JetDeviations::of(function, scale, asked.queries, order, observer);
+        let Some(order) = asked.deviations else { return Ok(None) };
+        let scale = self.main.plan.scale;
+        let found = JetDeviations::of(function, scale, asked.queries, order.degree(), observer);
         found.map(Some).map_err(|error| self.main.refused(error))
     }
 }

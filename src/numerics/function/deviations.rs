@@ -1,13 +1,15 @@
 //! Standard deviations of a function and its derivatives.
 
-use super::functionals::{JetFunctional, deviations, has_variance};
+use std::ops::Range;
+
+use super::functionals::{FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance};
 use super::interpolant::Interpolant;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 
 /// Standard deviations of a jet at m queries given the values.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct JetDeviations {
     /// `[m]`, unit V.
     pub values: Vec<f64>,
@@ -15,6 +17,8 @@ pub struct JetDeviations {
     pub gradients: Vec<f64>,
     /// `[m, d, d]`, unit V/L²; empty unless asked for.
     pub hessians: Vec<f64>,
+    /// Queries, ascending, where rounding made a variance negative: the deviation is 0.
+    pub clamped: Vec<usize>,
 }
 
 impl JetDeviations {
@@ -36,15 +40,23 @@ impl JetDeviations {
             return Err(NumericsError::DerivativesVary { order });
         }
         let (m, d) = (queries.n_points(), queries.dimension());
-        let found = deviations((solver, solution, factor), queries, &functionals(m, d, order), observer)?;
-        Ok(Self::of_packed(&found, d, order))
+        let width = width(d, order);
+        let per_block = (FUNCTIONALS_PER_BLOCK / width).max(1);
+        let (mut all, mut clamped) = (Vec::with_capacity(m * width), Vec::new());
+        for first in (0..m).step_by(per_block) {
+            let functionals = functionals(first..(first + per_block).min(m), d, order);
+            let found = deviations((solver, solution, factor), queries, &functionals, observer)?;
+            clamped.extend(found.clamped.iter().map(|at| functionals[*at].query));
+            all.extend(found.found);
+        }
+        clamped.dedup();
+        Ok(Self { clamped, ..Self::of_packed(&all, d, order) })
     }
 
     /// From value, derivatives and upper triangle of the Hessian, query by query, as far as the order goes.
     pub(super) fn of_packed(found: &[f64], d: usize, order: usize) -> Self {
-        let width = [1, 1 + d, 1 + d + d * (d + 1) / 2][order.min(2)];
-        let mut of = Self { values: Vec::new(), gradients: Vec::new(), hessians: Vec::new() };
-        for jet in found.chunks_exact(width) {
+        let mut of = Self::default();
+        for jet in found.chunks_exact(width(d, order)) {
             let (value, rest) = jet.split_at(1);
             of.values.extend(value);
             let (gradient, hessian) = rest.split_at(if order >= 1 { d } else { 0 });
@@ -67,10 +79,15 @@ impl JetDeviations {
     }
 }
 
-/// Value, derivatives, and the upper triangle of the Hessian, query by query.
-fn functionals(m: usize, d: usize, order: usize) -> Vec<JetFunctional> {
-    let mut functionals = Vec::new();
-    for query in 0..m {
+/// Functionals of a query: its value, derivatives, and the upper triangle of the Hessian, as far as the order goes.
+fn width(d: usize, order: usize) -> usize {
+    [1, 1 + d, 1 + d + d * (d + 1) / 2][order.min(2)]
+}
+
+/// These, query by query.
+fn functionals(queries: Range<usize>, d: usize, order: usize) -> Vec<JetFunctional> {
+    let mut functionals = Vec::with_capacity(queries.len() * width(d, order));
+    for query in queries {
         functionals.push(JetFunctional::value(query, d));
         if order >= 1 {
             functionals.extend((0..d).map(|axis| {

@@ -42,7 +42,11 @@ pub(crate) fn errors_under(
 ) -> Result<Vec<f64>, NumericsError> {
     let mut found = Vec::with_capacity(functionals.len());
     for block in functionals.chunks(JUDGED_AT_ONCE) {
-        found.extend(errors_of_block(process, interpolant, queries, block, observer)?);
+        // Of a size whose square has a number.
+        let sizes: Vec<f64> = block.iter().map(|functional| functional.size(process.kernel)).collect();
+        let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
+        let errors = errors_of_block(process, interpolant, queries, &block, observer)?;
+        found.extend(errors.iter().zip(sizes).map(|(error, size)| error * size));
     }
     Ok(found)
 }
@@ -152,7 +156,7 @@ mod tests {
                     Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
                 let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
                 let of = (&*u.solver, &*u.solution, 1.0);
-                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap();
+                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap().found;
                 for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
                     // Terms of the size of what is not known beforehand cancel to rounding.
                     let prior = functional.prior_variance(&kernel);

@@ -3,8 +3,6 @@
 //! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, `F` of k(·, x_j) is its covariance with the value at x_j,
 //! and its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value (Rasmussen and Williams 2006, sec. 9.4).
 
-use std::borrow::Cow;
-
 use faer::{ColRef, MatMut};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -23,7 +21,7 @@ use crate::numerics::sums::jets::check_smooth_at;
 use crate::numerics::sums::nodes::Nodes;
 
 /// Functionals whose columns are held at once.
-const FUNCTIONALS_PER_BLOCK: usize = 512;
+pub(crate) const FUNCTIONALS_PER_BLOCK: usize = 512;
 
 /// `c u + g·∇u + A : D²u` at a query.
 #[derive(Debug, Clone)]
@@ -55,16 +53,30 @@ impl JetFunctional {
         Self { query, of_value: 0.0, of_gradient: zeros(dimension), of_hessian }
     }
 
-    /// The same of a function of the coordinates that a kernel stretches: gradients get the factors of their axes, Hessians those of both.
-    fn stretched(&self, kernel: &Kernel) -> Cow<'_, Self> {
-        if !kernel.is_stretched() {
-            return Cow::Borrowed(self);
-        }
+    /// The same of a function of the coordinates in units of the length scale, as the kernel stretches them: gradients get the factors of their
+    /// axes, Hessians those of both.
+    fn in_length_scales(&self, kernel: &Kernel) -> Self {
         let (mut found, d) = (self.clone(), self.of_gradient.len());
-        found.of_gradient.iter_mut().enumerate().for_each(|(a, g)| *g *= kernel.stretch(a));
+        let factor = |axis: usize| kernel.stretch(axis) / kernel.length_scale();
+        found.of_gradient.iter_mut().enumerate().for_each(|(a, g)| *g *= factor(a));
         let entries = found.of_hessian.iter_mut().enumerate();
-        entries.for_each(|(at, entry)| *entry *= kernel.stretch(at / d) * kernel.stretch(at % d));
-        Cow::Owned(found)
+        entries.for_each(|(at, entry)| *entry *= factor(at / d) * factor(at % d));
+        found
+    }
+
+    /// How large it is in units of the length scale, where the squares of what it finds may have no number; 1 for nothing.
+    pub(super) fn size(&self, kernel: &Kernel) -> f64 {
+        let Self { of_value, of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
+        let largest = of_gradient.iter().chain(&of_hessian).fold(of_value.abs(), |a, b| a.max(b.abs()));
+        if largest > 0.0 { largest } else { 1.0 }
+    }
+
+    /// That part of it.
+    pub(super) fn over(&self, size: f64) -> Self {
+        let mut found = self.clone();
+        found.of_value /= size;
+        found.of_gradient.iter_mut().chain(&mut found.of_hessian).for_each(|entry| *entry /= size);
+        found
     }
 
     /// Of a mean.
@@ -97,22 +109,16 @@ impl JetFunctional {
     /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
     /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
     pub(crate) fn prior_variance(&self, kernel: &Kernel) -> f64 {
-        self.stretched(kernel).prior_variance_of_stretched(kernel)
-    }
-
-    fn prior_variance_of_stretched(&self, kernel: &Kernel) -> f64 {
+        let Self { of_value, of_gradient, of_hessian, .. } = &self.in_length_scales(kernel);
         let [value, slope, bend] = kernel.profile_at_zero();
-        let (v, inverse_square) = (kernel.variance(), kernel.inverse_square_length());
-        let first = 2.0 * slope * inverse_square;
-        let of_slopes = -first * dot(&self.of_gradient, &self.of_gradient);
-        let mut total = self.of_value * self.of_value * value + of_slopes;
+        let first = 2.0 * slope;
+        let mut total = of_value * of_value * value - first * dot(of_gradient, of_gradient);
         if self.has_hessian() {
-            let trace = self.trace();
-            let squares = dot(&self.of_hessian, &self.of_hessian);
-            total += 2.0 * self.of_value * trace * first;
-            total += 4.0 * bend * inverse_square * inverse_square * (trace * trace + 2.0 * squares);
+            let trace: f64 = of_hessian.iter().step_by(of_gradient.len() + 1).sum();
+            total += 2.0 * of_value * trace * first;
+            total += 4.0 * bend * (trace * trace + 2.0 * dot(of_hessian, of_hessian));
         }
-        v * total
+        kernel.variance() * total
     }
 }
 
@@ -125,8 +131,15 @@ pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
     }
 }
 
-/// Standard deviations of functionals given values at the points, `[functionals]`, for a kernel and noise that are `factor` times those of the
-/// solver. A variance that rounding makes negative is 0.
+/// Standard deviations of functionals.
+pub(crate) struct Deviations {
+    /// `[functionals]`
+    pub(crate) found: Vec<f64>,
+    /// Functionals whose variance rounding made negative: their deviation is 0.
+    pub(crate) clamped: Vec<usize>,
+}
+
+/// Standard deviations of functionals given values at the points, for a kernel and noise that are `factor` times those of the solver.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] at points of the cloud; [`NumericsError::NotPositiveDefinite`]
@@ -136,7 +149,7 @@ pub(crate) fn deviations(
     queries: &Cloud,
     functionals: &[JetFunctional],
     observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Result<Deviations, NumericsError> {
     let (n, kernel) = (solver.n_points(), solver.kernel());
     solver.cloud().check_same_dimension(queries)?;
     if functionals.iter().any(JetFunctional::has_derivatives) {
@@ -145,12 +158,15 @@ pub(crate) fn deviations(
     let covariances = Covariant::of(solver.cloud(), kernel);
     let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
     let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];
-    let mut found = Vec::with_capacity(functionals.len());
+    let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
     for block in functionals.chunks(FUNCTIONALS_PER_BLOCK) {
         observer.checkpoint()?;
+        // Of a size whose square has a number.
+        let sizes: Vec<f64> = block.iter().map(|functional| functional.size(kernel)).collect();
+        let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
         observer.enter(Stage::Evaluate);
         let columns = &mut buffer[..n * block.len()];
-        covariances.fill(block, queries, columns);
+        covariances.fill(&block, queries, columns);
         observer.enter(Stage::Solve);
         solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()))?;
         let variance = |(column, functional): (&[f64], &JetFunctional)| {
@@ -161,14 +177,20 @@ pub(crate) fn deviations(
             });
             let variance = functional.prior_variance(kernel) - explained;
             // What is no number stays none.
-            (if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0)
+            ((if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0), variance < 0.0)
         };
-        let variances = columns.par_chunks_exact(n).zip(block).map(variance);
-        found.extend(variances.map(|variance| (factor * variance).sqrt()).collect::<Vec<f64>>());
+        let variances = columns.par_chunks_exact(n).zip(&block).map(variance).collect::<Vec<_>>();
+        let first = found.len();
+        for (at, ((variance, is_negative), size)) in variances.into_iter().zip(sizes).enumerate() {
+            found.push(factor.sqrt() * variance.sqrt() * size);
+            if is_negative {
+                clamped.push(first + at);
+            }
+        }
     }
     match found.iter().position(|deviation| !deviation.is_finite()) {
         Some(at) => Err(NumericsError::Overflow { query: functionals[at].query }),
-        None => Ok(found),
+        None => Ok(Deviations { found, clamped }),
     }
 }
 
@@ -187,13 +209,13 @@ impl<'a> Covariant<'a> {
     pub(crate) fn fill(&self, functionals: &[JetFunctional], queries: &Cloud, columns: &mut [f64]) {
         let Self { nodes, kernel } = self;
         columns.par_chunks_exact_mut(nodes.n_points()).zip(functionals).for_each(|(column, functional)| {
-            let (x, functional) = (queries.point(functional.query), &*functional.stretched(kernel));
+            let (x, functional) = (queries.point(functional.query), &functional.in_length_scales(kernel));
             nodes.dispatch(Covariances { nodes, kernel, functional, x, column });
         });
     }
 }
 
-/// `F k(·, x_j)` for all j: with D = x − x_j, `v[cφ + 2φ′/ℓ² (g·D + tr A) + 4φ″/ℓ⁴ DᵀAD]`, all of it as the kernel stretches it.
+/// `F k(·, x_j)` for all j: with s = (x − x_j)/ℓ, `v[cφ + 2φ′(g·s + tr A) + 4φ″ sᵀAs]`, s, g and A in units of ℓ, as the kernel stretches them.
 struct Covariances<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
@@ -238,7 +260,7 @@ struct CovariancePairs<'a, 'b, S> {
 }
 
 impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
-    /// g·D and DᵀAD/ℓ².
+    /// g·s and sᵀAs.
     type Others = (Pack<S>, Pack<S>);
 
     #[inline(always)]
@@ -247,8 +269,10 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
         let d = x.len();
         let zero = Pack::splat(self.simd, 0.0);
         let mut along = zero;
+        let inverse = 1.0 / kernel.length_scale();
         let differences = &mut *self.differences;
         let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+            let difference = difference * inverse;
             along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
             difference.store(&mut differences[c], at);
         });
@@ -263,13 +287,13 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
                 form = Pack::load(self.simd, &self.differences[a], at).mul_add(row, form);
             }
         }
-        (q, (along, form * kernel.inverse_square_length()))
+        (q, (along, form))
     }
 
     #[inline(always)]
     fn take(&mut self, at: usize, (along, form): Self::Others, [value, slope, bend]: [Pack<S>; 3]) {
         let Covariances { kernel, functional, .. } = *self.of;
-        let first = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        let first = 2.0 * kernel.variance();
         let of_slopes = first * slope * (along + self.trace);
         let of_bends = (2.0 * first) * bend * form;
         // φ″ may be as great as float64 has it where D is 0.

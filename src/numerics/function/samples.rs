@@ -14,6 +14,9 @@ use crate::numerics::solver::parallelism;
 /// Variances below this multiple of ε, the queries and the prior variance are rounding of the covariance.
 const ROUNDING: f64 = 64.0;
 
+/// Draws that are made at once.
+const DRAWS_PER_BLOCK: usize = 256;
+
 /// `C ≈ LLᵀ` of a covariance `[m, m]`, which has whatever rank float64 leaves it.
 pub struct Root {
     /// `[r, m]` row by row: r independent directions.
@@ -35,6 +38,11 @@ impl Root {
         observer.enter(Stage::Solve);
         observer.checkpoint()?;
         let m = covariance.latent.len().isqrt();
+        let rounding = ROUNDING * f64::EPSILON * m as f64 * prior_variance;
+        // Where nothing varies there is nothing to factorize; what is no number goes on.
+        if covariance.latent.iter().step_by(m + 1).all(|variance| *variance <= rounding) {
+            return Ok(Self { directions: Vec::new(), n_queries: m });
+        }
         let mut factor = covariance.latent.clone();
         let (mut order, mut inverse) = (vec![0usize; m], vec![0usize; m]);
         let par = parallelism((m * m * m) as f64 / 3.0);
@@ -49,7 +57,6 @@ impl Root {
             Default::default(),
         )
         .map_err(|_| NumericsError::WeightsOverflow)?;
-        let rounding = ROUNDING * f64::EPSILON * m as f64 * prior_variance;
         let is_signal = |column: &usize| factor[column * (m + 1)].powi(2) > rounding;
         let rank = (0..info.rank).take_while(is_signal).count();
         let mut directions = vec![0.0; rank * m];
@@ -60,19 +67,33 @@ impl Root {
     }
 
     /// Draws `[count, m]` about means `[m]`. What a draw is depends on the seed, the list and its place in it, not on how many others there are.
-    pub fn draw(&self, means: &[f64], count: usize, (seed, list): (u64, u64)) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn draw(
+        &self,
+        means: &[f64],
+        count: usize,
+        (seed, list): (u64, u64),
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
         let m = self.n_queries;
         let rank = self.directions.len().checked_div(m).unwrap_or(0);
-        let mut normals = vec![0.0; rank * count];
-        for (draw, numbers) in normals.chunks_exact_mut(rank.max(1)).enumerate() {
-            Random::of(seed, (list << 32) ^ draw as u64).fill_normal(numbers);
-        }
+        let mut normals = vec![0.0; rank * count.min(DRAWS_PER_BLOCK)];
         let mut draws: Vec<f64> = means.iter().copied().cycle().take(m * count).collect();
-        let out = MatMut::from_column_major_slice_mut(&mut draws, m, count);
         let directions = MatRef::from_column_major_slice(&self.directions, m, rank);
-        let normals = MatRef::from_column_major_slice(&normals, rank, count);
-        matmul(out, Accum::Add, directions, normals, 1.0, parallelism((2 * m * rank * count) as f64));
-        draws
+        for (block, draws) in draws.chunks_mut(m * DRAWS_PER_BLOCK).enumerate() {
+            observer.checkpoint()?;
+            let (first, count) = (block * DRAWS_PER_BLOCK, draws.len() / m);
+            let normals = &mut normals[..rank * count];
+            for (draw, numbers) in normals.chunks_exact_mut(rank.max(1)).enumerate() {
+                Random::of(seed, (list << 32) ^ (first + draw) as u64).fill_normal(numbers);
+            }
+            let out = MatMut::from_column_major_slice_mut(draws, m, count);
+            let normals = MatRef::from_column_major_slice(normals, rank, count);
+            matmul(out, Accum::Add, directions, normals, 1.0, parallelism((2 * m * rank * count) as f64));
+        }
+        Ok(draws)
     }
 }
 
@@ -105,8 +126,9 @@ mod tests {
             let covariance = covariance(&solver, &queries, &Unobserved).unwrap();
             let root = Root::of(&covariance, kernel.at_zero(), &Unobserved).unwrap();
             let means: Vec<f64> = (0..m).map(|i| i as f64).collect();
-            let draws = root.draw(&means, count, (3, 0));
-            assert_eq!(root.draw(&means, 5, (3, 0)), draws[..5 * m], "a draw does not depend on the others");
+            let draws = root.draw(&means, count, (3, 0), &Unobserved).unwrap();
+            let few = root.draw(&means, 5, (3, 0), &Unobserved).unwrap();
+            assert_eq!(few, draws[..5 * m], "a draw does not depend on the others");
             let at = |draw: usize, query: usize| draws[draw * m + query] - means[query];
             for i in 0..m {
                 for j in 0..=i {
@@ -124,8 +146,11 @@ mod tests {
 
     #[test]
     fn what_is_known_exactly_does_not_vary() {
-        let covariance = Covariance { latent: vec![0.0, 0.0, 0.0, 1e-17], clamped: vec![0] };
-        let root = Root::of(&covariance, 1.0, &Unobserved).unwrap();
-        assert_eq!(root.draw(&[1.0, 2.0], 2, (0, 0)), [1.0, 2.0, 1.0, 2.0]);
+        for variance in [0.0, 1e-17] {
+            let covariance = Covariance { latent: vec![0.0, 0.0, 0.0, variance], clamped: vec![0] };
+            let root = Root::of(&covariance, 1.0, &Unobserved).unwrap();
+            let draws = root.draw(&[1.0, 2.0], 2, (0, 0), &Unobserved).unwrap();
+            assert_eq!(draws, [1.0, 2.0, 1.0, 2.0]);
+        }
     }
 }

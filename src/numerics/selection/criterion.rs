@@ -91,7 +91,8 @@ impl Criterion {
                 let (misfit, freedom) = misfit_and_freedom(parts);
                 let square = freedom * freedom;
                 Sensitivity {
-                    scale: -2.0 * n * misfit / (square * freedom),
+                    // In this order the cube of what may be very large or small is never there.
+                    scale: -2.0 * n * (misfit / square) / freedom,
                     of_columns: Some(parts.relative_noise.to_vec()),
                     right: times_weights(n / square, parts.relative_noise),
                 }
@@ -106,7 +107,9 @@ impl Criterion {
             Self::MarginalLikelihood | Self::LeaveOneOut => (score, 1.0),
             Self::GeneralizedCrossValidation => {
                 let (half, error) = (0.5 * n_points as f64, (-score).max(f64::MIN_POSITIVE));
-                (-half * error.ln(), half / error)
+                // Values that leave nothing to explain have no slope to follow.
+                let slope = if score < 0.0 { half / error } else { 0.0 };
+                (-half * error.ln(), slope)
             }
         }
     }

@@ -174,9 +174,10 @@ fn free_slopes<'a>(
     slopes: &'a [f64],
     bounds: &'a [(f64, f64)],
 ) -> impl Iterator<Item = f64> + 'a {
-    x.iter().zip(slopes).zip(bounds).map(|((&x, &slope), &bounds)| match side(x, bounds) {
-        Some(Side::Max) if slope > 0.0 => 0.0,
-        Some(Side::Min) if slope < 0.0 => 0.0,
+    // At both, where the bounds are equal.
+    x.iter().zip(slopes).zip(bounds).map(|((&x, &slope), &(min, max))| match slope {
+        _ if slope > 0.0 && max - x <= near(x) => 0.0,
+        _ if slope < 0.0 && x - min <= near(x) => 0.0,
         _ => slope,
     })
 }
@@ -190,10 +191,14 @@ pub enum Side {
 
 /// The bound that a number is at.
 pub(super) fn side(x: f64, (min, max): (f64, f64)) -> Option<Side> {
-    let near = AT_BOUND * (1.0 + x.abs());
     match x {
-        _ if x - min <= near => Some(Side::Min),
-        _ if max - x <= near => Some(Side::Max),
+        _ if x - min <= near(x) => Some(Side::Min),
+        _ if max - x <= near(x) => Some(Side::Max),
         _ => None,
     }
+}
+
+/// What a number at a bound may be off it.
+fn near(x: f64) -> f64 {
+    AT_BOUND * (1.0 + x.abs())
 }

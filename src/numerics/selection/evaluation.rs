@@ -36,7 +36,7 @@ pub(super) struct State {
     weights: Vec<f64>,
     /// T, `L⁻ᵀ` times an orthonormal basis of `L⁻¹F`, `[n, p]`: `P = W − TTᵀ`.
     of_mean: Vec<f64>,
-    /// `P_ii`, `[n]`; empty where it does not count.
+    /// `P_ii`, `[n]`, 0 where the mean leaves nothing of it; empty where it does not count.
     diagonal: Vec<f64>,
     relative_noise: Vec<f64>,
     energy: f64,
@@ -84,6 +84,18 @@ impl<'a> Evaluator<'a> {
         at: &Hyperparameters,
         observer: &dyn Observer,
     ) -> Result<Option<State>, NumericsError> {
+        Ok(self.state(at, observer)?.filter(|state| state.score.is_finite()))
+    }
+
+    /// The same, whatever the score; `None` where the matrix is not positive definite in float64.
+    ///
+    /// # Errors
+    /// Those of [`Evaluator::score`].
+    pub(super) fn state(
+        &mut self,
+        at: &Hyperparameters,
+        observer: &dyn Observer,
+    ) -> Result<Option<State>, NumericsError> {
         let kernel = at.kernel_on(self.subject.cloud)?;
         if !self.matrices.factorize((self.subject.cloud, &kernel), &at.noise, observer)? {
             return Ok(None);
@@ -111,7 +123,7 @@ impl<'a> Evaluator<'a> {
             state.diagonal = self.diagonal(&state.of_mean);
         }
         state.score = self.criterion.score(&state.parts());
-        Ok(state.score.is_finite().then_some(state))
+        Ok(Some(state))
     }
 
     /// Derivatives of the score in the logarithms of what is free, at the hyperparameters of the last score.
@@ -168,14 +180,14 @@ impl<'a> Evaluator<'a> {
         columns
     }
 
-    /// `P_ii = W_ii − |T_i|²`; NaN where it is rounding: then nothing but its value says what a point's value is.
+    /// `P_ii = W_ii − |T_i|²`; 0 where it is rounding: then nothing but its value says what a point's value is.
     fn diagonal(&mut self, of_mean: &[f64]) -> Vec<f64> {
         self.matrices.invert_factor();
         let n = self.subject.n_points();
         let entry = |(i, of_inverse): (usize, f64)| {
             let of_mean: f64 = of_mean.chunks_exact(n).map(|t| t[i] * t[i]).sum();
             let left = of_inverse - of_mean;
-            if left > UNDETERMINED * of_inverse { left } else { f64::NAN }
+            if left <= UNDETERMINED * of_inverse { 0.0 } else { left }
         };
         self.matrices.inverse_diagonal().into_iter().enumerate().map(entry).collect()
     }

@@ -23,7 +23,7 @@ use crate::numerics::sums::regularization::Regularization;
 /// Columns of `L⁻¹` that are held at once.
 const COLUMNS_PER_BLOCK: usize = 512;
 
-/// Predictions of each value from all others, `[n]` each, in the order of the points.
+/// Predictions of each value from all others, `[n]` each, in the order of the points; NaN where the mean is not determined without the point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeaveOneOut {
     /// Unit V.
@@ -39,7 +39,9 @@ pub struct LeaveOneOut {
 impl LeaveOneOut {
     /// From Λ and `P_ii`.
     fn of(values: &[f64], weights: &[f64], diagonal: &[f64], noise: &Regularization, factor: f64) -> Self {
-        let each = |of: &dyn Fn(usize) -> f64| (0..values.len()).map(of).collect::<Vec<f64>>();
+        let each = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..values.len()).map(|i| if diagonal[i] > 0.0 { of(i) } else { f64::NAN }).collect()
+        };
         let means = each(&|i| values[i] - weights[i] / diagonal[i]);
         let observation_variances = each(&|i| factor / diagonal[i]);
         let variances = each(&|i| (observation_variances[i] - factor * noise.at(i)).max(0.0));
@@ -77,10 +79,11 @@ pub fn leave_one_out(
     Ok(LeaveOneOut::of(values, &solution.weights, &diagonal, solver.regularization(), factor))
 }
 
-/// The predictions under hyperparameters, from a factorization of its own; 2n³/3 flops.
+/// The predictions under hyperparameters, from a factorization of its own; 2n³/3 flops. Points without which the mean is not determined have none.
 ///
 /// # Errors
-/// Those of [`leave_one_out`] and [`Hyperparameters::kernel_on`].
+/// Those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`]; [`NumericsError::NotPositiveDefinite`];
+/// [`NumericsError::MeanNotDetermined`] by all points; [`NumericsError::Cancelled`].
 pub fn leave_one_out_with(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
     at: &Hyperparameters,
@@ -90,7 +93,7 @@ pub fn leave_one_out_with(
     at.noise.check_matches(cloud)?;
     observer.enter(Stage::Factor);
     let mut evaluator = Evaluator::new(&subject, Criterion::LeaveOneOut, false);
-    let state = evaluator.score(at, observer)?.ok_or_else(|| never_definite(at, values.len()))?;
+    let state = evaluator.state(at, observer)?.ok_or_else(|| never_definite(at, values.len()))?;
     let (weights, diagonal) = state.into_weights_and_diagonal();
     Ok(LeaveOneOut::of(values, &weights, &diagonal, &at.noise, 1.0))
 }

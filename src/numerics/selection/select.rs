@@ -68,11 +68,14 @@ pub struct Selected {
 ///
 /// # Errors
 /// [`NumericsError::InvalidVariation`] with the entry; those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`] of values or noise;
-/// [`NumericsError::MeanNotDetermined`]; [`NumericsError::NotPositiveDefinite`] if the matrix is that at no start; [`NumericsError::Cancelled`].
+/// [`NumericsError::MeanNotDetermined`], for leave-one-out also where it is not without one of the points; [`NumericsError::NotPositiveDefinite`] if the matrix is that at no start; [`NumericsError::Cancelled`].
 pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
     let Selection { cloud, vary, start, .. } = *selection;
     let subject = Subject::of(cloud, selection.values, selection.mean)?;
     start.noise.check_matches(cloud)?;
+    if selection.criterion == Criterion::LeaveOneOut {
+        subject.check_without_one()?;
+    }
     let families = if selection.families.is_empty() { &[start.family] } else { selection.families };
     check_epsilon(families, vary)?;
     let mut spaces = Vec::with_capacity(families.len());

@@ -54,6 +54,7 @@ impl Space {
     /// Whether nothing is free twice, and α is one number.
     fn check_distinct(&self, vary: &[Variation]) -> Result<(), NumericsError> {
         let last = vary.len().saturating_sub(1);
+        let has_axes = self.base.length_scales.len() > 1 || self.per_axis();
         for (at, free) in self.free.iter().enumerate() {
             let entry = vary.iter().rposition(|v| v.parameter == free.parameter).unwrap_or(last);
             let refuse = |requirement| Err(NumericsError::InvalidVariation { entry, requirement });
@@ -61,7 +62,7 @@ impl Space {
                 return refuse("must not vary a parameter twice");
             }
             match free.parameter {
-                Parameter::LengthScale if self.base.length_scales.len() > 1 => {
+                Parameter::LengthScale if has_axes => {
                     return refuse("cannot vary one length scale where every axis has its own");
                 }
                 Parameter::Alpha if self.base.alpha().is_none() => {

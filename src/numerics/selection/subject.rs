@@ -8,6 +8,9 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::trend::{Basis, Mean, Trend, solve_gram};
 use crate::numerics::sums::regularization::Regularization;
 
+/// What a leverage lacks of 1 at least: less is rounding.
+const LEVERAGE: f64 = 1e-10;
+
 /// Values at the points of a cloud with a mean: what all evaluations share.
 pub(super) struct Subject<'a> {
     pub(super) cloud: &'a Cloud,
@@ -37,6 +40,26 @@ impl<'a> Subject<'a> {
         let shared = if p > 0 { values.iter().sum::<f64>() / n as f64 } else { 0.0 };
         let values = values.iter().map(|value| value - shared).collect();
         Ok(Self { cloud, values, shared, basis, functions, n_functions: p })
+    }
+
+    /// Whether the mean is determined without any one of the points: none has all of the leverage, `fᵀ(FᵀF)⁻¹f < 1`.
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`].
+    pub(super) fn check_without_one(&self) -> Result<(), NumericsError> {
+        let (n, p) = (self.n_points(), self.n_functions);
+        if p == 0 {
+            return Ok(());
+        }
+        let column = |a: usize| &self.functions[a * n..][..n];
+        let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
+        let rows = Mat::from_fn(p, n, |a, i| column(a)[i]);
+        let solved = solve_gram(&gram, rows).ok_or(NumericsError::MeanNotDetermined)?;
+        let leverage = |i: usize| (0..p).map(|a| column(a)[i] * solved[(a, i)]).sum::<f64>();
+        match (0..n).any(|i| leverage(i) >= 1.0 - LEVERAGE) {
+            true => Err(NumericsError::MeanNotDetermined),
+            false => Ok(()),
+        }
     }
 
     pub(super) fn n_points(&self) -> usize {

@@ -72,6 +72,8 @@ impl<'a, 'b> Walk<'a, 'b> {
             value = merit.map_or(f64::INFINITY, |merit| -self.scale * merit);
             if gradient.is_some() && merit.is_some() {
                 slopes = self.slopes(x)?;
+                // The optimizer would go to places that are none.
+                slopes.iter_mut().filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
             }
         }
         if let Some(gradient) = gradient {

@@ -304,13 +304,18 @@ impl Price {
     }
 }
 
+/// Bytes of what is known of a list of values beside numbers at points and queries, and the work of keeping it.
+const BYTES_PER_LIST: usize = 600;
+const FLOPS_PER_LIST: f64 = 5000.0;
+
 /// What k lists of values take beside the first: solves and sums in matrix products, and derivatives `n_derivatives` of each on their own.
 pub fn many_price(n_points: usize, n_queries: usize, n_lists: usize, n_derivatives: usize) -> Price {
     let (n, m, k) = (n_points as f64, n_queries as f64, n_lists as f64);
     let of_derivatives = if n_derivatives > 0 { 40.0 * n * m } else { 0.0 };
     let numbers = n_points.saturating_mul(6).saturating_add(n_queries.saturating_mul(1 + n_derivatives));
-    let n_bytes = n_lists.saturating_mul(numbers).saturating_mul(size_of::<f64>());
-    Price { n_bytes, flops: k * (6.0 * n * n + 2.0 * n * m + of_derivatives) }
+    let n_bytes =
+        n_lists.saturating_mul(numbers.saturating_mul(size_of::<f64>()).saturating_add(BYTES_PER_LIST));
+    Price { n_bytes, flops: k * (6.0 * n * n + 2.0 * n * m + of_derivatives + FLOPS_PER_LIST) }
 }
 
 /// What so many joint draws at m queries take beside their covariance: its factor, and the draws.
@@ -335,7 +340,7 @@ pub fn judging_price((n_points, dimension): (usize, usize), n_queries: usize, n_
     let judging = Price {
         n_bytes: numbers
             .saturating_mul(size_of::<f64>())
-            .saturating_add(n_functionals * BYTES_PER_FUNCTIONAL),
+            .saturating_add(n_functionals * functional_bytes(dimension)),
         flops: n * n * (4.0 * k + 40.0 * n_blocks) + 1000.0 * n_queries as f64,
     };
     // The sampling of a cloud of which nobody has asked it.
@@ -343,16 +348,20 @@ pub fn judging_price((n_points, dimension): (usize, usize), n_queries: usize, n_
     judging.and(Price { n_bytes, flops })
 }
 
-/// Bytes of a functional of jets as it waits for its turn.
-const BYTES_PER_FUNCTIONAL: usize = 400;
+/// Bytes of a functional of jets while it is looked at, twice.
+fn functional_bytes(dimension: usize) -> usize {
+    let beyond_the_stack = if dimension * dimension > 16 { dimension * dimension } else { 0 };
+    2 * (400 + beyond_the_stack * size_of::<f64>())
+}
 
 /// What the deviations of so many functionals take, as variances do.
-pub fn deviations_price(n_points: usize, n_functionals: usize) -> Price {
-    let n = n_points as f64;
-    let columns =
-        n_points.saturating_mul(n_functionals.min(VARIANCES_AT_ONCE) + 5).saturating_mul(size_of::<f64>());
-    let n_bytes = columns.saturating_add(n_functionals.saturating_mul(BYTES_PER_FUNCTIONAL));
-    Price { n_bytes, flops: n * (n + 60.0) * n_functionals as f64 }
+pub fn deviations_price(n_points: usize, n_functionals: usize, dimension: usize) -> Price {
+    let (n, d) = (n_points as f64, dimension as f64);
+    let n_at_once = n_functionals.min(VARIANCES_AT_ONCE);
+    let columns = n_points.saturating_mul(n_at_once + 5).saturating_mul(size_of::<f64>());
+    let found = n_functionals.saturating_mul(4 * size_of::<f64>());
+    let n_bytes = columns.saturating_add(found).saturating_add(n_at_once * functional_bytes(dimension));
+    Price { n_bytes, flops: n * (n + 60.0 + 4.0 * d * d) * n_functionals as f64 }
 }
 
 /// Numbers that a solve for new values takes at a point: the point, its value, two sets of weights with their sums and residuals

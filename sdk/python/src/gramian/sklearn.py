@@ -14,7 +14,7 @@ from .answers import Posterior
 from .client import Client
 from .cloud import Cloud
 from .fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
-from .problems import Problem
+from .problems import NotPositiveDefinite, Problem
 from .rest.models import KernelUsed, SolverUsed
 from .rest.types import Unset
 from .tensors import Array
@@ -65,7 +65,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     mean_coefficients_ : array of `[p]` or `[k, p]`
         The constant, then a slope per feature; p is 0, 1 or 1 + d.
     log_marginal_likelihood_value_ : float or None
-        Of the values, in the sum over columns; None by the local solver.
+        Of the values, in the sum over columns; None by the local solver, and where the matrix has no Cholesky factor.
     cloud_id_ : str
         The id of the samples in the service.
     X_train_, y_train_ : arrays
@@ -180,7 +180,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     def sample_y(
         self, X: npt.ArrayLike, n_samples: int = 1, random_state: int | np.random.RandomState | None = 0
     ) -> Array:
-        """Draws functions from the posterior, and returns their values, without noise.
+        """Draws functions from the posterior, and returns their values, without noise; not by the local solver.
 
         Parameters
         ----------
@@ -273,7 +273,11 @@ def _pinned(cloud: Cloud, values: Array, choices: dict[str, Any]) -> Posterior:
     answer = cloud.posterior(values, somewhere, **choices)
     if answer.diagnostics.solver is SolverUsed.LOCAL:
         return answer
-    return cloud.posterior(values, somewhere, include="log_marginal_likelihood", **answer.fit)
+    try:
+        return cloud.posterior(values, somewhere, include="log_marginal_likelihood", **answer.fit)
+    except NotPositiveDefinite:
+        # The matrix has means all the same, from the part of it that has a factor.
+        return answer
 
 
 def _stacked(answers: list[Posterior], member: str) -> Array:

@@ -132,7 +132,9 @@ impl Operation for InterpolationBatchRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<InterpolationBatchResponse, Problem> {
-        let EachAt { jets, diagnostics, deviations, batch, .. } = fits.each_at(work.asked(), observer)?;
+        let EachAt { jets, mut diagnostics, deviations, batch, .. } = fits.each_at(work.asked(), observer)?;
+        let clamped = deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
+        diagnostics.warn_of_clamping(clamped);
         let Work { queries, derivatives, .. } = work;
         let (k, m, d) = (batch.solutions.len(), queries.n_points(), queries.dimension());
         let [value_deviations, gradient_deviations, hessian_deviations] =

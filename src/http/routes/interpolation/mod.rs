@@ -118,7 +118,7 @@ impl Work {
             queries: &self.queries,
             order: order_of(self.derivatives),
             has_variances: false,
-            has_deviations: self.has_deviations,
+            deviations: self.has_deviations.then_some(order_of(self.derivatives)),
         }
     }
 }
@@ -156,7 +156,9 @@ impl Operation for InterpolationRequest {
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
-        let ValuesAt { jets, diagnostics, deviations, .. } = fits.values_at(work.asked(), observer)?;
+        let ValuesAt { jets, mut diagnostics, deviations, .. } = fits.values_at(work.asked(), observer)?;
+        let clamped = deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
+        diagnostics.warn_of_clamping(clamped);
         let (m, d) = (jets.n_queries(), jets.dimension());
         let [of_values, of_gradients, of_hessians] = arrays(deviations, (m, d), work.derivatives);
         Ok(InterpolationResponse {
@@ -193,7 +195,7 @@ fn numbers_per_query(d: usize, derivatives: u8) -> usize {
 
 /// Entries of a Hessian that are equal are counted once.
 fn price_of_deviations(n: usize, m: usize, d: usize, derivatives: u8) -> Price {
-    deviations_price(n, m.saturating_mul(deviations_per_query(d, derivatives)))
+    deviations_price(n, m.saturating_mul(deviations_per_query(d, derivatives)), d)
 }
 
 fn deviations_per_query(d: usize, derivatives: u8) -> usize {
@@ -202,7 +204,9 @@ fn deviations_per_query(d: usize, derivatives: u8) -> usize {
 
 /// Deviations of values, gradients and Hessians, those that are asked for.
 fn arrays(deviations: Option<JetDeviations>, (m, d): (usize, usize), derivatives: u8) -> [Option<Array>; 3] {
-    let Some(JetDeviations { values, gradients, hessians }) = deviations else { return [None, None, None] };
+    let Some(JetDeviations { values, gradients, hessians, .. }) = deviations else {
+        return [None, None, None];
+    };
     [
         Some(Array::new(values, &[m])),
         (derivatives >= 1).then(|| Array::new(gradients, &[m, d])),

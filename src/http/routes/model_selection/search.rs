@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    FamilyScore, FreeParameter, LeftOut, ModelSelectionRequest, ModelSelectionResponse, N_ALPHAS, PathEntry,
-    SelectionCriterion, SelectionParameter,
+    FamilyScore, FreeParameter, LeftOut, MAX_PATH_POINTS, ModelSelectionRequest, ModelSelectionResponse,
+    N_ALPHAS, PathEntry, SelectionCriterion, SelectionParameter,
 };
 use crate::http::compute::JobObserver;
 use crate::http::fields::{KernelFamily, KernelUsed};
@@ -24,6 +24,9 @@ use crate::numerics::solver::choose::Price;
 use crate::numerics::solver::trend::Trend;
 use crate::numerics::sums::regularization::Regularization;
 
+const BEYOND_KERNELS: &str =
+    "the variance of the values is beyond what kernels take, 1e-140 to 1e140; scale the values";
+
 /// Further starts where nothing is said of them.
 const RESTARTS: u8 = 2;
 const MAX_RESTARTS: u8 = 100;
@@ -31,6 +34,13 @@ const MAX_RESTARTS: u8 = 100;
 /// Without `vary`: how far from the start length scale and variance may go, and alpha downwards.
 const RANGE: f64 = 100.0;
 const RANGE_OF_ALPHA: f64 = 1e6;
+
+/// Entries of `vary` at most: more than there are parameters, an axis each included.
+const MAX_VARY: usize = 64;
+
+/// Between these numbers, which bounds may be.
+const KERNEL_NUMBERS: (f64, f64) = (1e-140, 1e140);
+const ALPHAS: (f64, f64) = (1e-300, 1e300);
 
 /// What is searched, as far as the request says.
 pub struct Search {
@@ -63,19 +73,43 @@ impl Search {
         if let Some(at) = (1..families.len()).find(|&at| families[..at].contains(&families[at])) {
             return Err(Problem::invalid_request(format!("/families/{at}"), "a family is tried once"));
         }
-        check_axes(request.vary.as_deref().unwrap_or_default())?;
+        let vary = request.vary.as_deref().unwrap_or_default();
+        if vary.len() > MAX_VARY {
+            let detail = format!("vary has {} entries, {MAX_VARY} are the most", vary.len());
+            return Err(Problem::invalid_request("/vary", detail));
+        }
+        check_axes(vary)?;
+        let orders = orders(vary)?;
+        let lacks_matern = !families.is_empty() && !families.contains(&KernelFamily::Matern);
+        if let Some(at) = vary.iter().position(is_nu).filter(|_| lacks_matern) {
+            let detail = "only matern has nu: add it to families, or leave this out";
+            return Err(Problem::invalid_request(format!("/vary/{at}"), detail));
+        }
         Ok(Self {
             criterion: match request.criterion.unwrap_or_default() {
                 SelectionCriterion::MarginalLikelihood => Criterion::MarginalLikelihood,
                 SelectionCriterion::LeaveOneOut => Criterion::LeaveOneOut,
                 SelectionCriterion::GeneralizedCrossValidation => Criterion::GeneralizedCrossValidation,
             },
-            orders: orders(request.vary.as_deref().unwrap_or_default())?,
+            orders,
             vary: request.vary.clone(),
             families,
             restarts: usize::from(restarts),
             seed: request.seed.unwrap_or_default(),
         })
+    }
+
+    /// # Errors
+    /// 422 for an axis that the points do not have.
+    pub(super) fn check_axes_of(&self, dimension: usize) -> Result<(), Problem> {
+        let is_beyond = |free: &FreeParameter| free.axis.is_some_and(|axis| axis >= dimension);
+        match self.vary.iter().flatten().position(is_beyond) {
+            None => Ok(()),
+            Some(at) => {
+                let detail = format!("the points have the axes 0 to {}", dimension - 1);
+                Err(Problem::invalid_request(format!("/vary/{at}/axis"), detail))
+            }
+        }
     }
 
     /// What the search takes, where it takes as long as it mostly does.
@@ -90,9 +124,12 @@ impl Search {
         let n_descents = n_families * (1 + self.restarts);
         let n_evaluations = n_descents * expected_evaluations(n_free);
         let threads = (n_descents, rayon::current_num_threads());
-        selection_price((n, d), self.criterion, n_free, n_evaluations, threads)
-            .and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS))
-            .and(leave_one_out_price(n, 1 + d))
+        let price = selection_price((n, d), self.criterion, n_free, n_evaluations, threads)
+            .and(leave_one_out_price(n, 1 + d));
+        match n <= MAX_PATH_POINTS {
+            true => price.and(alpha_path_price((n, d), self.criterion, 1 + d, N_ALPHAS)),
+            false => price,
+        }
     }
 
     /// The families that are tried, from that of the start.
@@ -110,6 +147,7 @@ impl Search {
         };
         match self.families.is_empty() {
             true if matches!(start, Family::Matern { .. }) => self.matern(start),
+            true if self.orders.is_some() => [vec![start], self.matern(start)].concat(),
             true => vec![start],
             false => self.families.iter().flat_map(given).collect(),
         }
@@ -145,19 +183,24 @@ impl Search {
 
 /// Length scale, variance and noise about the start.
 fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
-    let about = |parameter, x: f64, below: f64| Variation { parameter, min: x / below, max: x * RANGE };
+    let within = |(least, greatest): (f64, f64), x: f64| x.clamp(least, greatest);
+    let about = |parameter, x: f64| {
+        let [min, max] = [x / RANGE, x * RANGE].map(|x| within(KERNEL_NUMBERS, x));
+        Variation { parameter, min, max }
+    };
     let mut variations: Vec<Variation> = match start.length_scales[..] {
-        [length_scale] => vec![about(Parameter::LengthScale, length_scale, RANGE)],
+        [length_scale] => vec![about(Parameter::LengthScale, length_scale)],
         ref all => {
             let axes = all.iter().enumerate();
-            axes.map(|(axis, &scale)| about(Parameter::LengthScaleOfAxis(axis), scale, RANGE)).collect()
+            axes.map(|(axis, &scale)| about(Parameter::LengthScaleOfAxis(axis), scale)).collect()
         }
     };
-    variations.push(about(Parameter::Variance, start.variance, RANGE));
+    variations.push(about(Parameter::Variance, start.variance));
     if let Regularization::Uniform(alpha) = start.noise {
         // A start without noise says nothing of how much there may be.
-        let alpha = alpha.max(start.variance / RANGE_OF_ALPHA);
-        variations.push(about(Parameter::Alpha, alpha, RANGE_OF_ALPHA));
+        let least = alpha.max(start.variance / RANGE_OF_ALPHA) / RANGE_OF_ALPHA;
+        let [min, max] = [least, RANGE * alpha.max(start.variance)].map(|x| within(ALPHAS, x));
+        variations.push(Variation { parameter: Parameter::Alpha, min, max });
     }
     variations.into_iter().enumerate().collect()
 }
@@ -176,9 +219,12 @@ fn check_axes(vary: &[FreeParameter]) -> Result<(), Problem> {
     }
 }
 
+fn is_nu(free: &FreeParameter) -> bool {
+    free.parameter == SelectionParameter::Nu
+}
+
 /// The orders ν − ½ within bounds on ν.
 fn orders(vary: &[FreeParameter]) -> Result<Option<(u8, u8)>, Problem> {
-    let is_nu = |free: &FreeParameter| free.parameter == SelectionParameter::Nu;
     let Some(at) = vary.iter().position(is_nu) else { return Ok(None) };
     let FreeParameter { min, max, .. } = vary[at];
     let (least, most) = ((min - 0.5).ceil(), (max - 0.5).floor());
@@ -199,7 +245,10 @@ impl Work {
         let FitModel::Dense { kernel, regularization } = &plan.model else { return Err(Problem::internal()) };
         let interpolant = fits.interpolant(&values, observer)?;
         let diagnostics = fits.main.diagnostics(&interpolant.solution, plan.stored.cloud.n_points())?;
-        let start = scaled(kernel, regularization, plan.scale).map_err(|error| plan.refused(error))?;
+        let start = scaled(kernel, regularization, plan.scale).map_err(|error| match plan.is_learned {
+            true => Problem::invalid_request("/values", BEYOND_KERNELS),
+            false => plan.refused(error),
+        })?;
         let variations = search.variations(&start);
         let vary: Vec<Variation> = variations.iter().map(|(_, variation)| *variation).collect();
         let merged = fits.main.merged(&values);
@@ -220,9 +269,10 @@ impl Work {
         let refused = |error| match error {
             NumericsError::InvalidVariation { entry, requirement } => {
                 let entry = variations.get(entry).map_or(entry, |(at, _)| *at);
-                plan.refused(NumericsError::InvalidVariation { entry, requirement })
+                Problem::from_numerics(NumericsError::InvalidVariation { entry, requirement }, plan.pointers)
             }
-            other => plan.refused(other),
+            // In the unit of the values, as what is searched.
+            other => Problem::from_numerics(other, plan.pointers),
         };
         let selected = select(&selection, observer).map_err(refused)?;
         let left_out = leave_one_out_with((cloud, &merged, mean), &selected.hyperparameters, observer);
@@ -279,7 +329,8 @@ fn path(
     at: &Hyperparameters,
     observer: &JobObserver,
 ) -> Result<Vec<PathEntry>, NumericsError> {
-    if !matches!(at.noise, Regularization::Uniform(_)) {
+    let is_too_large = selection.cloud.n_points() > MAX_PATH_POINTS;
+    if is_too_large || !matches!(at.noise, Regularization::Uniform(_)) {
         return Ok(Vec::new());
     }
     let Selection { cloud, values, mean, criterion, .. } = *selection;
@@ -309,10 +360,11 @@ fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
 
 impl From<LeaveOneOut> for LeftOut {
     fn from(found: LeaveOneOut) -> Self {
+        let or_null = |list: Vec<f64>| list.into_iter().map(|x| Some(x).filter(|x| !x.is_nan())).collect();
         Self {
-            means: found.means,
-            variances: found.observation_variances,
-            log_predictive_densities: found.log_predictive_densities,
+            means: or_null(found.means),
+            variances: or_null(found.observation_variances),
+            log_predictive_densities: or_null(found.log_predictive_densities),
         }
     }
 }

@@ -54,7 +54,7 @@ pub struct Samples {
     /// Functions to draw.
     #[schema(minimum = 1)]
     pub count: usize,
-    /// Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+    /// Equal seeds give equal draws on processors of one kind, and more of them begin with the same ones; 0 if absent.
     #[serde(default)]
     #[schema(minimum = 0, maximum = 9007199254740991u64)]
     pub seed: u64,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{PosteriorQuantity as Q, Samples};
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Diagnostics, Fit, Warning, WarningCode};
+use crate::http::fields::{Diagnostics, Fit};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
@@ -13,6 +13,7 @@ use crate::http::serve::planner::{DenseOnly, Planner, check_seed};
 use crate::http::serve::values::{EachAt, ValuesAt, ValuesRequest};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
+use crate::numerics::error::NumericsError;
 use crate::numerics::function::batch::BatchJets;
 use crate::numerics::function::deviations::JetDeviations;
 use crate::numerics::function::interpolant::Interpolant;
@@ -126,7 +127,7 @@ impl Asked {
             price = price.and(many_price(n, m, k, if self.wants(Q::Gradients) { d } else { 0 }));
         }
         if self.wants(Q::GradientVariances) {
-            price = price.and(deviations_price(n, m.saturating_mul(self.n_deviations(d))));
+            price = price.and(deviations_price(n, m.saturating_mul(self.n_deviations(d)), d));
         }
         if self.samples.is_some() {
             price = price.and(samples_price(m, self.n_samples().saturating_mul(k)));
@@ -174,14 +175,12 @@ impl Work {
     }
 
     fn request(&self) -> ValuesRequest<'_> {
-        let has_deviations = self.asked.wants(Q::GradientVariances);
-        let has_gradients = has_deviations || self.asked.wants(Q::Gradients);
         ValuesRequest {
             values: &self.values,
             queries: &self.queries,
-            order: if has_gradients { JetOrder::Gradient } else { JetOrder::Value },
+            order: if self.asked.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value },
             has_variances: self.asked.needs_variances(),
-            has_deviations,
+            deviations: self.asked.wants(Q::GradientVariances).then_some(JetOrder::Gradient),
         }
     }
 }
@@ -263,13 +262,15 @@ impl Found {
             }
         };
         let clamped = variances.as_ref().map(|v| &v.clamped).or(covariance.as_ref().map(|c| &c.clamped));
-        warn_of_clamping(clamped.map_or(&[], Vec::as_slice), &mut diagnostics);
+        let clamped = clamped.or(deviations.as_ref().map(|deviations| &deviations.clamped));
+        diagnostics.warn_of_clamping(clamped.map_or(&[], Vec::as_slice));
         let shape = |of_each: &[usize]| [&leading, of_each].concat();
         let samples = match (asked.samples, &covariance) {
             (Some(samples), Some(covariance)) => {
                 let prior_variance = function()?.solver.kernel().at_zero() * scale;
                 let root = Root::of(covariance, prior_variance, observer).map_err(refused)?;
-                Some(Array::new(draws(&root, &jets.values, m, samples), &shape(&[samples.count, m])))
+                let drawn = draws(&root, &jets.values, m, samples, observer).map_err(refused)?;
+                Some(Array::new(drawn, &shape(&[samples.count, m])))
             }
             (None, _) | (_, None) => None,
         };
@@ -306,9 +307,18 @@ impl Found {
 }
 
 /// Draws `[k, count, m]`, each list with numbers of its own.
-fn draws(root: &Root, means: &[f64], m: usize, Samples { count, seed }: Samples) -> Vec<f64> {
-    let lists = means.chunks_exact(m).enumerate();
-    lists.flat_map(|(list, means)| root.draw(means, count, (seed, list as u64))).collect()
+fn draws(
+    root: &Root,
+    means: &[f64],
+    m: usize,
+    Samples { count, seed }: Samples,
+    observer: &JobObserver,
+) -> Result<Vec<f64>, NumericsError> {
+    let mut all = Vec::with_capacity(means.len() * count);
+    for (list, means) in means.chunks_exact(m).enumerate() {
+        all.extend(root.draw(means, count, (seed, list as u64), observer)?);
+    }
+    Ok(all)
 }
 
 /// What follows from means `[k, m]` and variances `[m]` of normal distributions.
@@ -350,15 +360,4 @@ impl Bands<'_> {
         };
         Some(self.means.iter().zip(variances.latent.iter().cycle()).map(of_one).collect())
     }
-}
-
-fn warn_of_clamping(clamped: &[usize], diagnostics: &mut Diagnostics) {
-    let Some(first) = clamped.first() else { return };
-    let count = clamped.len();
-    diagnostics.warnings.push(Warning {
-        code: WarningCode::VarianceClamped,
-        detail: format!(
-            "{count} variances came out negative within rounding, first at query {first}; served as 0"
-        ),
-    });
 }

@@ -168,8 +168,9 @@ impl Moving {
         let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
         let deviations = request.has_deviations.then(|| {
             let values = sure.iter_mut().step_by(n_sure).zip(&variances.latent);
-            values.for_each(|(slot, variance)| *slot = variance.sqrt());
-            JetDeviations::of_packed(&sure, d, request.order.degree())
+            values.for_each(|(slot, variance)| *slot = if *slot < 0.0 { -0.0 } else { variance.sqrt() });
+            let clamped = of_clamped(&mut sure, n_sure);
+            JetDeviations { clamped, ..JetDeviations::of_packed(&sure, d, request.order.degree()) }
         });
         let variances = request.has_variances.then_some(variances);
         Ok(MovingAnswer { jets, variances, deviations, n_dependent: n_dependent.into_inner() })
@@ -204,6 +205,18 @@ struct Derivative {
     prior_variance: f64,
     /// What turns its deviation in units of ℓ into one along the axes.
     unit: f64,
+}
+
+/// The queries with a deviation of −0, which says that rounding made its variance negative; it is 0 then.
+fn of_clamped(deviations: &mut [f64], per_query: usize) -> Vec<usize> {
+    let mut clamped = Vec::new();
+    for (query, deviations) in deviations.chunks_exact_mut(per_query).enumerate() {
+        if deviations.iter().any(|deviation| deviation.is_sign_negative()) {
+            clamped.push(query);
+            deviations.iter_mut().for_each(|deviation| *deviation = deviation.abs());
+        }
+    }
+    clamped
 }
 
 /// Variances that rounding made negative, served as 0.
@@ -308,7 +321,7 @@ impl Fit<'_> {
             for ((slot, of), explained) in sure[1..].iter_mut().zip(&self.derivatives).zip(explained) {
                 let variance = of.prior_variance - explained;
                 // What is no number stays none.
-                *slot = of.unit * if variance < 0.0 { 0.0 } else { variance.sqrt() };
+                *slot = if variance < 0.0 { -0.0 } else { of.unit * variance.sqrt() };
             }
             if sure[1..].iter().any(|deviation| !deviation.is_finite()) {
                 return Err(NumericsError::Overflow { query });

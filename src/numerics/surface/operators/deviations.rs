@@ -8,7 +8,9 @@
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
 use crate::numerics::error::NumericsError;
-use crate::numerics::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::numerics::function::functionals::{
+    FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance,
+};
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::machine::vector::{dot, norm};
 use crate::numerics::observer::Observer;
@@ -94,12 +96,15 @@ impl Applied<'_> {
             return Err(NumericsError::DerivativesVary { order });
         }
         let width = operator.n_components(self.queries.dimension());
-        let functionals: Vec<JetFunctional> =
-            regular(self.geometry).flat_map(|query| self.functionals(operator, query)).collect();
-        let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+        let all: Vec<usize> = regular(self.geometry).collect();
         let mut total = vec![0.0; self.queries.n_points() * width];
-        for (query, found) in regular(self.geometry).zip(found.chunks_exact(width)) {
-            total[query * width..][..width].copy_from_slice(found);
+        for some in all.chunks((FUNCTIONALS_PER_BLOCK / width).max(1)) {
+            let functionals: Vec<JetFunctional> =
+                some.iter().flat_map(|&query| self.functionals(operator, query)).collect();
+            let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+            for (query, found) in some.iter().zip(found.found.chunks_exact(width)) {
+                total[query * width..][..width].copy_from_slice(found);
+            }
         }
         Ok(total)
     }

@@ -159,7 +159,7 @@ impl Judged<'_> {
                 let process = Process { kernel, noise, factor, trend: solution.trend.as_ref() };
                 errors_under(&process, interpolant, queries, functionals, observer)
             }
-            found => found,
+            found => found.map(|found| found.found),
         }
     }
 

@@ -16,24 +16,38 @@ class LeftOut:
     """What each value is predicted to be from all others.
 
     Attributes:
-        means (list[float]): The predictions, in the order of the points.
-        variances (list[float]): The variances of the values predicted, their noise included.
-        log_predictive_densities (list[float]): The logarithms of the densities of the values under their predictions.
+        means (list[float | None]): The predictions, in the order of the points; null where the mean is not determined
+            without the point.
+        variances (list[float | None]): The variances of the values predicted, their noise included.
+        log_predictive_densities (list[float | None]): The logarithms of the densities of the values under their
+            predictions.
     """
 
-    means: list[float]
-    variances: list[float]
-    log_predictive_densities: list[float]
+    means: list[float | None]
+    variances: list[float | None]
+    log_predictive_densities: list[float | None]
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     __repr__ = without_unset
 
     def to_dict(self) -> dict[str, Any]:
-        means = self.means
+        means = []
+        for means_item_data in self.means:
+            means_item: float | None
+            means_item = means_item_data
+            means.append(means_item)
 
-        variances = self.variances
+        variances = []
+        for variances_item_data in self.variances:
+            variances_item: float | None
+            variances_item = variances_item_data
+            variances.append(variances_item)
 
-        log_predictive_densities = self.log_predictive_densities
+        log_predictive_densities = []
+        for log_predictive_densities_item_data in self.log_predictive_densities:
+            log_predictive_densities_item: float | None
+            log_predictive_densities_item = log_predictive_densities_item_data
+            log_predictive_densities.append(log_predictive_densities_item)
 
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
@@ -50,11 +64,44 @@ class LeftOut:
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         d = dict(src_dict)
-        means = cast(list[float], d.pop("means"))
+        means = []
+        _means = d.pop("means")
+        for means_item_data in _means:
 
-        variances = cast(list[float], d.pop("variances"))
+            def _parse_means_item(data: object) -> float | None:
+                if data is None:
+                    return data
+                return cast(float | None, data)
 
-        log_predictive_densities = cast(list[float], d.pop("log_predictive_densities"))
+            means_item = _parse_means_item(means_item_data)
+
+            means.append(means_item)
+
+        variances = []
+        _variances = d.pop("variances")
+        for variances_item_data in _variances:
+
+            def _parse_variances_item(data: object) -> float | None:
+                if data is None:
+                    return data
+                return cast(float | None, data)
+
+            variances_item = _parse_variances_item(variances_item_data)
+
+            variances.append(variances_item)
+
+        log_predictive_densities = []
+        _log_predictive_densities = d.pop("log_predictive_densities")
+        for log_predictive_densities_item_data in _log_predictive_densities:
+
+            def _parse_log_predictive_densities_item(data: object) -> float | None:
+                if data is None:
+                    return data
+                return cast(float | None, data)
+
+            log_predictive_densities_item = _parse_log_predictive_densities_item(log_predictive_densities_item_data)
+
+            log_predictive_densities.append(log_predictive_densities_item)
 
         left_out = cls(
             means=means,

@@ -44,12 +44,13 @@ class ModelSelectionRequest:
             mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
                 the points.
             criterion (SelectionCriterion | Unset): What is made as great as possible.
-            vary (list[FreeParameter] | Unset): What is free, and its bounds. Absent: length scale, or that of each axis
-                where `kernel` has them, variance and, unless noise is given for each point, alpha, from a hundredth (a
-                millionth for
-                alpha) to a hundred times of where the search begins.
+            vary (list[FreeParameter] | Unset): What is free, and its bounds; 64 entries at most. Absent: length scale, or
+                that of each axis where `kernel` has them, and variance, from a
+                hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a
+                millionth of where it begins, or
+                of a millionth of the variance if that is more, to a hundred times the variance.
             families (list[KernelFamily] | Unset): Families to try, with the parameters of `kernel` where it is of that
-                family; that of the start alone if absent.
+                family; that of the start alone if absent, and matern where nu varies.
             restarts (int | Unset): Further starts for each family, spread over the bounds; 2 if absent.
             seed (int | Unset): Where the further starts are; 0 if absent.
     """

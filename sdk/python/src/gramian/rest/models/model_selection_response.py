@@ -34,7 +34,7 @@ class ModelSelectionResponse:
         evaluations (int): How often the criterion was evaluated.
         families (list[FamilyScore]): The families that were tried.
         path (list[PathEntry]): The criterion over alpha, ascending, all else being as selected; empty with
-            `noise_variances`.
+            `noise_variances`, and beyond 3,000 points.
         leave_one_out (LeftOut): What each value is predicted to be from all others.
         diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
             well.

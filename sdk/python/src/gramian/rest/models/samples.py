@@ -16,7 +16,8 @@ class Samples:
 
     Attributes:
         count (int): Functions to draw.
-        seed (int | Unset): Equal seeds give equal draws, and more of them begin with the same ones; 0 if absent.
+        seed (int | Unset): Equal seeds give equal draws on processors of one kind, and more of them begin with the same
+            ones; 0 if absent.
     """
 
     count: int

@@ -127,7 +127,8 @@ def sync_detailed(
     sequential quadratic programming with exact slopes within
     bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
     predicted from all others. Every evaluation costs a
-    few factorizations.
+    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
+    with all of them.
 
     Args:
         body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
@@ -168,7 +169,8 @@ def sync(
     sequential quadratic programming with exact slopes within
     bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
     predicted from all others. Every evaluation costs a
-    few factorizations.
+    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
+    with all of them.
 
     Args:
         body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
@@ -204,7 +206,8 @@ async def asyncio_detailed(
     sequential quadratic programming with exact slopes within
     bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
     predicted from all others. Every evaluation costs a
-    few factorizations.
+    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
+    with all of them.
 
     Args:
         body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
@@ -243,7 +246,8 @@ async def asyncio(
     sequential quadratic programming with exact slopes within
     bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
     predicted from all others. Every evaluation costs a
-    few factorizations.
+    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
+    with all of them.
 
     Args:
         body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to

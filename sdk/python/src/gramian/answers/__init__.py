@@ -1,0 +1,40 @@
+"""Answers: arrays with the shapes documented here, and what the service says of them.
+
+n is the number of points of the cloud, d their dimension, m the number of queries and k that of lists of values; L is
+the unit of the coordinates and V that of the values. Arrays keep the order of the request, are read-only views of the
+answer's bytes (`.copy()` them to change them), and have NaN where there is no meaningful number; `degenerate` then says
+why. Answers can be pickled and used by several threads. `repr` shows arrays by their shapes.
+"""
+
+from .answer import Answer
+from .batches import InterpolationBatch, PosteriorBatch
+from .operators import (
+    LaplaceBeltrami,
+    LaplaceBeltramiMatrix,
+    LaplaceBeltramiSparseMatrix,
+    SurfaceGradient,
+    SurfaceGradientMatrix,
+    SurfaceGradientSparseMatrix,
+)
+from .selection import AlphaPath, LeaveOneOut, ModelSelection
+from .surface import Curvatures, Normals
+from .values import Interpolation, Posterior
+
+__all__ = [
+    "AlphaPath",
+    "Answer",
+    "Curvatures",
+    "Interpolation",
+    "InterpolationBatch",
+    "LaplaceBeltrami",
+    "LaplaceBeltramiMatrix",
+    "LaplaceBeltramiSparseMatrix",
+    "LeaveOneOut",
+    "ModelSelection",
+    "Normals",
+    "Posterior",
+    "PosteriorBatch",
+    "SurfaceGradient",
+    "SurfaceGradientMatrix",
+    "SurfaceGradientSparseMatrix",
+]

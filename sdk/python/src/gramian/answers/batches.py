@@ -1,0 +1,141 @@
+"""Functions through many lists of values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from ..fit import ValuesFit, batch_fit_used
+from ..rest.models import Diagnostics
+from ..tensors import Array, Members
+from .answer import Answer
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InterpolationBatch(Answer):
+    """Functions through lists of values (close to them, if `alpha` > 0), at the queries. Deviations are those of each.
+
+    Attributes
+    ----------
+    values
+        `[k, m]`, V. For each list u at each query.
+    gradients
+        `[k, m, d]`, V/L. For each list ∇u, with `derivatives` of 1 or 2.
+    hessians
+        `[k, m, d, d]`, V/L². For each list D²u, with `derivatives` of 2.
+    value_deviations
+        `[m]`, V. Standard deviation of any of the functions given its values, with `deviations`.
+    gradient_deviations
+        `[m, d]`, V/L. Of the components of any ∇u.
+    hessian_deviations
+        `[m, d, d]`, V/L². Of the entries of any D²u.
+    mean_coefficients
+        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
+        if it is zero.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    values: Array
+    gradients: Array | None
+    hessians: Array | None
+    value_deviations: Array | None
+    gradient_deviations: Array | None
+    hessian_deviations: Array | None
+    mean_coefficients: Array | None
+    diagnostics: Diagnostics
+    fit: ValuesFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/interpolation/batch`."""
+        diagnostics = members.diagnostics
+        m, d = diagnostics.n_queries, diagnostics.dimension
+        mean_coefficients = members.optional_arrays("mean_coefficients")
+        return cls(
+            values=members.array("values", m),
+            gradients=members.optional("gradients", m, d),
+            hessians=members.optional("hessians", m, d, d),
+            value_deviations=members.optional("value_deviations"),
+            gradient_deviations=members.optional("gradient_deviations", d),
+            hessian_deviations=members.optional("hessian_deviations", d, d),
+            mean_coefficients=mean_coefficients,
+            diagnostics=diagnostics,
+            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosteriorBatch(Answer):
+    """Gaussian processes given lists of values, at the queries. What was not asked for is None.
+
+    What depends on the values has a row for each list; the rest they share.
+
+    Attributes
+    ----------
+    means
+        `[k, m]`, V.
+    variances
+        `[m]`, V². Of any of the latent functions, no noise added; ≥ 0.
+    observation_variances
+        `[m]`, V². Of a new, noisy observation of any of them.
+    covariance
+        `[m, m]`, V². Of any of the latent functions between queries.
+    gradients
+        `[k, m, d]`, V/L. Of the means.
+    gradient_variances
+        `[m, d]`, V²/L². Of the components of any latent function's gradient.
+    samples
+        `[k, count, m]`, V. Joint draws of each latent function.
+    quantiles
+        `[k, q, m]`, V. Of each latent function.
+    exceedance_probabilities
+        `[k, m]`. That a new, noisy observation exceeds `threshold`.
+    log_marginal_likelihoods
+        `[k]`. −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π of each list.
+    mean_coefficients
+        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
+        if it is zero.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    means: Array
+    variances: Array | None
+    observation_variances: Array | None
+    covariance: Array | None
+    gradients: Array | None
+    gradient_variances: Array | None
+    samples: Array | None
+    quantiles: Array | None
+    exceedance_probabilities: Array | None
+    log_marginal_likelihoods: Array | None
+    mean_coefficients: Array | None
+    diagnostics: Diagnostics
+    fit: ValuesFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/posterior/batch`."""
+        diagnostics = members.diagnostics
+        m, d = diagnostics.n_queries, diagnostics.dimension
+        mean_coefficients = members.optional_arrays("mean_coefficients")
+        return cls(
+            means=members.array("means", m),
+            variances=members.optional("variances"),
+            observation_variances=members.optional("observation_variances"),
+            covariance=members.optional("covariance", m),
+            gradients=members.optional("gradients", m, d),
+            gradient_variances=members.optional("gradient_variances", d),
+            samples=members.optional_arrays("samples", m),
+            quantiles=members.optional_arrays("quantiles", m),
+            exceedance_probabilities=members.optional("exceedance_probabilities", m),
+            log_marginal_likelihoods=members.optional("log_marginal_likelihoods"),
+            mean_coefficients=mean_coefficients,
+            diagnostics=diagnostics,
+            fit=batch_fit_used(diagnostics, members.request, mean_coefficients),
+        )

@@ -1,0 +1,201 @@
+"""Operators on surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from ..fit import OperatorFit, operator_fit_used
+from ..rest.models import Degenerate, Diagnostics
+from ..sparse import csr_matrices
+from ..tensors import Array, Members
+from .answer import Answer
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradient(Answer):
+    """Surface gradients ∇u − (∇u·ν)ν of the values at the queries.
+
+    Attributes
+    ----------
+    gradients
+        `[m, d]`, V/L, tangent to the surface.
+    gradient_deviations
+        `[m, d]`, V/L. Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+    """
+
+    gradients: Array
+    gradient_deviations: Array | None
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        d = diagnostics.dimension
+        deviations = members.optional("gradient_deviations", d)
+        return cls(members.array("gradients", d), deviations, members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradientMatrix(Answer):
+    """The surface gradient as matrices, one per coordinate.
+
+    Attributes
+    ----------
+    matrices
+        `[d, m, n]`, 1/L. `matrices @ values` has the shape `[d, m]`.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+    """
+
+    matrices: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient/matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.arrays("matrices", diagnostics.n_points), members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceGradientSparseMatrix(Answer):
+    """The surface gradient as sparse matrices, one per coordinate.
+
+    Attributes
+    ----------
+    matrices
+        d of `scipy.sparse.csr_matrix`, `[m, n]`, 1/L, with their entries at the same places. `matrices[i] @ values` is
+        the component i at the queries. Rows of queries without a normal have no entries.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the surface: nothing is fitted to values.
+    fit
+        The surface: `**answer.fit` in a call repeats it.
+    """
+
+    matrices: list[csr_matrix]
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/surface-gradient/sparse-matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(csr_matrices(members), members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltrami(Answer):
+    """The Laplace–Beltrami operator of the values at the queries: on the unit circle Δ cos θ = −cos θ.
+
+    Attributes
+    ----------
+    values
+        `[m]`, V/L². Δu.
+    value_deviations
+        `[m]`, V/L². Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+    """
+
+    values: Array
+    value_deviations: Array | None
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        deviations = members.optional("value_deviations")
+        return cls(members.array("values"), deviations, members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltramiMatrix(Answer):
+    """The Laplace–Beltrami operator as a matrix: on the unit circle `matrix @ cos θ` is −cos θ.
+
+    Attributes
+    ----------
+    matrix
+        `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric in general.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+    fit
+        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+    """
+
+    matrix: Array
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami/matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        return cls(members.array("matrix", diagnostics.n_points), members.degenerate, diagnostics, fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltramiSparseMatrix(Answer):
+    """The Laplace–Beltrami operator as a sparse matrix: on the unit circle `matrix @ cos θ` is −cos θ.
+
+    Attributes
+    ----------
+    matrix
+        `scipy.sparse.csr_matrix`, `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric. Rows of
+        queries without a normal have no entries.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        Of the fit of the surface: nothing is fitted to values.
+    fit
+        The surface: `**answer.fit` in a call repeats it.
+    """
+
+    matrix: csr_matrix
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: OperatorFit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/laplace-beltrami/sparse-matrix`."""
+        diagnostics = members.diagnostics
+        fit = operator_fit_used(diagnostics, members.request)
+        [matrix] = csr_matrices(members)
+        return cls(matrix, members.degenerate, diagnostics, fit)

@@ -1,0 +1,147 @@
+"""Normals and curvatures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from ..fit import Fit, fit_used
+from ..rest.models import Degenerate, Diagnostics, SurfaceUsed
+from ..tensors import Array, Members
+from .answer import Answer
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Normals(Answer):
+    """Unit normals of the surface at the queries. Deviations are None unless asked for.
+
+    Attributes
+    ----------
+    normals
+        `[m, d]`, of length 1, outward unless asked for otherwise.
+    gradient_norms
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
+    levels
+        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+    surfaces
+        m entries. The function whose level surface was used.
+    normal_deviations
+        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
+        where none is known.
+    degenerate
+        The queries without a normal, or with a doubtful one.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    normals: Array
+    gradient_norms: Array
+    levels: Array
+    surfaces: tuple[SurfaceUsed, ...]
+    normal_deviations: Array | None
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: Fit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/normals`."""
+        diagnostics = members.diagnostics
+        return cls(
+            normals=members.array("normals", diagnostics.dimension),
+            gradient_norms=members.array("gradient_norms"),
+            levels=members.array("levels"),
+            surfaces=_surfaces(members),
+            normal_deviations=members.optional("normal_deviations"),
+            degenerate=members.degenerate,
+            diagnostics=diagnostics,
+            fit=fit_used(diagnostics, members.request),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Curvatures(Answer):
+    """Curvatures of the surface at the queries: with outward normals, a sphere of radius r has +1/r everywhere.
+
+    Deviations are None unless asked for.
+
+    Attributes
+    ----------
+    principal_curvatures
+        `[m, d − 1]`, 1/L, ascending.
+    principal_directions
+        `[m, d − 1, d]`, of length 1, the largest component positive; any basis where curvatures
+        coincide.
+    mean_curvatures
+        `[m]`, 1/L. The average of the principal curvatures.
+    gaussian_curvatures
+        `[m]`, 1/L^(d − 1). Their product.
+    normals
+        `[m, d]`, of length 1.
+    gradient_norms
+        `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
+    levels
+        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+    surfaces
+        m entries. The function whose level surface was used.
+    normal_deviations
+        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
+        where none is known.
+    principal_curvature_deviations
+        `[m, d − 1]`, 1/L. Standard deviations of the principal curvatures.
+    mean_curvature_deviations
+        `[m]`, 1/L.
+    gaussian_curvature_deviations
+        `[m]`, 1/L^(d − 1).
+    degenerate
+        The queries without curvatures, or with doubtful ones.
+    diagnostics
+        The kernel and α used, how the system was solved, and how well.
+    fit
+        All that was fitted with: `**answer.fit` in a call repeats it.
+    """
+
+    principal_curvatures: Array
+    principal_directions: Array
+    mean_curvatures: Array
+    gaussian_curvatures: Array
+    normals: Array
+    gradient_norms: Array
+    levels: Array
+    surfaces: tuple[SurfaceUsed, ...]
+    normal_deviations: Array | None
+    principal_curvature_deviations: Array | None
+    mean_curvature_deviations: Array | None
+    gaussian_curvature_deviations: Array | None
+    degenerate: tuple[Degenerate, ...]
+    diagnostics: Diagnostics
+    fit: Fit
+
+    @classmethod
+    def read(cls, members: Members) -> Self:
+        """Reads the answer of `/v1/curvatures`."""
+        diagnostics = members.diagnostics
+        d = diagnostics.dimension
+        return cls(
+            principal_curvatures=members.array("principal_curvatures", d - 1),
+            principal_directions=members.array("principal_directions", d - 1, d),
+            mean_curvatures=members.array("mean_curvatures"),
+            gaussian_curvatures=members.array("gaussian_curvatures"),
+            normals=members.array("normals", d),
+            gradient_norms=members.array("gradient_norms"),
+            levels=members.array("levels"),
+            surfaces=_surfaces(members),
+            normal_deviations=members.optional("normal_deviations"),
+            principal_curvature_deviations=members.optional("principal_curvature_deviations", d - 1),
+            mean_curvature_deviations=members.optional("mean_curvature_deviations"),
+            gaussian_curvature_deviations=members.optional("gaussian_curvature_deviations"),
+            degenerate=members.degenerate,
+            diagnostics=diagnostics,
+            fit=fit_used(diagnostics, members.request),
+        )
+
+
+def _surfaces(members: Members) -> tuple[SurfaceUsed, ...]:
+    return tuple(SurfaceUsed(name) for name in members.fields["surfaces"])
