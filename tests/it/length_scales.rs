@@ -172,7 +172,7 @@ async fn selection_finds_the_axes_that_do_not_matter() {
     assert_eq!(on["gradient"].as_array().unwrap().len(), 5);
     for (entry, pointer) in [
         (json!({"parameter": "variance", "axis": 0, "min": 1, "max": 2}), "/vary/0/axis"),
-        (json!({"parameter": "length_scales", "axis": 3, "min": 1, "max": 2}), "/vary/0"),
+        (json!({"parameter": "length_scales", "axis": 3, "min": 1, "max": 2}), "/vary/0/axis"),
         (json!({"parameter": "length_scale", "min": 1, "max": 2}), "/vary/0"),
     ] {
         body["vary"] = json!([entry]);

@@ -61,8 +61,8 @@ class ValuesOfCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as it
-            does if absent.
+            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
+            it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
@@ -144,8 +144,8 @@ class ValuesOfCloud(RegisteredCloud):
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as it
-            does if absent.
+            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
+            it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
