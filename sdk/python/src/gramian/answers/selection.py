@@ -34,7 +34,9 @@ class AlphaPath(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LeaveOneOut(Answer):
-    """What each value is predicted to be from all others, with what was selected; NaN where the mean hangs on the point.
+    """What each value is predicted to be from all others, with what was selected.
+
+    NaN where the mean is not determined without the point.
 
     Attributes
     ----------
