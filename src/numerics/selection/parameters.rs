@@ -67,6 +67,19 @@ pub enum Parameter {
     Epsilon,
 }
 
+impl Parameter {
+    /// The least and the greatest number that bounds may be.
+    pub fn range(self) -> (f64, f64) {
+        match self {
+            Self::Epsilon => (1e-300, 1e5),
+            Self::Alpha => (1e-300, 1e300),
+            Self::LengthScale | Self::LengthScales | Self::LengthScaleOfAxis(_) | Self::Variance => {
+                (1e-140, 1e140)
+            }
+        }
+    }
+}
+
 /// A parameter that is free between bounds, `0 < min ≤ max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variation {
@@ -91,10 +104,11 @@ impl Variation {
     /// What is wrong with the bounds.
     pub(super) fn check_bounds(&self) -> Result<(), &'static str> {
         let Self { parameter, min, max } = *self;
-        let (least, greatest, requirement) = match parameter {
-            Parameter::Epsilon => (1e-300, 1e5, "bounds must be between 1e-300 and 1e5"),
-            Parameter::Alpha => (1e-300, 1e300, "bounds must be between 1e-300 and 1e300"),
-            _ => (1e-140, 1e140, "bounds must be between 1e-140 and 1e140"),
+        let (least, greatest) = parameter.range();
+        let requirement = match parameter {
+            Parameter::Epsilon => "bounds must be between 1e-300 and 1e5",
+            Parameter::Alpha => "bounds must be between 1e-300 and 1e300",
+            _ => "bounds must be between 1e-140 and 1e140",
         };
         if !(least..=greatest).contains(&min) || !(least..=greatest).contains(&max) {
             return Err(requirement);

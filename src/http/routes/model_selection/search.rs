@@ -38,10 +38,6 @@ const RANGE_OF_ALPHA: f64 = 1e6;
 /// Entries of `vary` at most: more than there are parameters, an axis each included.
 const MAX_VARY: usize = 64;
 
-/// Between these numbers, which bounds may be.
-const KERNEL_NUMBERS: (f64, f64) = (1e-140, 1e140);
-const ALPHAS: (f64, f64) = (1e-300, 1e300);
-
 /// What is searched, as far as the request says.
 pub struct Search {
     criterion: Criterion,
@@ -120,7 +116,7 @@ impl Search {
             None => 2 + n_length_scales,
             Some(vary) => vary.iter().map(|free| if is_of_axes(free) { d } else { 1 }).sum(),
         };
-        let n_families = self.families.len().max(1) + self.orders.map_or(0, |(a, b)| usize::from(b - a));
+        let n_families = self.families.len().max(1) + self.orders.map_or(0, |(a, b)| 1 + usize::from(b - a));
         let n_descents = n_families * (1 + self.restarts);
         let n_evaluations = n_descents * expected_evaluations(n_free);
         let threads = (n_descents, rayon::current_num_threads());
@@ -183,11 +179,11 @@ impl Search {
 
 /// Length scale, variance and noise about the start.
 fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
-    let within = |(least, greatest): (f64, f64), x: f64| x.clamp(least, greatest);
-    let about = |parameter, x: f64| {
-        let [min, max] = [x / RANGE, x * RANGE].map(|x| within(KERNEL_NUMBERS, x));
-        Variation { parameter, min, max }
+    let between = |parameter: Parameter, min: f64, max: f64| {
+        let (least, greatest) = parameter.range();
+        Variation { parameter, min: min.clamp(least, greatest), max: max.clamp(least, greatest) }
     };
+    let about = |parameter, x: f64| between(parameter, x / RANGE, x * RANGE);
     let mut variations: Vec<Variation> = match start.length_scales[..] {
         [length_scale] => vec![about(Parameter::LengthScale, length_scale)],
         ref all => {
@@ -199,8 +195,7 @@ fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
     if let Regularization::Uniform(alpha) = start.noise {
         // A start without noise says nothing of how much there may be.
         let least = alpha.max(start.variance / RANGE_OF_ALPHA) / RANGE_OF_ALPHA;
-        let [min, max] = [least, RANGE * alpha.max(start.variance)].map(|x| within(ALPHAS, x));
-        variations.push(Variation { parameter: Parameter::Alpha, min, max });
+        variations.push(between(Parameter::Alpha, least, RANGE * alpha.max(start.variance)));
     }
     variations.into_iter().enumerate().collect()
 }
