@@ -25,6 +25,9 @@ pub trait Observer: Sync {
     /// Whether the work should stop at the next block.
     fn is_cancelled(&self) -> bool;
 
+    /// Called when a system is solved, with |Y − (K + αI)Λ|/|Y|.
+    fn solved_to(&self, _relative_residual: f64) {}
+
     /// # Errors
     /// [`NumericsError::Cancelled`] once the caller is gone.
     fn checkpoint(&self) -> Result<(), NumericsError> {

@@ -23,7 +23,7 @@ use super::sums::expansion::Expansion;
 use super::sums::regularization::Regularization;
 use dense::Dense;
 pub(crate) use dense::parallelism;
-pub use dense::{Method, Workspace};
+pub use dense::{Factor, FactorBuilder, Method, Workspace};
 use kind::{Quantity, SolverKind};
 pub use solution::Solution;
 pub use system::System;
@@ -60,6 +60,23 @@ impl Solver {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         Dense::factorize(workspace, system, observer).map(|dense| Self::Dense(Box::new(dense)))
+    }
+
+    /// The factor, to be taken elsewhere; nothing where there is none but its substitute.
+    pub fn factor(&self) -> Option<Factor<'_>> {
+        self.as_dense().factor()
+    }
+
+    /// A solver as it was, from its [`Factor`]; nothing unless that is whole and has the size of the system.
+    pub fn restore(
+        factor: FactorBuilder,
+        system: System,
+        weights_of_one: Vec<f64>,
+        norm1: f64,
+        reciprocal_condition: f64,
+    ) -> Option<Self> {
+        let dense = factor.finish(system, weights_of_one, norm1, reciprocal_condition)?;
+        Some(Self::Dense(Box::new(dense)))
     }
 
     fn as_dense(&self) -> &Dense {

@@ -111,6 +111,7 @@ impl Solution {
                 Ok(_) | Err(_) => {}
             }
         }
+        observer.solved_to(best.relative_residual(values));
         best.accept(solver, values, refined)
     }
 

@@ -51,6 +51,27 @@ impl Cholesky {
         Ok(Self { packed: Packed::gram(spare, cloud, kernel, regularization, observer)? })
     }
 
+    /// Memory for the factor of n points, still to be filled with it.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfMemory`].
+    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self, NumericsError> {
+        Ok(Self { packed: Packed::blank(spare, n)? })
+    }
+
+    /// All numbers as they lie in memory.
+    pub(super) fn numbers(&self) -> &[f64] {
+        self.packed.numbers()
+    }
+
+    pub(super) fn numbers_mut(&mut self) -> &mut [f64] {
+        self.packed.numbers_mut()
+    }
+
+    pub(super) fn n_points(&self) -> usize {
+        self.packed.n_points()
+    }
+
     pub(super) fn n_bytes(&self) -> usize {
         self.packed.n_bytes()
     }

@@ -1,6 +1,7 @@
 //! The factorization of the whole matrix: Cholesky, and where that fails least squares on the pivots of a rank-revealing one.
 
 mod cholesky;
+mod factor;
 mod packed;
 mod pivoted_cholesky;
 mod pivoting;
@@ -19,6 +20,7 @@ use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
 use cholesky::Cholesky;
+pub use factor::{Factor, FactorBuilder};
 use pivoted_cholesky::PivotedCholesky;
 
 /// How `K + αI` was factorized.

@@ -98,14 +98,17 @@ impl Packed {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         let n = cloud.n_points();
-        let n_numbers = Self::n_numbers(n).unwrap_or(usize::MAX);
-        let mut this = Self { buffer: spare.take(n_numbers)?, n };
+        let mut this = Self::blank(spare, n)?;
         let (nodes, stride) = (Nodes::of(cloud), this.stride());
         this.buffer.par_chunks_mut(stride * COLUMNS_PER_TASK).enumerate().try_for_each(
             |(task, columns)| {
                 observer.checkpoint()?;
                 for (k, column) in columns.chunks_exact_mut(stride).enumerate() {
+                    let mut end = 0;
                     for run in runs(n, task * COLUMNS_PER_TASK + k) {
+                        // What an earlier user left between the runs goes nowhere.
+                        column[end..run.at].fill(0.0);
+                        end = run.at + run.points.len();
                         let entries = &mut column[run.at..run.at + run.points.len()];
                         fill_kernel_column(
                             &nodes,
@@ -116,11 +119,30 @@ impl Packed {
                         );
                         entries[run.point - run.points.start] += regularization.at(run.point);
                     }
+                    column[end..].fill(0.0);
                 }
                 Ok(())
             },
         )?;
         Ok(this)
+    }
+
+    /// Memory for n points, with whatever is in it.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfMemory`].
+    pub(super) fn blank(spare: &Arc<SpareBuffer>, n: usize) -> Result<Self, NumericsError> {
+        let n_numbers = Self::n_numbers(n).unwrap_or(usize::MAX);
+        Ok(Self { buffer: spare.take(n_numbers)?, n })
+    }
+
+    /// The rectangle, column by column, with what lies between its parts.
+    pub(super) fn numbers(&self) -> &[f64] {
+        &self.buffer
+    }
+
+    pub(super) fn numbers_mut(&mut self) -> &mut [f64] {
+        &mut self.buffer
     }
 
     pub(super) fn n_points(&self) -> usize {
