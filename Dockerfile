@@ -1,4 +1,5 @@
-# The service as a small image: `docker build -t gramian . && docker run --rm -p 8080:8080 gramian`.
+# The service as a small image: `docker build -t gramian . && docker run --rm -p 8080:8080 -e GRAMIAN_ALLOW_ANONYMOUS=1 gramian`.
+# It listens beyond its own machine, so it starts only with keys (GRAMIAN_KEYS_FILE, GRAMIAN_API_KEYS) or with that permission.
 # tests/image.sh builds and runs it where there is no container engine.
 
 FROM rust:1.95-bookworm AS build
@@ -12,13 +13,18 @@ RUN --mount=type=cache,id=gramian-registry,target=/usr/local/cargo/registry,shar
     touch src/lib.rs src/main.rs \
     && CARGO_TARGET_DIR=/target CARGO_PROFILE_RELEASE_DEBUG=false CARGO_PROFILE_RELEASE_STRIP=symbols \
        cargo build --release --locked --bin gramian \
-    && install /target/release/gramian /usr/local/bin/gramian
+    && install /target/release/gramian /usr/local/bin/gramian \
+    && mkdir /store
 
 FROM debian:bookworm-slim
 LABEL org.opencontainers.image.title="gramian" \
       org.opencontainers.image.description="Geometric kernel interpolation and regression on point clouds, served over HTTP" \
       org.opencontainers.image.licenses="MIT OR Apache-2.0"
 COPY --from=build /usr/local/bin/gramian /usr/local/bin/gramian
+# Whom a bucket's server is certified by.
+COPY --from=build /etc/ssl/certs/ca-certificates.crt /etc/ssl/certs/ca-certificates.crt
+# A volume that is mounted here belongs to the user of the image: GRAMIAN_STORE=/var/lib/gramian.
+COPY --from=build --chown=10001:10001 /store /var/lib/gramian
 ENV GRAMIAN_BIND=0.0.0.0:8080
 EXPOSE 8080
 # A number, so that an orchestrator can see that it is not root without reading /etc/passwd.

@@ -125,7 +125,8 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     listener.set_nonblocking(true).unwrap();
-    let app = App::new(Flags::parse_from(["gramian"]).config).unwrap();
+    let opening = App::new(Flags::parse_from(["gramian"]).config);
+    let app = tokio::runtime::Runtime::new().unwrap().block_on(opening).unwrap();
     let ready = Arc::new(Mutex::new(vec![matrix; ROUNDS + 1]));
     let handler = move || {
         let (app, matrix) = (app.clone(), ready.lock().unwrap().pop().unwrap());

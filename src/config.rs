@@ -4,6 +4,7 @@
 //! starts with another meaning of a setting than its operator's is worse than one that does not.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -11,6 +12,7 @@ use axum::http::Uri;
 use clap::Args;
 
 use crate::machine;
+use crate::store::objects::{Place, Retention};
 
 /// The configuration, read once in `main` and passed down.
 #[derive(Debug, Clone, clap::Args)]
@@ -89,9 +91,53 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_DRAIN_SECONDS", default_value_t = 30.0, value_parser = positive_seconds)]
     pub drain_seconds: f64,
 
-    /// Bearer keys, separated by commas; without this setting the service is open.
+    /// Seconds that a job may take; later it fails.
+    #[arg(long, env = "GRAMIAN_JOB_SECONDS", default_value_t = 86400.0, value_parser = positive_seconds)]
+    pub job_seconds: f64,
+
+    /// Seconds that the result of a job is kept.
+    #[arg(long, env = "GRAMIAN_JOB_RESULT_SECONDS", default_value_t = 3600.0, value_parser = positive_seconds)]
+    pub job_result_seconds: f64,
+
+    /// A certificate with the authorities up to a root, in PEM: with it TLS is spoken and nothing else. Read again when it changes.
+    #[arg(long, env = "GRAMIAN_TLS_CERTIFICATE", requires = "tls_key")]
+    pub tls_certificate: Option<PathBuf>,
+
+    /// The private key of the certificate, in PEM.
+    #[arg(long, env = "GRAMIAN_TLS_KEY", requires = "tls_certificate")]
+    pub tls_key: Option<PathBuf>,
+
+    /// Bearer keys, separated by commas; without keys the service is open.
     #[arg(long, env = "GRAMIAN_API_KEYS", value_delimiter = ',', hide_env_values = true, value_parser = api_key)]
     pub api_keys: Vec<String>,
+
+    /// A file of hashes of bearer keys with their names and limits (`gramian key` makes lines for it), read again when it changes.
+    #[arg(long, env = "GRAMIAN_KEYS_FILE")]
+    pub keys_file: Option<PathBuf>,
+
+    /// Whether to serve anyone who reaches an address beyond this machine without keys, which is refused otherwise.
+    #[arg(long, env = "GRAMIAN_ALLOW_ANONYMOUS", default_value_t = false, action = clap::ArgAction::Set, value_parser = flag)]
+    pub allow_anonymous: bool,
+
+    /// Where clouds outlive the process: a directory, or `s3://bucket/prefix`, `gs://…`, `az://…`. Absent: memory alone.
+    #[arg(long, env = "GRAMIAN_STORE")]
+    pub store: Option<Place>,
+
+    /// Whether the service is ready only while the store takes all clouds.
+    #[arg(long, env = "GRAMIAN_STORE_REQUIRED", default_value_t = false, action = clap::ArgAction::Set, value_parser = flag)]
+    pub store_required: bool,
+
+    /// Days that a cloud stays in the store after it was registered first. Absent: for ever.
+    #[arg(long, env = "GRAMIAN_STORE_DAYS", value_parser = positive_days)]
+    pub store_days: Option<f64>,
+
+    /// Bytes that the store may have of clouds; beyond them the oldest go. Absent: any number.
+    #[arg(long, env = "GRAMIAN_STORE_BYTES", value_parser = clap::value_parser!(u64).range(1..))]
+    pub store_bytes: Option<u64>,
+
+    /// Bytes that the store may have of factorizations; beyond them the oldest go. 0 keeps none.
+    #[arg(long, env = "GRAMIAN_STORE_FACTOR_BYTES", default_value_t = 16 << 30)]
+    pub store_factor_bytes: u64,
 
     /// Origins that browsers may call from, separated by commas, or `*`.
     #[arg(long, env = "GRAMIAN_CORS_ORIGINS")]
@@ -137,9 +183,30 @@ impl Config {
         Duration::from_secs_f64(self.drain_seconds)
     }
 
+    /// How long the result of a job is kept.
+    pub fn job_result(&self) -> Duration {
+        Duration::from_secs_f64(self.job_result_seconds)
+    }
+
+    /// What of the store goes by itself.
+    pub fn retention(&self) -> Retention {
+        let age = self.store_days.map(|days| Duration::from_secs_f64(days * 86400.0));
+        Retention { age, n_bytes: self.store_bytes, n_factor_bytes: self.store_factor_bytes }
+    }
+
+    /// Whether it serves without keys.
+    pub fn is_open(&self) -> bool {
+        self.api_keys.is_empty() && self.keys_file.is_none()
+    }
+
+    /// How many share memory and queue: one, or several.
+    pub fn n_owners(&self) -> usize {
+        if self.keys_file.is_some() { self.api_keys.len().max(2) } else { self.api_keys.len().max(1) }
+    }
+
     /// Whether other machines reach it and need no key.
     pub fn is_exposed(&self) -> bool {
-        self.api_keys.is_empty() && !self.bind.ip().to_canonical().is_loopback()
+        self.is_open() && !self.bind.ip().to_canonical().is_loopback()
     }
 
     /// Those of the names that look like settings and are none: mistyped ones, most of the time.
@@ -169,11 +236,28 @@ fn whole<const MIN: u64, const MAX: u64>(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| format!("must be a whole number from {MIN} to {MAX}"))
 }
 
+/// `1` and `0` as well as `true` and `false`.
+fn flag(text: &str) -> Result<bool, String> {
+    match text {
+        "1" | "true" => Ok(true),
+        "0" | "false" => Ok(false),
+        _ => Err("must be 1 or 0".to_owned()),
+    }
+}
+
 /// Up to ten years, so that instants that far ahead are representable.
 fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3e8 => Ok(seconds),
         _ => Err("must be a positive number of seconds, at most 3e8".to_owned()),
+    }
+}
+
+/// Up to ten years as well.
+fn positive_days(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(days) if days > 0.0 && days <= 3650.0 => Ok(days),
+        _ => Err("must be a positive number of days, at most 3650".to_owned()),
     }
 }
 

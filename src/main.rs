@@ -4,7 +4,9 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use gramian::config::Config;
+use gramian::http::access;
 use gramian::http::serve::app::App;
+use gramian::http::serve::durable;
 use gramian::{server, telemetry};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -29,17 +31,28 @@ struct Arguments {
 enum Command {
     /// Exit with 0 if the server at GRAMIAN_BIND is ready.
     Health,
+    /// Make a key, and the lines for the file of keys (GRAMIAN_KEYS_FILE) that let it in.
+    Key {
+        /// Who has it: letters, digits, '-' and '_'.
+        name: String,
+    },
 }
 
 fn main() -> ExitCode {
     let Arguments { config, command } = Arguments::parse();
     let outcome = match command {
-        Some(Command::Health) => match server::is_ready(config.bind) {
+        Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.as_deref()) {
             Ok(true) => Ok(()),
             Ok(false) => Err("not ready".into()),
             Err(error) => Err(error.into()),
         },
-        None => serve(config),
+        Some(Command::Key { name }) => make_key(&name).map_err(Into::into),
+        None => {
+            let log = telemetry::start();
+            let served = serve(config);
+            log.mention_losses();
+            served
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -50,18 +63,30 @@ fn main() -> ExitCode {
     }
 }
 
+/// The key goes to standard error, which is seen, and the lines, which do not tell it, to standard output, to be added to a file.
+fn make_key(name: &str) -> Result<(), String> {
+    let (key, lines) = access::generate(name)?;
+    eprintln!("The key, which nothing keeps: {key}");
+    print!("{lines}");
+    Ok(())
+}
+
 #[tokio::main]
 async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
-    let log = telemetry::start();
     for name in Config::unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()))
     {
         tracing::warn!(name, "there is no such setting");
+    }
+    if config.is_exposed() && !config.allow_anonymous {
+        let remedy =
+            "set GRAMIAN_KEYS_FILE or GRAMIAN_API_KEYS, or GRAMIAN_ALLOW_ANONYMOUS=1 if that is meant";
+        return Err(format!("anyone who reaches {} could use the service: {remedy}", config.bind).into());
     }
     let listener = TcpListener::bind(config.bind).await;
     let listener =
         listener.map_err(|error| format!("cannot listen on {} (GRAMIAN_BIND): {error}", config.bind))?;
     if config.is_exposed() {
-        tracing::warn!("anyone who reaches this address may use the service: there are no GRAMIAN_API_KEYS");
+        tracing::warn!("anyone who reaches this address may use the service: there are no keys");
     }
     let mut signals = Signals::new()?;
     let stop = async move {
@@ -74,8 +99,11 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     };
     let (address, n_api_keys) = (listener.local_addr()?, config.api_keys.len());
     tracing::info!(%address, threads = config.n_threads(), n_api_keys, "listening");
-    server::serve(App::new(config)?, listener, stop).await?;
-    log.mention_losses();
+    let app = App::new(config).await?;
+    tokio::spawn(durable::catch_up(app.clone()));
+    tokio::spawn(durable::retain(app.clone()));
+    tokio::spawn(app.keys.clone().follow_file());
+    server::serve(app, listener, stop).await?;
     Ok(())
 }
 

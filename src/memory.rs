@@ -15,6 +15,9 @@ const BYTES_PER_THREAD: usize = 16 << 20;
 /// Of the budget without what the process itself takes: the part for requests that are read, unpacked, parsed or wait.
 const INTAKE_SHARE: usize = 4;
 
+/// The part for jobs and their results, where they are in memory.
+const JOBS_SHARE: usize = 32;
+
 /// Bytes of numbers for each byte that a body may have: JSON has a number in two bytes, its comma included.
 pub const NUMBERS_PER_BODY: usize = 4;
 
@@ -30,6 +33,8 @@ const BODIES_PER_REQUEST_OF_MANY: usize = 14;
 pub struct Memory {
     /// Bodies that are read and unpacked, and requests that wait.
     pub intake: usize,
+    /// Jobs and their results, where no store has them.
+    pub jobs: usize,
     /// Registered clouds.
     pub clouds: usize,
     /// Factors and weights, kept or in use, all work with them, and answers.
@@ -51,12 +56,13 @@ impl Memory {
         let spare = (config.cache_bytes / 8).min(total / 16);
         let rest = total - own - clouds - spare;
         let intake = rest / INTAKE_SHARE;
-        let n_bodies =
-            if config.api_keys.len() > 1 { BODIES_PER_REQUEST_OF_MANY } else { BODIES_PER_REQUEST };
-        let work = rest - intake;
+        let n_bodies = if config.n_owners() > 1 { BODIES_PER_REQUEST_OF_MANY } else { BODIES_PER_REQUEST };
+        let jobs = if config.store.is_none() { rest / JOBS_SHARE } else { 0 };
+        let work = rest - intake - jobs;
         let body = config.max_body_bytes.min(intake / n_bodies);
         Self {
             intake,
+            jobs,
             clouds,
             work,
             cache: (config.cache_bytes - config.cache_bytes / 8).min(work),
@@ -91,7 +97,7 @@ mod tests {
                     let config =
                         config(&[&["--memory-bytes", &bytes_text, "--threads", threads][..], keys].concat());
                     let memory = Memory::of(&config);
-                    let sum = memory.intake + memory.clouds + memory.work + memory.spare;
+                    let sum = memory.intake + memory.jobs + memory.clouds + memory.work + memory.spare;
                     assert!(sum < bytes && sum > bytes / 2, "{bytes} {threads}: {memory:?}");
                     let largest = Budget::new(memory.intake, n_owners).largest();
                     assert!(memory.cache <= memory.work && 6 * memory.body <= largest, "{memory:?}");

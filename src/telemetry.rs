@@ -1,5 +1,9 @@
-//! Logs: one JSON line each, to standard error.
+//! Logs: one JSON line each, to standard error; and spans of requests, to a collector of OpenTelemetry if there is one.
 
+use opentelemetry::{KeyValue, global};
+use opentelemetry_otlp::SpanExporter;
+use opentelemetry_sdk::Resource;
+use opentelemetry_sdk::trace::SdkTracerProvider;
 use tracing::Level;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::filter::Targets;
@@ -15,17 +19,54 @@ const MAX_WAITING_LINES: usize = 4096;
 pub struct Log {
     _writer: WorkerGuard,
     lost: ErrorCounter,
+    spans: Option<SdkTracerProvider>,
 }
 
-/// Starts logging at the level of `RUST_LOG`, which may name levels of single modules as well; `info` if absent.
+/// The variables of OpenTelemetry that name a collector; further ones say how to send (OTEL_EXPORTER_OTLP_HEADERS), how many
+/// (OTEL_TRACES_SAMPLER) and under which name (OTEL_SERVICE_NAME).
+const COLLECTORS: [&str; 2] = ["OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT"];
+
+/// Starts logging at the level of `RUST_LOG`, which may name levels of single modules as well; `info` if absent. To be called outside of the
+/// async runtime: spans are sent by a thread of their own, which waits for answers.
 pub fn start() -> Log {
     let wanted = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(Level::INFO));
     let builder = NonBlockingBuilder::default().buffered_lines_limit(MAX_WAITING_LINES).lossy(true);
     let (lines, writer) = builder.finish(std::io::stderr());
-    let log = Log { _writer: writer, lost: lines.error_counter() };
+    let lost = lines.error_counter();
     tracing_subscriber::registry().with(fmt::layer().json().with_writer(lines)).with(filter).init();
-    log
+    Log { _writer: writer, lost, spans: send_spans() }
+}
+
+/// Has spans sent to the collector that the environment names, if it does: OTLP over HTTP, in batches. No request waits for it.
+fn send_spans() -> Option<SdkTracerProvider> {
+    COLLECTORS.iter().find(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))?;
+    let exporter = match SpanExporter::builder().with_http().build() {
+        Ok(exporter) => exporter,
+        Err(error) => {
+            tracing::error!(%error, "spans are not sent");
+            return None;
+        }
+    };
+    let name = std::env::var("OTEL_SERVICE_NAME").unwrap_or_else(|_| env!("CARGO_PKG_NAME").to_owned());
+    let resource = Resource::builder().with_service_name(name);
+    let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
+    let provider = SdkTracerProvider::builder()
+        .with_resource(resource.with_attribute(version).build())
+        .with_batch_exporter(exporter)
+        .build();
+    global::set_tracer_provider(provider.clone());
+    tracing::info!("spans are sent");
+    Some(provider)
+}
+
+impl Drop for Log {
+    /// Sends what has not been sent.
+    fn drop(&mut self) {
+        if let Some(Err(error)) = self.spans.take().map(|spans| spans.shutdown()) {
+            tracing::warn!(%error, "the last spans were not sent");
+        }
+    }
 }
 
 impl Log {

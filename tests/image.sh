@@ -9,7 +9,8 @@
 #   to the build where it is present.
 #
 # What it checks: the service becomes ready, the image's own health check passes, a request is answered, the process is
-# not root and needs neither capabilities nor a writable file system, and SIGTERM ends it at once with status 0.
+# not root and needs neither capabilities nor a writable file system, SIGTERM ends it at once with status 0, a cloud is there again when
+# another container has the same volume, and without keys or permission it does not start.
 set -euo pipefail
 
 readonly image=localhost/gramian:test
@@ -119,19 +120,27 @@ engine build --layers=false --isolation chroot --network host --pull=never --for
 say "run"
 # Without --ulimit podman asks for more than this machine may be allowed to give. The health check has no timer: that
 # would need systemd, and the check itself is run below.
-engine run --detach --name "$container" --network none --health-interval disable \
-  --ulimit nofile=1000:1000 --ulimit nproc=1000:1000 --read-only --cap-drop all \
-  --security-opt no-new-privileges "$image" >/dev/null
-pid=$(engine inspect --format '{{.State.Pid}}' "$container")
+limits=(--network none --health-interval disable --ulimit nofile=1000:1000 --ulimit nproc=1000:1000 --read-only
+  --cap-drop all --security-opt no-new-privileges)
+if engine run --rm "${limits[@]}" "$image" 2>"$work/refused.log"; then fail "it starts without keys or permission"; fi
+grep -q GRAMIAN_ALLOW_ANONYMOUS "$work/refused.log" || fail "it does not say why it does not start: $(cat "$work/refused.log")"
+say "without keys or permission it does not start"
 
+# The volume is filled from the image, and so belongs to its user.
+start() {
+  engine run --detach --name "$container" "${limits[@]}" --volume gramian-clouds:/var/lib/gramian \
+    --env GRAMIAN_ALLOW_ANONYMOUS=1 --env GRAMIAN_STORE=/var/lib/gramian --env GRAMIAN_STORE_REQUIRED=1 "$image" >/dev/null
+  pid=$(engine inspect --format '{{.State.Pid}}' "$container")
+  local started=$SECONDS
+  until [[ $(inside curl --silent --max-time 5 --output /dev/null --write-out '%{http_code}' http://127.0.0.1:8080/health/ready) == 200 ]]; do
+    running || fail "the service ended before it was ready"
+    ((SECONDS - started < ready_seconds)) || fail "/health/ready is not 200 after $ready_seconds s"
+    sleep 0.2
+  done
+}
 running() { [[ $(engine inspect --format '{{.State.Running}}' "$container") == true ]]; }
-started=$SECONDS
-until [[ $(inside curl --silent --max-time 5 --output /dev/null --write-out '%{http_code}' http://127.0.0.1:8080/health/ready) == 200 ]]; do
-  running || fail "the service ended before it was ready"
-  ((SECONDS - started < ready_seconds)) || fail "/health/ready is not 200 after $ready_seconds s"
-  sleep 0.2
-done
-say "ready"
+start
+say "ready, with a volume for clouds"
 
 engine healthcheck run "$container" || fail "the image's health check does not pass"
 say "health check passes"
@@ -151,13 +160,23 @@ jq --exit-status --argjson n "$n_points" '.mean_curvatures | length == $n and al
   fail "not $n_points mean curvatures: $(jq --compact-output .mean_curvatures "$work/answer.json" | head -c 2000)"
 say "$n_points mean curvatures of the torus"
 
-started=$SECONDS
-engine stop --time $((2 * stop_seconds)) "$container" >/dev/null
-exit_code=$(engine inspect --format '{{.State.ExitCode}}' "$container")
-[[ $exit_code -eq 0 ]] || fail "SIGTERM ends the service with status $exit_code"
-((SECONDS - started <= stop_seconds)) || fail "it took $((SECONDS - started)) s to end after SIGTERM"
+id=$(jq --raw-output .diagnostics.cloud_id "$work/answer.json")
+stop() {
+  local started=$SECONDS exit_code
+  engine stop --time $((2 * stop_seconds)) "$container" >/dev/null
+  exit_code=$(engine inspect --format '{{.State.ExitCode}}' "$container")
+  [[ $exit_code -eq 0 ]] || fail "SIGTERM ends the service with status $exit_code"
+  ((SECONDS - started <= stop_seconds)) || fail "it took $((SECONDS - started)) s to end after SIGTERM"
+}
+stop
 say "SIGTERM ends it with status 0"
 
+engine rm "$container" >/dev/null
+start
+status=$(inside curl --silent --output "$work/cloud.json" --write-out '%{http_code}' "http://127.0.0.1:8080/v1/clouds/$id")
+[[ $status == 200 ]] || fail "the cloud is not there any more: $status $(head -c 2000 "$work/cloud.json")"
+stop
+say "another container on the volume has the cloud"
 mib() { awk -v bytes="$1" 'BEGIN { printf "%.1f MiB", bytes / 1048576 }'; }
 total=$(engine image inspect --format '{{.Size}}' "$image")
 base=$(engine image inspect --format '{{.Size}}' docker.io/library/debian:bookworm-slim)

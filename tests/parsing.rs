@@ -117,9 +117,11 @@ fn parse(format: Format, coding: Coding, body: &[u8]) -> Outcome {
     ALLOCATOR.reset_peak_usage();
     let began = Instant::now();
     let request = RequestBody::new(format, coding, body.to_vec(), LIMIT_BYTES);
-    let problem = match format {
-        Format::Npy | Format::Ply => request.parse::<CloudRequest>(&CONTEXT, is_room).err(),
-        Format::Json | Format::Safetensors => request.parse::<Request>(&CONTEXT, is_room).err(),
+    let unpacked = request.unpack(&CONTEXT, is_room);
+    let problem = match (unpacked, format) {
+        (Err(problem), _) => Some(problem),
+        (Ok(body), Format::Npy | Format::Ply) => body.parse::<CloudRequest>(&CONTEXT).err(),
+        (Ok(body), Format::Json | Format::Safetensors) => body.parse::<Request>(&CONTEXT).err(),
     };
     let took = began.elapsed();
     let peak = ALLOCATOR.peak_usage() - before;

@@ -110,7 +110,8 @@ fn ply_in_binary(points: &[f64], is_double: bool) -> Vec<u8> {
 fn register(format: Format, body: Vec<u8>) -> usize {
     let limit = body.len();
     let request: Request = RequestBody::new(format, Coding::Identity, body, limit)
-        .parse(&ParseContext::UNLIMITED, |_| Ok(()))
+        .unpack(&ParseContext::UNLIMITED, |_| Ok(()))
+        .and_then(|body| body.parse(&ParseContext::UNLIMITED))
         .unwrap_or_else(|problem| panic!("{format:?}: {problem:?}"));
     let cloud = |points: Points| Cloud::new(points.coordinates, points.dimension).unwrap();
     let store = CloudStore::<Problem>::new(usize::MAX);

@@ -3,7 +3,8 @@
 
     tests/soak.py GRAMIAN [--minutes 10] [--report FILE]
 
-Clients post new clouds to every route, eight at a time the same one, list clouds, read slowly or not at all, send bodies
+The server has a directory as its store. Clients post new clouds to every route, as requests and as jobs, register clouds,
+ask for estimates, post eight at a time the same one, list clouds, scrape metrics, read slowly or not at all, send bodies
 that never end, leave midway, and ask for more than there is memory. Meanwhile a probe sends small requests, whose clouds
 are new or known; before that it has done so beside factorizations of 16,400 points, on a server of its own. At the end:
 
@@ -28,6 +29,7 @@ import signal
 import socket
 import statistics
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
@@ -43,8 +45,10 @@ GRACE = 2.0
 FLAGS = [
     *("--threads", "2", "--memory-bytes", str(BUDGET), "--cache-bytes", str(192 << 20)),
     *("--cloud-bytes", str(16 << 20), "--deadline-seconds", str(DEADLINE), "--body-seconds", "3"),
-    *("--max-queue", "32"),
+    *("--max-queue", "32", "--job-result-seconds", "60"),
 ]
+# Less than what comes in half a minute of clouds, and in some minutes of factors: the oldest go all the time.
+STORE_FLAGS = ["--store-bytes", str(4 << 20), "--store-factor-bytes", str(512 << 20)]
 GEOMETRY = ["/v1/normals", "/v1/curvatures", "/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"]
 VALUES = ["/v1/interpolation", "/v1/posterior", "/v1/surface-gradient", "/v1/laplace-beltrami"]
 N_PROBES_IDLE = 300
@@ -88,26 +92,27 @@ class Soak:
             if status >= 500 and status not in (503, 504):
                 self.failures.append(f"{path} answered {status}")
 
-    def call(self, method, path, body=None, connection=None):
-        """One request, read to its end; its status and the seconds that it took."""
+    def call(self, method, path, body=None, connection=None, prefer=None):
+        """One request, read to its end; its status, the seconds that it took, and its body."""
         own = connection is None
         connection = connection or self.connection()
         began = time.monotonic()
         try:
             headers = {"Content-Type": "application/json"} if body else {}
+            headers |= {"Prefer": prefer} if prefer else {}
             connection.request(method, path, body, headers)
             response = connection.getresponse()
-            response.read()
+            answer = response.read()
         except (OSError, http.client.HTTPException) as error:
             connection.close()
             with self.lock:
                 self.failures.append(f"{path}: {type(error).__name__}: {error}")
-            return 0, time.monotonic() - began
+            return 0, time.monotonic() - began, b""
         seconds = time.monotonic() - began
         self.note(path, response.status, seconds)
         if own:
             connection.close()
-        return response.status, seconds
+        return response.status, seconds, answer
 
 
 def cloud(n, k, dimension=3):
@@ -170,9 +175,35 @@ def post_equal(soak, source):
 
 def list_clouds(soak, source):
     while soak.goes_on():
-        soak.call("GET", "/v1/clouds?limit=1000")
-        soak.call("GET", "/health/ready")
+        for path in ("/v1/clouds?limit=1000", "/health/ready", "/metrics"):
+            soak.call("GET", path)
         time.sleep(source.uniform(0.05, 0.3))
+
+
+def register(soak, source):
+    """Registers clouds, asks what work with them would take, reads them, which the store may have forgotten, or deletes them."""
+    while soak.goes_on():
+        request = {"points": cloud(source.choice([100, 1000, 5000]), soak.number())}
+        status, _, answer = soak.call("POST", "/v1/clouds", json.dumps(request))
+        if status == 201:
+            known = json.loads(answer)["cloud_id"]
+            asked = {"operation": "compute_normals", "cloud": {"id": known}}
+            soak.call("POST", "/v1/estimate", json.dumps(asked))
+            soak.call(source.choice(["GET", "HEAD", "DELETE"]), f"/v1/clouds/{known}")
+        time.sleep(source.uniform(0, 0.3))
+
+
+def post_jobs(soak, source):
+    """Follows jobs to their results, or looks at them once, deletes them, or leaves them to end alone."""
+    while soak.goes_on():
+        path, body = request_of(source, soak, source.choice([100, 1000, 3000]))
+        status, _, answer = soak.call("POST", path, body, prefer="respond-async")
+        if status == 202:
+            job = f"/v1/jobs/{json.loads(answer)['job_id']}"
+            method, path = source.choice([("GET", f"{job}/result"), ("GET", f"{job}/events"), ("GET", job), ("DELETE", job)])
+            soak.call(method, path)
+        else:
+            time.sleep(0.2)
 
 
 def send(soak, path, body, length=None):
@@ -226,7 +257,7 @@ def probe(soak, first, until=math.inf, count=math.inf):
             break
         new = json.dumps({"cloud": {"points": cloud(100, k)}})
         for kind, body in (("cold", new), ("warm", known)):
-            status, taken = soak.call("POST", "/v1/normals", body, connection)
+            status, taken, _ = soak.call("POST", "/v1/normals", body, connection)
             if status == 200:
                 seconds[kind].append(taken)
             else:
@@ -286,7 +317,7 @@ def run(soak):
     # Clients are elsewhere as a rule: those here leave the cores to the server.
     os.nice(10)
     roles = [post_new_clouds] * 8 + [post_large] * 2 + [post_equal, list_clouds, list_clouds]
-    roles += [read_slowly] * 8 + [send_slowly] * 2 + [leave] * 3
+    roles += [read_slowly] * 8 + [send_slowly] * 2 + [leave] * 3 + [register] + [post_jobs] * 3
     threads = [threading.Thread(target=role, args=(soak, random.Random(k))) for k, role in enumerate(roles)]
     threads.append(threading.Thread(target=watch, args=(soak,)))
     for thread in threads:
@@ -341,7 +372,9 @@ def main():
     arguments.add_argument("--report", type=Path)
     arguments = arguments.parse_args()
     idle, beside, failed = probe_beside_large_work(arguments.binary)
-    with server(arguments.binary, FLAGS) as (base, pid):
+    with tempfile.TemporaryDirectory() as store, server(
+        arguments.binary, [*FLAGS, *STORE_FLAGS, "--store", store]
+    ) as (base, pid):
         soak = Soak(base, pid, arguments.minutes)
         soak.failures += failed
         loaded = run(soak)

@@ -4,8 +4,8 @@
     tests/with_server.py GRAMIAN COMMAND [ARGUMENT]…
 
 Starts the binary GRAMIAN on a free port, in its default configuration, runs the command with the base URL of the server as
-GRAMIAN_URL, ends the server and exits as the command did. Neither sees other GRAMIAN_ variables. Needs nothing but the
-standard library.
+GRAMIAN_URL and the path of the binary as GRAMIAN_BINARY, for those that start further ones; ends the server and exits as
+the command did. Neither sees other GRAMIAN_ variables. Needs nothing but the standard library.
 """
 
 import contextlib
@@ -25,7 +25,8 @@ def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     with server(sys.argv[1]) as (base, _):
-        outcome = subprocess.run(sys.argv[2:], env=environment() | {"GRAMIAN_URL": base}, check=False)
+        variables = {"GRAMIAN_URL": base, "GRAMIAN_BINARY": str(Path(sys.argv[1]).resolve())}
+        outcome = subprocess.run(sys.argv[2:], env=environment() | variables, check=False)
     sys.exit(outcome.returncode)
 
 

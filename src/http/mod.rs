@@ -1,10 +1,14 @@
 //! HTTP: every route on this page, middleware beneath.
 
+pub mod access;
 pub mod around;
 pub mod compute;
 pub mod fields;
+pub mod jobs;
+pub mod metrics;
 pub mod openapi;
 pub mod problem;
+pub mod reading;
 mod routes;
 pub mod serve;
 pub mod wire;
@@ -25,22 +29,27 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::config::Origins;
 use around::{authentication, middleware};
+use jobs::Runner;
 use routes::{
-    clouds, curvatures, interpolation, kernels, laplace_beltrami, model_selection, normals, pages, posterior,
-    process, surface_gradient,
+    clouds, curvatures, estimate, interpolation, jobs as job_routes, kernels, laplace_beltrami,
+    model_selection, normals, pages, posterior, process, surface_gradient,
 };
 use serve::app::App;
 
-/// The service as one router.
-pub fn router(app: Arc<App>) -> Router {
+/// The service as one router, and what works on its jobs.
+pub fn router(app: Arc<App>) -> (Router, Runner) {
     let (v1, probes, document) = parts();
+    let recover = || CatchPanicLayer::custom(middleware::recover as fn(_) -> _);
+    let runner = Runner { app: app.clone(), routes: v1.clone().layer(recover()).with_state(app.clone()) };
     let document = openapi::to_value(&document);
     let document_3_0 = openapi::version_3_0::derive(&document);
     let [document, document_3_0] = [document, document_3_0].map(|document| serve_json(&document));
     let v1 = v1
         .layer(from_fn_with_state(app.clone(), middleware::meet_deadline))
+        .layer(from_fn_with_state(runner.clone(), jobs::respond_async))
         .layer(from_fn_with_state(app.clone(), authentication::authenticate));
-    v1.merge(probes)
+    let router = v1
+        .merge(probes)
         .route("/openapi.json", document)
         .route("/openapi-3.0.json", document_3_0)
         .merge(
@@ -49,10 +58,11 @@ pub fn router(app: Arc<App>) -> Router {
         )
         .fallback(middleware::not_found)
         .method_not_allowed_fallback(middleware::method_not_allowed)
-        .layer(CatchPanicLayer::custom(middleware::recover))
+        .layer(recover())
         .layer(option_layer(app.config.cors_origins.as_ref().map(cors)))
         .layer(from_fn_with_state(app.clone(), middleware::name_and_log))
-        .with_state(app)
+        .with_state(app);
+    (router, runner)
 }
 
 /// A route to a document.
@@ -77,8 +87,12 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
         .routes(routes!(clouds::create_cloud, clouds::list_clouds))
         .routes(routes!(clouds::get_cloud, clouds::check_cloud, clouds::delete_cloud))
         .routes(routes!(kernels::list_kernels))
+        .routes(routes!(estimate::estimate))
+        .routes(routes!(job_routes::get_job, job_routes::delete_job))
         .layer(from_fn(middleware::negotiate))
-        // Whatever follows computes, and negotiates by itself.
+        // Whatever follows computes, or has computed, and negotiates by itself.
+        .routes(routes!(job_routes::follow_job))
+        .routes(routes!(job_routes::get_job_result))
         .routes(routes!(interpolation::compute_interpolation))
         .routes(routes!(interpolation::compute_interpolation_batch))
         .routes(routes!(posterior::compute_posterior))
@@ -95,6 +109,7 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
     let probes = OpenApiRouter::new()
         .routes(routes!(process::check_live))
         .routes(routes!(process::check_ready))
+        .routes(routes!(process::get_metrics))
         .routes(routes!(process::get_version))
         .routes(routes!(pages::get_start_page))
         .routes(routes!(pages::list_problem_pages))
@@ -108,7 +123,16 @@ fn parts() -> (Router<Arc<App>>, Router<Arc<App>>, utoipa::openapi::OpenApi) {
 
 /// Nothing unless origins are configured: then OPTIONS is a method like any other that no path has.
 fn cors(origins: &Origins) -> CorsLayer {
-    let exposed = ["x-request-id", "server-timing", "cache-status", "location", "retry-after", "etag"];
+    let exposed = [
+        "x-request-id",
+        "server-timing",
+        "cache-status",
+        "gramian-cloud",
+        "location",
+        "preference-applied",
+        "retry-after",
+        "etag",
+    ];
     let layer = CorsLayer::new()
         .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
         .allow_headers([
@@ -117,6 +141,9 @@ fn cors(origins: &Origins) -> CorsLayer {
             header::CONTENT_ENCODING,
             header::IF_NONE_MATCH,
             HeaderName::from_static("x-request-id"),
+            HeaderName::from_static("gramian-cloud"),
+            HeaderName::from_static("prefer"),
+            HeaderName::from_static("traceparent"),
         ])
         .expose_headers(exposed.map(HeaderName::from_static));
     layer.allow_origin(match origins {

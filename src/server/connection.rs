@@ -19,7 +19,8 @@ use tower::ServiceExt;
 use super::activity::{Activity, Expiry, Notice};
 use super::body::{Receiving, Sending};
 use super::pace::Pace;
-use super::socket::Socket;
+use super::socket::{Socket, Wire};
+use super::tls::Tls;
 use crate::http::around::transport::Arrival;
 
 /// Bytes of a head of HTTP/1, and of what is read ahead or not yet sent; a larger head is answered 431. hyper takes 100
@@ -72,10 +73,17 @@ tokio::task_local! {
 
 /// Serves what comes on a connection until it ends, or has to: see [`Activity::expired`]. Draining, it ends after the answers
 /// under way.
-pub async fn serve(socket: TcpStream, router: Router, patience: Patience, activity: Arc<Activity>) {
+pub async fn serve(
+    socket: TcpStream,
+    tls: Option<Arc<Tls>>,
+    router: Router,
+    patience: Patience,
+    activity: Arc<Activity>,
+) {
     // Both fail if the client has gone already. On the listener the buffer would miss who came before it was set.
     let _ = socket.set_nodelay(true);
     let _ = SockRef::from(&socket).set_send_buffer_size(SOCKET_BUFFER);
+    let Some(socket) = shaken(socket, tls, patience, &activity).await else { return };
     let exchanges = activity.clone();
     let service = service_fn(move |request| exchange(request, router.clone(), exchanges.clone()));
     let io = TokioIo::new(Socket::new(socket, activity.clone()));
@@ -102,6 +110,27 @@ pub async fn serve(socket: TcpStream, router: Router, patience: Patience, activi
         connection.as_mut().graceful_shutdown();
         // Whoever does not answer is left without a farewell.
         let _ = tokio::time::timeout(LEAVE, connection).await;
+    }
+}
+
+/// A newcomer once it has shaken hands, where that is asked for. It takes as long as a head may, and its place may be needed by another.
+async fn shaken(
+    socket: TcpStream,
+    tls: Option<Arc<Tls>>,
+    patience: Patience,
+    activity: &Activity,
+) -> Option<Wire> {
+    let Some(tls) = tls else { return Some(Wire::Plain(socket)) };
+    tokio::select! {
+        outcome = tls.accept(socket) => match outcome {
+            Ok(stream) => Some(Wire::Tls(Box::new(stream))),
+            Err(error) => {
+                tracing::debug!(%error, "no handshake");
+                None
+            }
+        },
+        _ = activity.expired(patience.idle, patience.sending) => None,
+        _ = activity.notice() => None,
     }
 }
 

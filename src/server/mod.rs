@@ -10,6 +10,7 @@ mod probe;
 mod socket;
 #[cfg(test)]
 mod tests;
+mod tls;
 
 use std::future::Future;
 use std::io;
@@ -26,6 +27,7 @@ use accept::{Acceptor, Connections, Door};
 use activity::Activity;
 use connection::Patience;
 pub use probe::is_ready;
+use tls::Tls;
 
 /// How often a draining server looks whether requests are still being computed.
 const DRAINING_INTERVAL: Duration = Duration::from_millis(20);
@@ -37,7 +39,7 @@ const DRAINING_INTERVAL: Duration = Duration::from_millis(20);
 /// then finds its connection broken, never an answer that looks complete and is not.
 ///
 /// # Errors
-/// None so far: failures to accept are logged, and pass.
+/// If there is to be TLS and its files are wrong. Failures to accept are logged, and pass.
 pub async fn serve(
     app: Arc<App>,
     listener: TcpListener,
@@ -45,7 +47,16 @@ pub async fn serve(
 ) -> io::Result<()> {
     let config = &app.config;
     let patience = Patience { idle: config.idle(), sending: config.sending() };
-    let listening = Listening { router: router(app.clone()), patience, limit: config.max_connections };
+    let tls = match (&config.tls_certificate, &config.tls_key) {
+        (Some(certificate), Some(key)) => {
+            Some(Arc::new(Tls::new(certificate, key).map_err(io::Error::other)?))
+        }
+        _ => None,
+    };
+    let following = tls.clone().map(|tls| tokio::spawn(tls.follow_files()));
+    let (router, runner) = router(app.clone());
+    tokio::spawn(runner.go_round());
+    let listening = Listening { router, tls, patience, limit: config.max_connections };
     let mut connections = listening.until(listener, stop).await;
     tracing::info!(n_connections = connections.len(), "draining");
     app.draining.cancel();
@@ -60,16 +71,22 @@ pub async fn serve(
         () = connections.all_ended() => {}
         () = over => {}
     }
+    // They are left in order, so that another process goes on with them at once.
+    app.jobs.all_left().await;
     if connections.len() > 0 {
         tracing::warn!(n_connections = connections.len(), "connections are cut, their answers are not read");
     }
     connections.cut().await;
+    if let Some(following) = following {
+        following.abort();
+    }
     Ok(())
 }
 
 /// What every connection is served with.
 struct Listening {
     router: Router,
+    tls: Option<Arc<Tls>>,
     patience: Patience,
     /// Connections at once.
     limit: usize,
@@ -93,10 +110,12 @@ impl Listening {
             match newcomer {
                 Some(socket) if has_room => {
                     let activity = Activity::new();
-                    let router = self.router.clone();
-                    let served = connection::serve(socket, router, self.patience, activity.clone());
+                    let (tls, router) = (self.tls.clone(), self.router.clone());
+                    let served = connection::serve(socket, tls, router, self.patience, activity.clone());
                     connections.add(activity, served);
                 }
+                // What it would be told is not what it expects to hear.
+                Some(_) if self.tls.is_some() => {}
                 Some(socket) => door.turn_away(socket),
                 None => {}
             }

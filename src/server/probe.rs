@@ -2,21 +2,99 @@
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
-/// Whether a server at this address answers its readiness probe with 200, within two seconds.
+use tokio_rustls::rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
+use tokio_rustls::rustls::crypto::{CryptoProvider, verify_tls12_signature, verify_tls13_signature};
+use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName, UnixTime};
+use tokio_rustls::rustls::{
+    ClientConfig, ClientConnection, DigitallySignedStruct, Error, SignatureScheme, StreamOwned,
+};
+
+use super::tls;
+
+/// Whether a server at this address answers its readiness probe with 200, within two seconds; over TLS if it has a certificate.
 ///
 /// # Errors
 /// Those of the connection.
-pub fn is_ready(bind: SocketAddr) -> io::Result<bool> {
+pub fn is_ready(bind: SocketAddr, certificate: Option<&Path>) -> io::Result<bool> {
     let timeout = Duration::from_secs(2);
-    let mut stream = TcpStream::connect_timeout(&reachable(bind), timeout)?;
+    let stream = TcpStream::connect_timeout(&reachable(bind), timeout)?;
     stream.set_read_timeout(Some(timeout))?;
     stream.set_write_timeout(Some(timeout))?;
+    match certificate {
+        None => ask(stream, bind),
+        Some(certificate) => ask(over_tls(stream, certificate)?, bind),
+    }
+}
+
+fn ask(mut stream: impl Read + Write, bind: SocketAddr) -> io::Result<bool> {
     write!(stream, "GET /health/ready HTTP/1.1\r\nHost: {bind}\r\nConnection: close\r\n\r\n")?;
     let mut status_line = [0; 12];
     stream.read_exact(&mut status_line)?;
     Ok(&status_line[9..] == b"200")
+}
+
+/// The server is known by its certificate: names and authorities mean nothing on the loopback.
+fn over_tls(stream: TcpStream, certificate: &Path) -> io::Result<StreamOwned<ClientConnection, TcpStream>> {
+    let known = tls::certificates(certificate).map_err(io::Error::other)?.swap_remove(0);
+    let provider = tls::provider();
+    let config = ClientConfig::builder_with_provider(provider.clone()).with_safe_default_protocol_versions();
+    let config = config.map_err(io::Error::other)?.dangerous();
+    let config = config.with_custom_certificate_verifier(Arc::new(Known { known, provider }));
+    let name = ServerName::from(Ipv4Addr::LOCALHOST);
+    let connection = ClientConnection::new(Arc::new(config.with_no_client_auth()), name);
+    Ok(StreamOwned::new(connection.map_err(io::Error::other)?, stream))
+}
+
+/// Trusts one certificate, whatever it says.
+#[derive(Debug)]
+struct Known {
+    known: CertificateDer<'static>,
+    provider: Arc<CryptoProvider>,
+}
+
+impl ServerCertVerifier for Known {
+    fn verify_server_cert(
+        &self,
+        shown: &CertificateDer<'_>,
+        _authorities: &[CertificateDer<'_>],
+        _name: &ServerName<'_>,
+        _ocsp: &[u8],
+        _now: UnixTime,
+    ) -> Result<ServerCertVerified, Error> {
+        if *shown == self.known {
+            Ok(ServerCertVerified::assertion())
+        } else {
+            Err(Error::General("the server has another certificate than GRAMIAN_TLS_CERTIFICATE".to_owned()))
+        }
+    }
+
+    fn verify_tls12_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signature: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, Error> {
+        let algorithms = &self.provider.signature_verification_algorithms;
+        verify_tls12_signature(message, certificate, signature, algorithms)
+    }
+
+    fn verify_tls13_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signature: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, Error> {
+        let algorithms = &self.provider.signature_verification_algorithms;
+        verify_tls13_signature(message, certificate, signature, algorithms)
+    }
+
+    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
+        self.provider.signature_verification_algorithms.supported_schemes()
+    }
 }
 
 /// A server that listens on every address is asked on the loopback.

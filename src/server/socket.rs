@@ -1,4 +1,4 @@
-//! The socket beneath hyper: notes when its client does not read, looks at heads, and ends as the last answer deserves.
+//! The socket beneath hyper, plain or with TLS: notes when its client does not read, looks at heads, and ends as the last answer deserves.
 
 use std::io;
 use std::pin::Pin;
@@ -7,12 +7,38 @@ use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
+use tokio_rustls::server::TlsStream;
 
 use super::activity::Activity;
 use super::head::HeadScanner;
 
+/// What comes from a client and goes to it.
+pub enum Wire {
+    Plain(TcpStream),
+    Tls(Box<TlsStream<TcpStream>>),
+}
+
+impl Wire {
+    fn tcp(&self) -> &TcpStream {
+        match self {
+            Self::Plain(tcp) => tcp,
+            Self::Tls(tls) => tls.get_ref().0,
+        }
+    }
+}
+
+/// Calls a method of whichever stream it is.
+macro_rules! of_either {
+    ($self:expr, $stream:ident => $call:expr) => {
+        match &mut $self.inner {
+            Wire::Plain($stream) => $call,
+            Wire::Tls($stream) => $call,
+        }
+    };
+}
+
 pub struct Socket {
-    inner: TcpStream,
+    inner: Wire,
     activity: Arc<Activity>,
     scanner: HeadScanner,
     /// The last answer is sent and the client knows that none follows.
@@ -20,7 +46,7 @@ pub struct Socket {
 }
 
 impl Socket {
-    pub fn new(inner: TcpStream, activity: Arc<Activity>) -> Self {
+    pub fn new(inner: Wire, activity: Arc<Activity>) -> Self {
         Self { inner, activity, scanner: HeadScanner::new(), is_shut_down: false }
     }
 
@@ -46,7 +72,7 @@ impl AsyncRead for Socket {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let n_before = buffer.filled().len();
-        let outcome = Pin::new(&mut self.inner).poll_read(cx, buffer);
+        let outcome = of_either!(self, stream => Pin::new(stream).poll_read(cx, buffer));
         if let Err(fault) = self.scanner.scan(&buffer.filled()[n_before..]) {
             self.activity.distrust(fault);
         }
@@ -56,7 +82,7 @@ impl AsyncRead for Socket {
 
 impl AsyncWrite for Socket {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        let outcome = Pin::new(&mut self.inner).poll_write(cx, bytes);
+        let outcome = of_either!(self, stream => Pin::new(stream).poll_write(cx, bytes));
         self.note(outcome)
     }
 
@@ -65,16 +91,19 @@ impl AsyncWrite for Socket {
         cx: &mut Context<'_>,
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        let outcome = Pin::new(&mut self.inner).poll_write_vectored(cx, slices);
+        let outcome = of_either!(self, stream => Pin::new(stream).poll_write_vectored(cx, slices));
         self.note(outcome)
     }
 
     fn is_write_vectored(&self) -> bool {
-        self.inner.is_write_vectored()
+        match &self.inner {
+            Wire::Plain(tcp) => tcp.is_write_vectored(),
+            Wire::Tls(tls) => tls.is_write_vectored(),
+        }
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.inner).poll_flush(cx)
+        of_either!(self, stream => Pin::new(stream).poll_flush(cx))
     }
 
     /// Ends the answers. If the last one came before its request was read, what the client still sends is read and thrown
@@ -82,7 +111,7 @@ impl AsyncWrite for Socket {
     /// reads after sending.
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         if !self.is_shut_down {
-            std::task::ready!(Pin::new(&mut self.inner).poll_shutdown(cx))?;
+            std::task::ready!(of_either!(self, stream => Pin::new(stream).poll_shutdown(cx)))?;
             self.is_shut_down = true;
         }
         if !self.activity.is_answered_early() {
@@ -93,7 +122,8 @@ impl AsyncWrite for Socket {
         // A few at a time, so that one fast client does not keep a thread.
         for _ in 0..16 {
             let mut buffer = ReadBuf::new(&mut scratch);
-            let outcome = std::task::ready!(Pin::new(&mut self.inner).poll_read(cx, &mut buffer));
+            let outcome = of_either!(self, stream => Pin::new(stream).poll_read(cx, &mut buffer));
+            let outcome = std::task::ready!(outcome);
             if outcome.is_err() || buffer.filled().is_empty() {
                 return Poll::Ready(Ok(()));
             }
@@ -108,7 +138,7 @@ impl Drop for Socket {
     fn drop(&mut self) {
         if self.activity.has_half_an_answer() {
             // It fails if the client has gone, which is as well.
-            let _ = self.inner.set_zero_linger();
+            let _ = self.inner.tcp().set_zero_linger();
         }
     }
 }

@@ -91,7 +91,7 @@ async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
         .route("/paused", get(async move || Watched::body(&paused, 4, 100, 2 * SENDING)))
         .route("/whole", get(async move || Watched::body(&whole, 1, 8 << 20, none)));
     let patience = Patience { idle: Duration::from_secs(30), sending };
-    let listening = Listening { router, patience, limit: 100 };
+    let listening = Listening { router, tls: None, patience, limit: 100 };
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     tokio::spawn(async move { listening.until(listener, std::future::pending()).await });

@@ -1,11 +1,14 @@
 //! Registered clouds, named by their content.
 
+use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use super::Owner;
-use super::fair_cache::FairCache;
+use super::fair_cache::{Counts, FairCache};
 use super::key::CloudId;
+use super::objects::cloud_object::CloudHead;
 use super::single_flight::SingleFlight;
 use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::numerics::points::cloud::Cloud;
@@ -21,7 +24,12 @@ pub struct RegisteredCloud {
     pub cloud: Arc<Cloud>,
     /// The client's normals, `[n, d]`, not normalised.
     pub normals: Option<Cloud>,
-    pub created_at: SystemTime,
+    /// Nanoseconds since 1970.
+    created_at: AtomicU64,
+    /// Whether it outlives the process.
+    is_durable: AtomicBool,
+    /// When it was last seen in the store, nanoseconds since 1970.
+    seen_at: AtomicU64,
     /// Points that coincide with an earlier one.
     pub n_duplicates: usize,
     /// The least and the greatest value of each coordinate.
@@ -40,10 +48,59 @@ impl RegisteredCloud {
             bounding_box: cloud.bounding_box(),
             cloud,
             normals,
-            created_at: SystemTime::now(),
+            created_at: AtomicU64::new(nanoseconds(SystemTime::now())),
+            is_durable: AtomicBool::new(false),
+            seen_at: AtomicU64::new(0),
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
         }
+    }
+
+    /// As it was written, with the name that its points have.
+    pub fn restored(id: CloudId, cloud: Cloud, normals: Option<Cloud>, head: CloudHead) -> Self {
+        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
+        Self {
+            id,
+            n_duplicates: head.n_duplicates,
+            bounding_box: head.bounding_box,
+            cloud,
+            normals,
+            created_at: AtomicU64::new(nanoseconds(head.created_at)),
+            is_durable: AtomicBool::new(true),
+            seen_at: AtomicU64::new(nanoseconds(SystemTime::now())),
+            sampling: OnceLock::new(),
+            noise: OnceLock::new(),
+        }
+    }
+
+    /// When it was registered.
+    pub fn created_at(&self) -> SystemTime {
+        SystemTime::UNIX_EPOCH + Duration::from_nanos(self.created_at.load(Ordering::Relaxed))
+    }
+
+    /// Whether it outlives the process.
+    pub fn is_durable(&self) -> bool {
+        self.is_durable.load(Ordering::Acquire)
+    }
+
+    /// Says that it does, and since when it is registered if it was before.
+    pub fn set_durable(&self, since: Option<SystemTime>) {
+        if let Some(since) = since {
+            self.created_at.store(nanoseconds(since), Ordering::Relaxed);
+        }
+        self.trust();
+        self.is_durable.store(true, Ordering::Release);
+    }
+
+    /// It was seen in the store.
+    pub fn trust(&self) {
+        self.seen_at.store(nanoseconds(SystemTime::now()), Ordering::Relaxed);
+    }
+
+    /// Whether it is in memory alone, or was in the store no longer than that ago.
+    pub fn is_trusted(&self, most: Duration) -> bool {
+        let elapsed = nanoseconds(SystemTime::now()).saturating_sub(self.seen_at.load(Ordering::Relaxed));
+        !self.is_durable() || Duration::from_nanos(elapsed) <= most
     }
 
     /// How it is sampled, once that was asked for.
@@ -71,16 +128,30 @@ impl RegisteredCloud {
     }
 }
 
+/// Since 1970; until 2554.
+fn nanoseconds(time: SystemTime) -> u64 {
+    let since_epoch = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX)
+}
+
 /// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
 pub struct CloudStore<E> {
     clouds: FairCache<CloudId, Arc<RegisteredCloud>>,
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
+    reads: SingleFlight<(Owner, CloudId), Option<Arc<RegisteredCloud>>, E>,
+    writes: SingleFlight<(Owner, CloudId), bool, Infallible>,
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub fn new(max_bytes: usize) -> Self {
-        Self { clouds: FairCache::new(max_bytes), samplings: SingleFlight::new(), noise: SingleFlight::new() }
+        Self {
+            clouds: FairCache::new(max_bytes),
+            samplings: SingleFlight::new(),
+            noise: SingleFlight::new(),
+            reads: SingleFlight::new(),
+            writes: SingleFlight::new(),
+        }
     }
 
     /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered, not kept.
@@ -96,6 +167,43 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         }
         let stored = Arc::new(RegisteredCloud::new(id, cloud, normals));
         self.clouds.get_or_insert(owner, id, stored, |stored| stored.n_bytes())
+    }
+
+    /// The cloud that is kept, or what `read` finds, at most once however many ask.
+    ///
+    /// # Errors
+    /// Those of `read`; they are not kept.
+    pub async fn get_or_read<F>(
+        &self,
+        owner: Owner,
+        id: CloudId,
+        read: impl FnOnce() -> F,
+    ) -> Result<Option<Arc<RegisteredCloud>>, E>
+    where
+        F: Future<Output = Result<Option<Arc<RegisteredCloud>>, E>> + Send + 'static,
+    {
+        match self.clouds.get(owner, &id) {
+            Some(found) => Ok(Some(found)),
+            None => self.reads.join((owner, id), read).await.1,
+        }
+    }
+
+    /// Writes a cloud at most once however many have it; answers what `write` does.
+    pub async fn write<F>(&self, owner: Owner, id: CloudId, write: impl FnOnce() -> F) -> bool
+    where
+        F: Future<Output = bool> + Send + 'static,
+    {
+        let begin = || {
+            let writing = write();
+            async move { Ok(writing.await) }
+        };
+        self.writes.join((owner, id), begin).await.1.unwrap_or_else(|never: Infallible| match never {})
+    }
+
+    /// Keeps a cloud that was read again, unless it is there.
+    pub fn adopt(&self, owner: Owner, cloud: RegisteredCloud) -> Arc<RegisteredCloud> {
+        let (id, cloud) = (cloud.id, Arc::new(cloud));
+        self.clouds.get_or_insert(owner, id, cloud, |cloud| cloud.n_bytes()).0
     }
 
     pub fn get(&self, owner: Owner, id: CloudId) -> Option<Arc<RegisteredCloud>> {
@@ -154,10 +262,15 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         self.clouds.n_bytes()
     }
 
+    /// How many are kept, and how many made room for others.
+    pub fn counts(&self) -> Counts {
+        self.clouds.counts()
+    }
+
     /// All clouds of an owner, oldest first, ties by id.
     pub fn list(&self, owner: Owner) -> Vec<Arc<RegisteredCloud>> {
         let mut clouds = self.clouds.values(owner);
-        clouds.sort_by_key(|stored| (stored.created_at, stored.id));
+        clouds.sort_by_key(|stored| (stored.created_at(), stored.id));
         clouds
     }
 }

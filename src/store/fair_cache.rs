@@ -27,6 +27,15 @@ pub(super) struct FairCache<K, V> {
 struct Entries<K, V> {
     of: HashMap<Owner, OfOwner<K, V>>,
     n_bytes: usize,
+    /// Values that made room for others, since the start.
+    n_evicted: u64,
+}
+
+/// How many values there are, and were.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    pub n_kept: usize,
+    pub n_evicted: u64,
 }
 
 struct OfOwner<K, V> {
@@ -42,7 +51,7 @@ struct Entry<V> {
 impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
     /// An empty cache of at most so many bytes.
     pub(super) fn new(max_bytes: usize) -> Self {
-        Self { max_bytes, entries: Mutex::new(Entries { of: HashMap::new(), n_bytes: 0 }) }
+        Self { max_bytes, entries: Mutex::new(Entries { of: HashMap::new(), n_bytes: 0, n_evicted: 0 }) }
     }
 
     /// Finds a value, which is the most recently used one then.
@@ -133,6 +142,13 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         self.lock().n_bytes
     }
 
+    /// How many values are kept, and how many made room for others since the start.
+    pub(super) fn counts(&self) -> Counts {
+        let entries = self.lock();
+        let n_kept = entries.of.values().map(|of| of.by_use.len()).sum();
+        Counts { n_kept, n_evicted: entries.n_evicted }
+    }
+
     /// What is let go is handed out, to be dropped when the lock is free.
     fn keep(
         &self,
@@ -194,6 +210,7 @@ impl<K: Hash + Eq, V> Entries<K, V> {
         for _ in 0..of.by_use.len() {
             let (key, entry) = of.by_use.pop_lru()?;
             if may_go(&entry.value) {
+                self.n_evicted += 1;
                 return self.account_for(owner, entry);
             }
             // It is in use, and by that the most recently used one.

@@ -59,6 +59,11 @@ pub struct FitKey {
 }
 
 impl FitKey {
+    /// What the factorization depends on beside its cloud, 64 hexadecimal digits.
+    pub fn fit_name(&self) -> String {
+        blake3::Hash::from(self.fit).to_string()
+    }
+
     /// Names local regressions of a cloud, which choose all else by themselves.
     pub fn of_local(owner: Owner, cloud_id: CloudId) -> Self {
         Self { owner, cloud_id, fit: blake3::hash(b"local").into() }

@@ -12,14 +12,20 @@
 //! kept. What two entries share is counted in both, since either may outlive the other. Factors, and all work with them,
 //! take their memory from one budget (budget.rs): a factor holds its part for as long as anybody holds the factor, and
 //! what is kept makes room for work.
+//!
+//! WHAT OUTLIVES THE PROCESS. Clouds may have a second level, objects in a directory or in object storage (objects/). Memory is a cache
+//! of it then; what is in neither is not there.
 
 pub mod budget;
 pub mod clouds;
 mod fair_cache;
 pub mod key;
 pub mod learned;
+pub mod objects;
 pub mod prepared;
 mod single_flight;
+
+pub use fair_cache::Counts;
 
 /// Whose clouds are meant: the position of the API key in the configuration, or the one owner of an open service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::Owner;
 use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
-use super::fair_cache::FairCache;
+use super::fair_cache::{Counts, FairCache};
 use super::key::{CloudId, FitKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
 use crate::numerics::function::moving::Moving;
@@ -34,6 +34,8 @@ pub struct PreparedFit {
     prepared: Prepared,
     pub gram_time: Duration,
     pub factor_time: Duration,
+    /// It was read, not made.
+    is_restored: bool,
     surface: OnceLock<PreparedSurface>,
     memory: Arc<Reservation>,
 }
@@ -53,7 +55,14 @@ impl PreparedFit {
         memory.shrink_to(0);
         let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
         let memory = Arc::new(memory);
-        Self { prepared: Prepared::Local, gram_time, factor_time, surface: OnceLock::new(), memory }
+        Self {
+            prepared: Prepared::Local,
+            gram_time,
+            factor_time,
+            is_restored: false,
+            surface: OnceLock::new(),
+            memory,
+        }
     }
 
     /// Gives back what of the memory it does not take.
@@ -61,14 +70,24 @@ impl PreparedFit {
         memory.shrink_to(moving.n_bytes());
         let (prepared, memory) = (Prepared::Moving(Arc::new(moving)), Arc::new(memory));
         let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
-        Self { prepared, gram_time, factor_time, surface: OnceLock::new(), memory }
+        Self { prepared, gram_time, factor_time, is_restored: false, surface: OnceLock::new(), memory }
     }
 
     /// Gives back what of the memory the finished solver does not take.
     pub fn new(solver: Solver, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
         memory.shrink_to(solver.n_bytes());
         let (prepared, memory) = (Prepared::Solver(Arc::new(solver)), Arc::new(memory));
-        Self { prepared, gram_time, factor_time, surface: OnceLock::new(), memory }
+        Self { prepared, gram_time, factor_time, is_restored: false, surface: OnceLock::new(), memory }
+    }
+
+    /// The same of a solver that was made before, and read again.
+    pub fn restored(solver: Solver, memory: Reservation) -> Self {
+        Self { is_restored: true, ..Self::new(solver, Duration::ZERO, Duration::ZERO, memory) }
+    }
+
+    /// Whether it was read, not made.
+    pub fn is_restored(&self) -> bool {
+        self.is_restored
     }
 
     /// The system made ready.
@@ -84,6 +103,18 @@ impl PreparedFit {
         match &self.prepared {
             Prepared::Moving(moving) => Some(moving),
             Prepared::Solver(_) | Prepared::Local => None,
+        }
+    }
+
+    /// What it is, by name: a factorization that was read; one of all of the matrix, or of as many pivots as it has rank; neighbourhoods; or
+    /// nothing.
+    pub fn kind(&self) -> &'static str {
+        match &self.prepared {
+            Prepared::Solver(_) if self.is_restored => "restored",
+            Prepared::Solver(solver) if solver.rank() < solver.n_points() => "pivoted",
+            Prepared::Solver(_) => "dense",
+            Prepared::Moving(_) => "moving",
+            Prepared::Local => "local",
         }
     }
 
@@ -347,6 +378,11 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
     /// Bytes of all solvers, surfaces and weights that are kept, and of the memory for the next factorization.
     pub fn n_bytes(&self) -> usize {
         self.fits.n_bytes() + self.solutions.n_bytes() + self.spare.n_bytes()
+    }
+
+    /// How many solvers are kept, and how many made room for others or for work.
+    pub fn counts(&self) -> Counts {
+        self.fits.counts()
     }
 
     /// Bytes of the budget that are held, by what is kept and by work.

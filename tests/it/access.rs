@@ -60,7 +60,7 @@ async fn probes_and_documents_need_no_key() {
     let server = Server::with_flags(&["--api-keys", "alpha-key"]).await;
     let documents =
         ["/openapi.json", "/openapi-3.0.json", "/docs/", "/problems/unauthorized", "/problems", "/"];
-    for path in ["/health/live", "/health/ready", "/version"].into_iter().chain(documents) {
+    for path in ["/health/live", "/health/ready", "/metrics", "/version"].into_iter().chain(documents) {
         assert_eq!(server.get(path).await.status, 200, "{path}");
     }
 }
@@ -75,6 +75,10 @@ async fn every_operation_refuses_keys_and_media_types_where_the_document_says_so
         for (method, operation) in item.as_object().unwrap() {
             let method: Method = method.to_uppercase().parse().unwrap();
             for (status, headers) in [("401", ["wrong-key", "*/*"]), ("406", ["alpha-key", "text/csv"])] {
+                // What a result is depends on another request.
+                if path.ends_with("/result") && status == "406" {
+                    continue;
+                }
                 let [key, accept] = headers;
                 let headers = [("authorization", &*format!("Bearer {key}")), ("accept", accept)];
                 let answer = send(&server, method.clone(), &path, &headers, &json!({})).await;

@@ -23,7 +23,10 @@ use document::{Contract, Operation, Response, Served};
 const BESIDE: [&str; 3] = ["/docs", "/openapi.json", "/openapi-3.0.json"];
 
 /// Headers that HTTP, its compression, CORS and what browsers obey bring along with any answer. All others belong to the interface.
-const OF_HTTP: [&str; 11] = [
+/// Refusals repeat the cloud that a request named to proxies.
+const OF_HTTP: [&str; 13] = [
+    "cache-control",
+    "gramian-cloud",
     "content-type",
     "content-length",
     "content-encoding",

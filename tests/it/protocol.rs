@@ -42,9 +42,15 @@ async fn a_wrong_method_is_answered_with_the_right_ones() {
     }
     assert_eq!(allowed(Method::PUT, "/v1/clouds").await, "GET HEAD POST");
     assert_eq!(allowed(Method::POST, &format!("/v1/clouds/{id}")).await, "DELETE GET HEAD");
-    for path in
-        ["/v1/kernels", "/health/live", "/health/ready", "/version", "/openapi.json", "/problems/internal"]
-    {
+    for path in [
+        "/v1/kernels",
+        "/health/live",
+        "/health/ready",
+        "/metrics",
+        "/version",
+        "/openapi.json",
+        "/problems/internal",
+    ] {
         assert_eq!(allowed(Method::POST, path).await, "GET HEAD", "{path}");
     }
 }
@@ -100,6 +106,9 @@ async fn what_generated_clients_accept_is_acceptable() {
         );
     }
     bodies.insert("/v1/model-selection", bodies["/v1/posterior"].clone());
+    let mut named = bodies["/v1/normals"].clone();
+    named["operation"] = json!("compute_normals");
+    bodies.insert("/v1/estimate", named);
     for (name, document) in
         [("3.1", gramian::http::openapi_json()), ("3.0", gramian::http::openapi_3_0_json())]
     {
@@ -110,7 +119,10 @@ async fn what_generated_clients_accept_is_acceptable() {
                 let accepted: BTreeSet<&str> = responses.values().flat_map(media_types).collect();
                 let accept = accepted.into_iter().collect::<Vec<_>>().join(", ");
                 let method: Method = method.to_uppercase().parse().unwrap();
-                let url = server.url(&path.replace("{cloud_id}", &id).replace("{slug}", "internal"));
+                let job =
+                    if path.contains("{job_id}") { ask_for_a_job(&server).await } else { String::new() };
+                let path = path.replace("{cloud_id}", &id).replace("{slug}", "internal");
+                let url = server.url(&path.replace("{job_id}", &job));
                 let mut request = server.client.request(method.clone(), url);
                 if !accept.is_empty() {
                     request = request.header("accept", &accept);
@@ -126,6 +138,12 @@ async fn what_generated_clients_accept_is_acceptable() {
             }
         }
     }
+}
+
+async fn ask_for_a_job(server: &Server) -> String {
+    let request = server.client.post(server.url("/v1/normals")).header("prefer", "respond-async");
+    let answer = request.json(&ROUTES[0].with("/values", &json!("absent"))).send().await.unwrap();
+    answer.json::<Value>().await.unwrap()["job_id"].as_str().unwrap().to_owned()
 }
 
 async fn register_a_cloud(server: &Server) -> String {
@@ -210,6 +228,7 @@ async fn every_answer_names_its_request() {
     for path in [
         "/health/live",
         "/health/ready",
+        "/metrics",
         "/version",
         "/openapi.json",
         "/docs/",

@@ -80,7 +80,7 @@ impl Server {
         let stop_signal = async move {
             stopped.await.ok();
         };
-        tokio::spawn(serve(App::new(config).unwrap(), listener, stop_signal));
+        tokio::spawn(serve(App::new(config).await.unwrap(), listener, stop_signal));
         Self { address, client: reqwest::Client::new(), _stop: stop }
     }
 

@@ -12,21 +12,31 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::store::Owner;
 
-/// Lets requests with a valid key through, with their [`Owner`] as an extension.
+/// The name of the key that a request was made with, as an extension of its answer, for the log.
+#[derive(Clone)]
+pub struct KeyName(pub String);
+
+/// Lets requests with a valid key through that are within its limits, with their [`Owner`] as an extension.
 pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
-    let owner = if app.keys.is_open() {
-        Some(Owner(0))
-    } else {
-        bearer_key(&request).and_then(|key| app.keys.owner_of(key))
+    if app.keys.is_open() {
+        request.extensions_mut().insert(Owner(0));
+        return next.run(request).await;
+    }
+    let Some(caller) = bearer_key(&request).and_then(|key| app.keys.caller_of(key)) else {
+        let detail = "send Authorization: Bearer <key> with a valid key";
+        return Problem::new(Slug::Unauthorized, detail).into_response();
     };
-    match owner {
-        Some(owner) => {
-            request.extensions_mut().insert(owner);
+    let mut response = match caller.enter() {
+        Err(too_many) => Problem::rate_limited(&too_many.limit, too_many.retry_after_seconds).into_response(),
+        Ok(_entered) => {
+            request.extensions_mut().insert(caller.owner);
             next.run(request).await
         }
-        None => Problem::new(Slug::Unauthorized, "send Authorization: Bearer <key> with a valid key")
-            .into_response(),
+    };
+    if let Some(name) = &caller.name {
+        response.extensions_mut().insert(KeyName(name.clone()));
     }
+    response
 }
 
 /// The scheme is case-insensitive (RFC 9110, section 11.1).

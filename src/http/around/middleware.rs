@@ -3,22 +3,29 @@
 use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use uuid::Uuid;
 
+use super::authentication::KeyName;
+use super::span::RequestSpan;
 use super::transport;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
+use crate::store::key::CloudId;
 
 /// Bytes of a method and of a path that are logged: clients may send any number.
 const LOGGED_METHOD_BYTES: usize = 32;
 const LOGGED_PATH_BYTES: usize = 200;
+
+/// The cloud that a request is about: proxies send all that is about one cloud to one replica.
+pub const CLOUD_HEADER: HeaderName = HeaderName::from_static("gramian-cloud");
 
 /// What the pages for people may load and do: their own files. Swagger UI writes styles into its elements, and has icons in
 /// its style sheet.
@@ -41,22 +48,54 @@ fn secure(headers: &mut HeaderMap) {
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
 pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let _counted = Counted::new(app.clone());
-    let began = Instant::now();
-    let request_id = client_request_id(request.headers()).unwrap_or_else(|| uuid::Uuid::now_v7().to_string());
+    let mut under_way = UnderWay::new(app.clone(), &request);
+    let request_id = client_request_id(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
     let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
     let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
+    let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    let span = RequestSpan::begin(request.method(), route, request.headers());
+    let cloud = named_cloud(&request);
     let response = transport::answer(&app, request, next).await;
+    if let Some(problem) = response.extensions().get::<Problem>() {
+        app.metrics.refused(problem.slug());
+    }
     let mut response = with_problem_document(response, &request_id);
     secure(response.headers_mut());
+    if let Some(cloud) = cloud {
+        response.headers_mut().entry(CLOUD_HEADER).or_insert(cloud);
+    }
     if let Ok(value) = HeaderValue::from_str(&request_id) {
         response.headers_mut().insert("x-request-id", value);
     }
+    let duration_ms = under_way.answered(response.status()).as_secs_f64() * 1e3;
     let status = response.status().as_u16();
-    let duration_ms = began.elapsed().as_secs_f64() * 1e3;
     let cache = response.headers().get("cache-status").and_then(|value| value.to_str().ok()).unwrap_or("-");
-    tracing::info!(request_id, method, path, status, duration_ms, cache, "{method} {path} {status}");
+    if cache != "-" {
+        app.metrics.cached(cache);
+    }
+    let trace_id = span.trace_id();
+    span.end(response.status(), response.headers());
+    let key = response.extensions().get::<KeyName>().map_or("-", |name| &name.0);
+    tracing::info!(
+        request_id,
+        trace_id,
+        key,
+        method,
+        path,
+        status,
+        duration_ms,
+        cache,
+        "{method} {path} {status}"
+    );
     response
+}
+
+/// The cloud that a request names to whoever passes it on, in its head or its path: every answer repeats it.
+fn named_cloud(request: &Request) -> Option<HeaderValue> {
+    let is_id = |text: &&str| CloudId::parse(text).is_some();
+    let in_head = request.headers().get(CLOUD_HEADER).and_then(|value| value.to_str().ok()).filter(is_id);
+    let in_path = || request.uri().path().strip_prefix("/v1/clouds/").filter(is_id);
+    HeaderValue::from_str(in_head.or_else(in_path)?).ok()
 }
 
 /// The beginning of a text, with a mark where more follows.
@@ -69,18 +108,34 @@ fn cut(text: &str, n_bytes: usize) -> String {
 }
 
 /// A request under way, also if its client leaves.
-struct Counted(Arc<App>);
+struct UnderWay {
+    app: Arc<App>,
+    began: Instant,
+    method: Method,
+    route: Option<MatchedPath>,
+    status: Option<StatusCode>,
+}
 
-impl Counted {
-    fn new(app: Arc<App>) -> Self {
+impl UnderWay {
+    fn new(app: Arc<App>, request: &Request) -> Self {
         app.n_requests.fetch_add(1, Ordering::Relaxed);
-        Self(app)
+        app.metrics.arrived();
+        let route = request.extensions().get::<MatchedPath>().cloned();
+        Self { app, began: Instant::now(), method: request.method().clone(), route, status: None }
+    }
+
+    /// Says that it was answered, and how long that took.
+    fn answered(&mut self, status: StatusCode) -> Duration {
+        self.status = Some(status);
+        self.began.elapsed()
     }
 }
 
-impl Drop for Counted {
+impl Drop for UnderWay {
     fn drop(&mut self) {
-        self.0.n_requests.fetch_sub(1, Ordering::Relaxed);
+        self.app.n_requests.fetch_sub(1, Ordering::Relaxed);
+        let route = self.route.as_ref().map(MatchedPath::as_str);
+        self.app.metrics.left(&self.method, route, self.status, self.began.elapsed());
     }
 }
 
@@ -92,12 +147,18 @@ fn client_request_id(headers: &HeaderMap) -> Option<String> {
 }
 
 /// Writes the document of a problem, also for errors that a library answered on its own. Other headers are kept.
-fn with_problem_document(response: Response, request_id: &str) -> Response {
+pub fn with_problem_document(response: Response, request_id: &str) -> Response {
     let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
         return response;
     }
-    let problem = response.extensions().get::<Problem>().cloned().unwrap_or_else(|| foreign(status));
+    let problem = match response.extensions().get::<Problem>() {
+        Some(problem) => problem.clone(),
+        None => match response.extensions().get::<Documented>() {
+            Some(Documented(document)) => return written_before(status, document, request_id),
+            None => foreign(status),
+        },
+    };
     let mut documented = problem.to_response(request_id);
     for (name, value) in response.headers() {
         if name != header::CONTENT_TYPE && name != header::CONTENT_LENGTH {
@@ -105,6 +166,18 @@ fn with_problem_document(response: Response, request_id: &str) -> Response {
         }
     }
     documented
+}
+
+/// A problem that has its document, as an extension of its answer.
+#[derive(Clone)]
+pub struct Documented(pub serde_json::Value);
+
+/// The document of a problem that was written for another request.
+fn written_before(status: StatusCode, document: &serde_json::Value, request_id: &str) -> Response {
+    let mut document = document.clone();
+    document["instance"] = request_id.into();
+    let media_type = [(header::CONTENT_TYPE, "application/problem+json")];
+    (status, media_type, document.to_string()).into_response()
 }
 
 /// An error that no handler of ours made.

@@ -2,4 +2,6 @@
 
 pub mod authentication;
 pub mod middleware;
+pub mod span;
+pub mod trace;
 pub mod transport;

@@ -95,8 +95,8 @@ pub async fn answer(app: &App, request: Request, next: Next) -> Response {
         // What follows on this connection may be a request that somebody else has smuggled in.
         return close(version, Problem::new(Slug::MalformedRequest, detail).into_response());
     }
-    // Probes are there for whoever waits for the end.
-    if request.uri().path().starts_with("/health/") {
+    // Probes and metrics are there for whoever waits for the end.
+    if request.uri().path().starts_with("/health/") || request.uri().path() == "/metrics" {
         return next.run(request).await;
     }
     let arrival = arrival.filter(|arrival| !arrival.is_read()).cloned();

@@ -8,12 +8,14 @@ use std::time::Duration;
 use tokio::sync::oneshot;
 
 use super::observer::{JobObserver, StageTimes};
+use super::progress::Progress;
 use super::pulse::Pulse;
 use super::turns::{Turn, Turns};
 use crate::store::Owner;
 
 /// A pool of threads of its own with turns on it.
 pub(super) struct Lane {
+    n_turns: usize,
     pool: Arc<rayon::ThreadPool>,
     turns: Arc<Turns>,
     pulse: Arc<Pulse>,
@@ -35,7 +37,12 @@ impl Lane {
             .thread_name(move |index| format!("{name}-{index}"))
             .start_handler(move |_| be_nice(niceness))
             .build()?;
-        Ok(Self { pool: Arc::new(pool), turns: Turns::new(n_turns), pulse: Pulse::new() })
+        Ok(Self { n_turns, pool: Arc::new(pool), turns: Turns::new(n_turns), pulse: Pulse::new() })
+    }
+
+    /// Jobs that have their turn, and those that wait for one.
+    pub(super) fn load(&self) -> (usize, usize) {
+        self.turns.load(self.n_turns)
     }
 
     /// Waits for a turn of this owner.
@@ -48,6 +55,7 @@ impl Lane {
     pub(super) async fn run<T: Send + 'static>(
         &self,
         turn: Turn,
+        progress: Option<Arc<Progress>>,
         job: impl FnOnce(&JobObserver) -> T + Send + 'static,
     ) -> Option<(T, StageTimes)> {
         let (sender, receiver) = oneshot::channel();
@@ -56,7 +64,7 @@ impl Lane {
         let pulse = self.pulse.clone();
         self.pool.spawn(move || {
             pulse.beat();
-            let observer = JobObserver::new(cancelled, pulse);
+            let observer = JobObserver::new(cancelled, pulse, progress);
             let outcome = catch_unwind(AssertUnwindSafe(|| job(&observer)));
             drop(turn);
             // The receiver is gone if the client is.
@@ -138,7 +146,7 @@ mod tests {
             }
         };
         let turn = lane.turn(Owner(0)).await;
-        let mut running = Box::pin(lane.run(turn, work));
+        let mut running = Box::pin(lane.run(turn, None, work));
         assert!(futures_util::poll!(&mut running).is_pending());
         for _ in 0..3 {
             assert!(lane.is_moving(Duration::from_secs(5)).await);

@@ -15,9 +15,11 @@
 //! channel. What many may want at once is awaited before the job begins, through the flights of the store. clippy.toml
 //! refuses the calls that could break this; each exception says why it is none.
 
+mod calibration;
 mod lane;
 mod observer;
 mod places;
+mod progress;
 mod pulse;
 mod turns;
 
@@ -26,10 +28,13 @@ use std::time::Duration;
 
 use super::problem::Problem;
 use crate::store::Owner;
+pub use calibration::Work;
 use lane::Lane;
 pub use observer::{JobObserver, StageTimes};
 pub use places::Admission;
 use places::Places;
+pub use progress::{Progress, Snapshot};
+pub use turns::Turns;
 
 /// Flops up to which a job goes to the light lane: some 2 ms of one core.
 const LIGHT_FLOPS: f64 = 3e7;
@@ -42,6 +47,21 @@ pub const FLOPS_PER_PARSED_BYTE: f64 = 20.0;
 
 /// How long a lane may be without any sign of life: between two checkpoints of the largest factorization lies a second or two.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What there is to do at a moment.
+pub struct Load {
+    /// Requests that have a place, and how many places there are.
+    pub n_admitted: usize,
+    pub n_places: usize,
+    pub lanes: [LaneLoad; 3],
+}
+
+/// Jobs of a lane.
+pub struct LaneLoad {
+    pub name: &'static str,
+    pub n_running: usize,
+    pub n_waiting: usize,
+}
 
 /// Bounded compute threads behind a bounded queue.
 pub struct Compute {
@@ -75,6 +95,17 @@ impl Compute {
     /// Threads of each lane.
     pub fn n_threads(&self) -> usize {
         self.n_threads
+    }
+
+    /// What there is to do now.
+    pub fn load(&self) -> Load {
+        let lanes = [("light", &self.light), ("shared", &self.shared), ("exclusive", &self.exclusive)];
+        let lanes = lanes.map(|(name, lane)| {
+            let (n_running, n_waiting) = lane.load();
+            LaneLoad { name, n_running, n_waiting }
+        });
+        let (n_admitted, n_places) = self.places.load();
+        Load { n_admitted, n_places, lanes }
     }
 
     /// Takes a place for a request of this owner.
@@ -126,7 +157,7 @@ impl Compute {
         let lane = self.lane(flops);
         let turn = lane.turn(admission.owner).await;
         admission.begin();
-        lane.run(turn, job).await.ok_or_else(panicked)
+        lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)
     }
 
     /// Runs a small job of an answer that is on its way, when its place is another's already.
@@ -139,7 +170,7 @@ impl Compute {
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
         let turn = self.light.turn(owner).await;
-        let (result, _) = self.light.run(turn, |_| job()).await.ok_or_else(panicked)?;
+        let (result, _) = self.light.run(turn, None, |_| job()).await.ok_or_else(panicked)?;
         Ok(result)
     }
 

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::progress::Progress;
 use super::pulse::Pulse;
 use crate::numerics::observer::{Observer, Stage};
 
@@ -31,6 +32,8 @@ impl StageTimes {
 pub struct JobObserver {
     cancelled: Arc<AtomicBool>,
     pulse: Arc<Pulse>,
+    /// Told where the job is, if anybody looks.
+    progress: Option<Arc<Progress>>,
     clock: Mutex<Clock>,
 }
 
@@ -49,8 +52,12 @@ impl Clock {
 }
 
 impl JobObserver {
-    pub(super) fn new(cancelled: Arc<AtomicBool>, pulse: Arc<Pulse>) -> Self {
-        Self { cancelled, pulse, clock: Mutex::default() }
+    pub(super) fn new(
+        cancelled: Arc<AtomicBool>,
+        pulse: Arc<Pulse>,
+        progress: Option<Arc<Progress>>,
+    ) -> Self {
+        Self { cancelled, pulse, progress, clock: Mutex::default() }
     }
 
     #[expect(clippy::disallowed_methods, reason = "a clock, for as long as it takes to read it")]
@@ -71,6 +78,15 @@ impl Observer for JobObserver {
         let mut clock = self.clock();
         clock.stop();
         clock.current = Some((stage, Instant::now()));
+        if let Some(progress) = &self.progress {
+            progress.enter(stage);
+        }
+    }
+
+    fn solved_to(&self, relative_residual: f64) {
+        if let Some(progress) = &self.progress {
+            progress.solved_to(relative_residual);
+        }
     }
 
     fn is_cancelled(&self) -> bool {

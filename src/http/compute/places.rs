@@ -4,13 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::calibration::{Calibration, Work};
+use super::progress::Progress;
 use crate::store::Owner;
-
-/// Seconds that a flop takes until any was measured: 20 Gflop/s.
-const SECONDS_PER_FLOP: f64 = 5e-11;
-
-/// Requests below it say nothing about the speed of the machine.
-const LEAST_MEASURED_FLOPS: f64 = 1e8;
 
 /// A bounded number of places, of which several owners have at most half each.
 pub(super) struct Places {
@@ -24,15 +20,14 @@ struct State {
     admitted: HashMap<u64, Admitted>,
     by_owner: HashMap<Owner, usize>,
     n_admissions: u64,
-    /// Moving average over requests of size.
-    seconds_per_flop: f64,
+    calibration: Calibration,
 }
 
 struct Admitted {
     owner: Owner,
     since: Instant,
-    /// Known once it is planned.
-    flops: Option<f64>,
+    /// Known once it is planned, with the seconds that it was expected to take then.
+    work: Option<(Work, f64)>,
     /// When its turn came, after it was planned.
     begun: Option<Instant>,
 }
@@ -42,6 +37,8 @@ pub struct Admission {
     places: Arc<Places>,
     id: u64,
     pub owner: Owner,
+    /// Told how far the request is, if anybody looks.
+    pub(super) progress: Option<Arc<Progress>>,
 }
 
 impl Places {
@@ -51,7 +48,7 @@ impl Places {
             admitted: HashMap::new(),
             by_owner: HashMap::new(),
             n_admissions: 0,
-            seconds_per_flop: SECONDS_PER_FLOP,
+            calibration: Calibration::default(),
         };
         Arc::new(Self { n_places, share, deadline, state: Mutex::new(state) })
     }
@@ -63,8 +60,13 @@ impl Places {
         let id = state.n_admissions;
         state.n_admissions += 1;
         *state.by_owner.entry(owner).or_default() += 1;
-        state.admitted.insert(id, Admitted { owner, since: Instant::now(), flops: None, begun: None });
-        Ok(Admission { places: self.clone(), id, owner })
+        state.admitted.insert(id, Admitted { owner, since: Instant::now(), work: None, begun: None });
+        Ok(Admission { places: self.clone(), id, owner, progress: Progress::of_this_task() })
+    }
+
+    /// Places that are taken, of how many.
+    pub(super) fn load(&self) -> (usize, usize) {
+        (self.state().admitted.len(), self.n_places)
     }
 
     /// Whether there is a place for an owner; if not, in how many seconds.
@@ -96,7 +98,7 @@ impl Places {
         let meant =
             state.admitted.values().filter(|admitted| owner.is_none_or(|owner| admitted.owner == owner));
         let left = meant.filter_map(|admitted| {
-            let seconds = admitted.flops? * state.seconds_per_flop;
+            let (_, seconds) = admitted.work?;
             let until_deadline = (admitted.since + self.deadline).saturating_duration_since(now);
             let elapsed = now.saturating_duration_since(admitted.begun?).as_secs_f64();
             Some((seconds - elapsed).clamp(0.0, until_deadline.as_secs_f64()))
@@ -111,33 +113,60 @@ impl Places {
 }
 
 impl Admission {
-    /// Says what the request will cost in all.
-    pub fn set_flops(&self, flops: f64) {
+    /// Says what the request will cost in all; answers how many seconds that will take.
+    pub fn set_work(&self, work: Work) -> f64 {
+        let mut state = self.places.state();
+        let seconds = state.calibration.seconds(work);
+        if let Some(admitted) = state.admitted.get_mut(&self.id) {
+            admitted.work = Some((work, seconds));
+        }
+        if let Some(progress) = &self.progress {
+            progress.expect(seconds);
+        }
+        seconds
+    }
+
+    /// Whether it is a job: nobody waits for its answer.
+    pub fn is_job(&self) -> bool {
+        self.progress.is_some()
+    }
+
+    /// How many seconds work will take once its turn has come.
+    pub fn expected_seconds(&self, work: Work) -> f64 {
+        self.places.state().calibration.seconds(work)
+    }
+
+    /// What it takes says nothing about others.
+    pub fn forget_work(&self) {
         if let Some(admitted) = self.places.state().admitted.get_mut(&self.id) {
-            admitted.flops = Some(flops);
+            admitted.work = None;
         }
     }
 
     /// Its turn has come.
     pub(super) fn begin(&self) {
         if let Some(admitted) = self.places.state().admitted.get_mut(&self.id)
-            && admitted.flops.is_some()
+            && admitted.work.is_some()
         {
             admitted.begun.get_or_insert_with(Instant::now);
+        }
+        if let Some(progress) = &self.progress {
+            progress.begin();
         }
     }
 
     /// It was computed to its end: what it took says how fast the machine is.
     pub fn finish(&self) {
         let mut state = self.places.state();
-        let Some(Admitted { flops: Some(flops), begun: Some(begun), .. }) = state.admitted.get(&self.id)
-        else {
-            return;
-        };
-        if *flops >= LEAST_MEASURED_FLOPS {
-            let sample = begun.elapsed().as_secs_f64() / flops;
-            state.seconds_per_flop = 0.5 * state.seconds_per_flop + 0.5 * sample;
-        }
+        let admitted = state.admitted.get(&self.id);
+        let Some(Admitted { work: Some((work, _)), begun: Some(begun), .. }) = admitted else { return };
+        let (work, seconds) = (*work, begun.elapsed().as_secs_f64());
+        state.calibration.learn(work, seconds);
+    }
+
+    /// The same of work that was done at once, in the turn that planned it.
+    pub fn did_at_once(&self, work: Work, took: Duration) {
+        self.places.state().calibration.learn(work, took.as_secs_f64());
     }
 }
 
@@ -178,9 +207,10 @@ mod tests {
     #[test]
     fn a_place_is_free_when_the_first_of_those_who_began_has_ended() {
         let places = Places::new(3, 1, DEADLINE);
+        let work = |flops| Work { operation: "", is_cached: false, flops };
         let [long, short, _waiting] = [1e12, 4e11, 1e9].map(|flops| {
             let admission = places.take(A).ok().unwrap();
-            admission.set_flops(flops);
+            admission.set_work(work(flops));
             admission
         });
         long.begin();
@@ -191,7 +221,7 @@ mod tests {
         assert!(places.look(A).is_ok());
         assert_eq!(places.seconds_until_any_is_free(), 50);
         // None lasts beyond its deadline.
-        long.set_flops(1e15);
+        long.set_work(work(1e15));
         assert_eq!(places.seconds_until_any_is_free(), 100);
     }
 }

@@ -11,7 +11,7 @@ use tokio::sync::oneshot;
 use crate::store::Owner;
 
 /// Turns that are free, and who waits for one.
-pub(super) struct Turns {
+pub struct Turns {
     state: Mutex<State>,
 }
 
@@ -22,17 +22,17 @@ struct State {
 }
 
 /// A turn, handed on when dropped.
-pub(super) struct Turn {
+pub struct Turn {
     turns: Option<Arc<Turns>>,
 }
 
 impl Turns {
-    pub(super) fn new(n: usize) -> Arc<Self> {
+    pub fn new(n: usize) -> Arc<Self> {
         Arc::new(Self { state: Mutex::new(State { n_free: n, waiting: VecDeque::new() }) })
     }
 
     /// Waits for a turn.
-    pub(super) async fn take(self: &Arc<Self>, owner: Owner) -> Turn {
+    pub async fn take(self: &Arc<Self>, owner: Owner) -> Turn {
         let receiver = {
             let mut state = self.state();
             if state.n_free > 0 {
@@ -66,6 +66,14 @@ impl Turns {
         }
         state.n_free += 1;
         None
+    }
+
+    /// Turns that are taken, and who waits for one.
+    pub fn load(&self, n_turns: usize) -> (usize, usize) {
+        let state = self.state();
+        let is_here = |sender: &&oneshot::Sender<Turn>| !sender.is_closed();
+        let n_waiting = state.waiting.iter().flat_map(|(_, queue)| queue).filter(is_here).count();
+        (n_turns.saturating_sub(state.n_free), n_waiting)
     }
 
     #[expect(clippy::disallowed_methods, reason = "a queue, for as long as it takes to look at its ends")]

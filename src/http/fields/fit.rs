@@ -41,6 +41,11 @@ pub struct Geometry {
     pub surface: Option<SurfaceChoice>,
 }
 
+/// A request about a cloud.
+pub trait HasCloud {
+    fn cloud(&self) -> &CloudRef;
+}
+
 /// The fields of a request that determine its fit, taken out of it.
 #[derive(Debug, Default)]
 pub struct Fit {
@@ -94,6 +99,12 @@ macro_rules! request {
             #[schema(nullable = false)]
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
             $($(#[$field_meta])* pub $field: $type,)*
+        }
+
+        impl $crate::http::fields::HasCloud for $name {
+            fn cloud(&self) -> &$crate::http::fields::CloudRef {
+                &self.cloud
+            }
         }
 
         impl $name {

@@ -17,5 +17,5 @@ pub use diagnostics::{
     Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, Warning, WarningCode,
 };
 pub(crate) use fit::request;
-pub use fit::{Fit, Geometry};
+pub use fit::{Fit, Geometry, HasCloud};
 pub use kernel::{Kernel, KernelFamily, KernelUsed};

@@ -26,6 +26,25 @@ impl ToSchema for CloudIdSchema {
     }
 }
 
+/// The schema of the id of a job; requests are read as text, since what is no id is an unknown job.
+pub struct JobIdSchema;
+
+impl PartialSchema for JobIdSchema {
+    fn schema() -> RefOr<Schema> {
+        let text = "The id of a job: a UUID of version 7, in lower case.";
+        let schema = ObjectBuilder::new()
+            .schema_type(SchemaType::Type(Type::String))
+            .pattern(Some("^[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}$"));
+        schema.description(Some(text)).into()
+    }
+}
+
+impl ToSchema for JobIdSchema {
+    fn name() -> Cow<'static, str> {
+        "JobId".into()
+    }
+}
+
 /// The schema of the cursor of a page; requests are read as text, so that a refusal is a problem like any other.
 pub struct CursorSchema;
 

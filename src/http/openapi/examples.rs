@@ -20,10 +20,11 @@ macro_rules! example_file {
 
 /// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
 /// sends the ones and compares the others.
-pub const EXAMPLES: [(&str, &str); 23] = [
+pub const EXAMPLES: [(&str, &str); 24] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
     example_file!("list_clouds"),
+    example_file!("estimate"),
     example_file!("list_kernels"),
     example_file!("compute_interpolation"),
     example_file!("compute_interpolation_batch"),

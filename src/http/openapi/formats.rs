@@ -13,6 +13,7 @@ fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) 
         "assemble_surface_gradient_matrix" | "assemble_laplace_beltrami_matrix" => {
             (&[Format::Safetensors], &[Format::Safetensors, Format::Npy])
         }
+        "estimate" => (&[Format::Safetensors], &[]),
         _ => (&[Format::Safetensors], &[Format::Safetensors]),
     }
 }

@@ -8,7 +8,7 @@ use utoipa::openapi::{ObjectBuilder, Ref, RefOr};
 use super::{id_of, is_computed, operations};
 
 /// Name, example, description.
-const HEADERS: [(&str, &str, &str); 7] = [
+const HEADERS: [(&str, &str, &str); 8] = [
     (
         "X-Request-Id",
         "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c",
@@ -24,6 +24,12 @@ const HEADERS: [(&str, &str, &str); 7] = [
         "gramian; hit",
         "Whether the factorization was there: `gramian; hit`, `gramian; fwd=miss; stored`, `gramian; fwd=miss; collapsed` \
          (another request computed it), `gramian; fwd=miss`. With two factorizations a hit only if both were there.",
+    ),
+    (
+        "Gramian-Cloud",
+        "bd711900da5366ee5d24b56f902cd7e737e487987d5285c2791b2955e124c69c",
+        "The cloud that the answer is about. Send it with requests that name a cloud: a proxy in front of several servers finds \
+         the one by it that has its factorizations. It is repeated in every answer, refusals included.",
     ),
     ("Location", "/v1/clouds/…", "The path of the cloud."),
     ("ETag", "W/\"…\"", "The id of the cloud in quotes, weak; for If-None-Match."),
@@ -50,9 +56,10 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
 /// The headers that the operation has when it succeeds.
 fn own_names(operation: &Operation) -> Vec<&'static str> {
     match id_of(operation) {
-        "create_cloud" => vec!["Location"],
-        "get_cloud" | "check_cloud" => vec!["ETag"],
-        _ if is_computed(operation) => vec!["Server-Timing", "Cache-Status"],
+        "create_cloud" => vec!["Location", "Gramian-Cloud"],
+        "get_cloud" | "check_cloud" => vec!["ETag", "Gramian-Cloud"],
+        "get_job_result" => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
+        _ if is_computed(operation) => vec!["Server-Timing", "Cache-Status", "Gramian-Cloud"],
         _ => vec![],
     }
 }
@@ -62,7 +69,7 @@ fn names(status: &str, own: &[&'static str]) -> Vec<&'static str> {
     let by_status = match status {
         "200" | "201" | "304" => own,
         "401" => &["WWW-Authenticate"],
-        "503" => &["Retry-After"],
+        "429" | "503" => &["Retry-After"],
         _ => &[],
     };
     [&["X-Request-Id"], by_status].concat()

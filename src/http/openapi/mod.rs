@@ -27,7 +27,8 @@ use super::problem::ProblemDocument;
                        operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, \
                        lengths are in the client's unit, a null marks an entry without a meaningful value, and every error \
                        is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so \
-                       are computed answers in JSON if Accept-Encoding asks for it.",
+                       are computed answers in JSON if Accept-Encoding asks for it. Every request that computes is answered \
+                       202 at once, with a job and its Location, if it is sent with `Prefer: respond-async`.",
         contact(name = "The gramian developers"),
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
@@ -37,6 +38,7 @@ use super::problem::ProblemDocument;
         (name = "values", description = "Functions through values: interpolation, regression, Gaussian processes."),
         (name = "geometry", description = "Normals and curvatures of the surface that a cloud samples."),
         (name = "operators", description = "Surface gradient and Laplace–Beltrami, applied and as matrices."),
+        (name = "jobs", description = "Long work: what was asked with `Prefer: respond-async`, how far it is, and what came of it."),
         (name = "process", description = "Health, version and pages for people; no key needed."),
     ),
     components(schemas(ProblemDocument<'static>)),
@@ -106,5 +108,5 @@ fn id_of(operation: &Operation) -> &str {
 
 /// Whether its answers come from a factorization: every operation with a body but the registration of clouds.
 fn is_computed(operation: &Operation) -> bool {
-    operation.request_body.is_some() && id_of(operation) != "create_cloud"
+    operation.request_body.is_some() && !matches!(id_of(operation), "create_cloud" | "estimate")
 }

@@ -28,7 +28,7 @@ macro_rules! problem_set {
 problem_set! {
     /// Operations that compute.
     ComputeProblems:
-    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
     ProblemTooLarge,
     UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch, LengthMismatch,
     KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, UnsupportedBySolver, Internal, Overloaded,
@@ -38,29 +38,48 @@ problem_set! {
 problem_set! {
     /// The registration of a cloud.
     RegisterProblems:
-    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
     UnsupportedMediaType,
     InvalidRequest, InvalidCloud, DimensionMismatch, LengthMismatch, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// The description of one cloud. What is not UTF-8 in the path is no path.
-    DescribeProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+    DescribeProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only look a cloud up, and answer without a body.
-    LookUpProblems: MalformedRequest, Unauthorized, UnknownCloud, NotFound, Internal, Overloaded
+    LookUpProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, Internal, Overloaded
+}
+
+problem_set! {
+    /// A look at one job.
+    JobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
+}
+
+problem_set! {
+    /// Operations on one job that need not agree on a media type.
+    AnyJobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, Internal, Overloaded
+}
+
+problem_set! {
+    /// The result of a job, which is what its request is answered with.
+    JobResultProblems:
+    MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, UnknownJob, NotFound, NotAcceptable,
+    BodyTooLarge, ProblemTooLarge, UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch,
+    LengthMismatch, KernelNotSmooth, KernelNotPositiveDefinite, NotPositiveDefinite, UnsupportedBySolver, Internal, Overloaded,
+    DeadlineExceeded
 }
 
 problem_set! {
     /// The list of clouds.
-    ListProblems: MalformedRequest, Unauthorized, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
+    ListProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
     /// Operations that only read what is built in.
-    ReadProblems: MalformedRequest, Unauthorized, NotAcceptable, Internal, Overloaded
+    ReadProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, Internal, Overloaded
 }
 
 problem_set! {

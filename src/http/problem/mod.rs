@@ -154,6 +154,14 @@ impl Problem {
         problem
     }
 
+    /// 429 beyond a limit of the key.
+    pub fn rate_limited(limit: &str, retry_after_seconds: u64) -> Self {
+        let detail = format!("this key may make {limit}; try again in {retry_after_seconds} s");
+        let mut problem = Self::new(Slug::RateLimited, detail);
+        problem.members.retry_after_seconds = Some(retry_after_seconds);
+        problem
+    }
+
     /// 503 for another reason than a full queue.
     pub fn unavailable(reason: &str, retry_after_seconds: u64) -> Self {
         let detail = format!("{reason}; try again in {retry_after_seconds} s");

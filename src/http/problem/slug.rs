@@ -18,6 +18,7 @@ pub enum Slug {
     NotPositiveDefinite,
     UnsupportedBySolver,
     UnknownCloud,
+    UnknownJob,
     NotFound,
     MethodNotAllowed,
     NotAcceptable,
@@ -26,6 +27,7 @@ pub enum Slug {
     BodyTooLarge,
     ProblemTooLarge,
     Unauthorized,
+    RateLimited,
     Overloaded,
     DeadlineExceeded,
     Internal,
@@ -42,7 +44,7 @@ struct Entry {
 }
 
 impl Slug {
-    pub const ALL: [Slug; 24] = [
+    pub const ALL: [Slug; 26] = [
         Self::MalformedRequest,
         Self::MalformedJson,
         Self::MalformedBody,
@@ -56,6 +58,7 @@ impl Slug {
         Self::NotPositiveDefinite,
         Self::UnsupportedBySolver,
         Self::UnknownCloud,
+        Self::UnknownJob,
         Self::NotFound,
         Self::MethodNotAllowed,
         Self::NotAcceptable,
@@ -64,6 +67,7 @@ impl Slug {
         Self::BodyTooLarge,
         Self::ProblemTooLarge,
         Self::Unauthorized,
+        Self::RateLimited,
         Self::Overloaded,
         Self::DeadlineExceeded,
         Self::Internal,
@@ -184,6 +188,13 @@ impl Slug {
                 explanation: "The cloud was never posted with this key, was deleted, or was dropped as the least recently used. Post its \
                  points again: the id stays the same.",
             },
+            Self::UnknownJob => Entry {
+                name: "unknown-job",
+                status: StatusCode::NOT_FOUND,
+                title: "No such job",
+                explanation: "The job was never asked for with this key, was deleted, or its result was kept as long as \
+                 GRAMIAN_JOB_RESULT_SECONDS says. Ask again.",
+            },
             Self::NotFound => Entry {
                 name: "not-found",
                 status: StatusCode::NOT_FOUND,
@@ -239,6 +250,13 @@ impl Slug {
                 status: StatusCode::UNAUTHORIZED,
                 title: "No valid API key",
                 explanation: "Send Authorization: Bearer <key> with one of the configured keys.",
+            },
+            Self::RateLimited => Entry {
+                name: "rate-limited",
+                status: StatusCode::TOO_MANY_REQUESTS,
+                title: "Too many requests with this key",
+                explanation: "The key may make so many requests a minute, or have so many under way, as the detail says. Try again after the \
+                 seconds in Retry-After.",
             },
             Self::Overloaded => Entry {
                 name: "overloaded",

@@ -1,8 +1,9 @@
 //! `/v1/clouds`: registered clouds, named by their content.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use axum::Extension;
 use axum::extract::{Path, RawQuery, Request, State};
@@ -11,11 +12,13 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::http::compute::{Admission, JobObserver};
+use crate::http::around::middleware::CLOUD_HEADER;
+use crate::http::compute::{Admission, JobObserver, Work};
 use crate::http::fields::schemas::{CloudIdSchema, CursorSchema};
 use crate::http::openapi::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
+use crate::http::serve::durable::{find_cloud, forget_cloud, keep, list_clouds as list_of, unavailable};
 use crate::http::serve::intake::read_body;
 use crate::http::serve::planner::{Planner, unknown_cloud};
 use crate::http::serve::sampling::find_sampling;
@@ -27,6 +30,8 @@ use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
+use crate::store::objects::Listed;
+use crate::store::objects::cloud_object::CloudHead;
 
 /// Clouds in a page when the client names no number.
 const DEFAULT_PAGE: usize = 50;
@@ -101,9 +106,29 @@ impl From<&RegisteredCloud> for Cloud {
             bounding_box: BoundingBox { min, max },
             spacing: nearest.map(|NearestRange { min, median, max }| Spacing { min, median, max }),
             n_duplicates: stored.n_duplicates,
-            created_at: humantime::format_rfc3339_millis(stored.created_at).to_string(),
+            created_at: written(stored.created_at()),
         }
     }
+}
+
+impl Cloud {
+    /// As its head in the store has it.
+    fn of_head(id: CloudId, head: CloudHead) -> Self {
+        let (min, max) = head.bounding_box;
+        Self {
+            cloud_id: id.to_string(),
+            n_points: head.n_points,
+            dimension: head.dimension,
+            bounding_box: BoundingBox { min, max },
+            spacing: None,
+            n_duplicates: head.n_duplicates,
+            created_at: written(head.created_at),
+        }
+    }
+}
+
+fn written(time: SystemTime) -> String {
+    humantime::format_rfc3339_millis(time).to_string()
 }
 
 /// A page of clouds, oldest first.
@@ -146,7 +171,7 @@ pub async fn create_cloud(
     let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
     let job = move |observer: &JobObserver| {
         let (request, mut memory) = intake.parse::<CloudRequest>(&shared, observer)?;
-        let planner = Planner { app: &shared, owner };
+        let planner = Planner::new(&shared, owner);
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
         // With what looking at its neighbours takes.
         memory.shrink_to(
@@ -157,10 +182,13 @@ pub async fn create_cloud(
         Ok::<_, Problem>((stored, is_new, memory))
     };
     let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;
+    // Memory may have let go of what the store has.
+    let is_new = keep(&app, owner, &stored).await && is_new;
     let cloud = describe(&app, &admission, &stored).await?;
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
-    Ok((status, [(header::LOCATION, location)], axum::Json(cloud)).into_response())
+    let named = [(header::LOCATION, location), (CLOUD_HEADER, cloud.cloud_id.clone())];
+    Ok((status, named, axum::Json(cloud)).into_response())
 }
 
 /// Describe a cloud
@@ -186,12 +214,12 @@ pub async fn get_cloud(
     Path(cloud_id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let stored = find(&app, owner, &cloud_id)?;
+    let admission = app.compute.admit(owner)?;
+    let stored = find(&app, &admission, &cloud_id).await?;
     let etag = etag_of(&stored);
     if is_known(&headers, &etag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
-    let admission = app.compute.admit(owner)?;
     let cloud = describe(&app, &admission, &stored).await?;
     Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
 }
@@ -203,7 +231,8 @@ async fn describe(
     stored: &RegisteredCloud,
 ) -> Result<Cloud, Problem> {
     let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
-    admission.set_flops(sampling_flops(n, d));
+    let work = Work { operation: "describe_cloud", is_cached: false, flops: sampling_flops(n, d) };
+    admission.set_work(work);
     find_sampling(app, admission, stored).await?;
     admission.finish();
     Ok(Cloud::from(stored))
@@ -227,7 +256,8 @@ pub async fn check_cloud(
     Path(cloud_id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let etag = etag_of(find(&app, owner, &cloud_id)?.as_ref());
+    let admission = app.compute.admit(owner)?;
+    let etag = etag_of(find(&app, &admission, &cloud_id).await?.as_ref());
     let status = if is_known(&headers, &etag) { StatusCode::NOT_MODIFIED } else { StatusCode::OK };
     let json = HeaderValue::from_static("application/json");
     let mut response = (status, [(header::ETAG, etag)]).into_response();
@@ -253,12 +283,10 @@ pub async fn delete_cloud(
     Path(cloud_id): Path<String>,
 ) -> Result<StatusCode, Problem> {
     let id = CloudId::parse(&cloud_id).ok_or_else(|| unknown_cloud(&cloud_id))?;
-    if !app.clouds.remove(owner, id) {
-        return Err(unknown_cloud(&cloud_id));
+    match forget_cloud(&app, owner, id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(unknown_cloud(&cloud_id)),
     }
-    app.prepared.forget_cloud(owner, id);
-    app.learned.forget_cloud(owner, id);
-    Ok(StatusCode::NO_CONTENT)
 }
 
 /// List clouds
@@ -283,20 +311,23 @@ pub async fn list_clouds(
 ) -> Result<axum::Json<CloudList>, Problem> {
     let page = Page::parse(query.as_deref().unwrap_or(""))?;
     let admission = app.compute.admit(owner)?;
-    let shared = app.clone();
-    // Nothing is computed: it only takes longer than an async worker may be held.
-    let job = move |_: &_| {
-        let clouds = shared.clouds.list(owner);
-        let start = match page.after {
-            None => 0,
-            Some(last) => clouds.partition_point(|stored| Cursor::of(stored) <= last),
-        };
-        let shown = &clouds[start..clouds.len().min(start.saturating_add(page.limit))];
-        let is_last = start + shown.len() == clouds.len();
-        let next = shown.last().filter(|_| !is_last).map(|stored| Cursor::of(stored).to_string());
-        CloudList { clouds: shown.iter().map(|stored| Cloud::from(stored.as_ref())).collect(), next }
+    let (shown, is_last) = list_of(&app, &admission, page.after.map(|cursor| cursor.0), page.limit).await?;
+    let next = shown.last().filter(|_| !is_last).map(|(listed, _)| Cursor(*listed).to_string());
+    let elsewhere =
+        shown.iter().filter(|(_, stored)| stored.is_none()).map(|(listed, _)| listed.id).collect();
+    let mut heads = heads(&app, owner, elsewhere).await?;
+    let describe = |(listed, stored): (Listed, Option<Arc<RegisteredCloud>>)| match stored {
+        Some(stored) => Some(Cloud::from(stored.as_ref())),
+        // Those that were deleted meanwhile have none.
+        None => heads.remove(&listed.id).map(|head| Cloud::of_head(listed.id, head)),
     };
-    Ok(axum::Json(app.compute.run(&admission, 0.0, job).await?.0))
+    Ok(axum::Json(CloudList { clouds: shown.into_iter().filter_map(describe).collect(), next }))
+}
+
+async fn heads(app: &App, owner: Owner, ids: Vec<CloudId>) -> Result<HashMap<CloudId, CloudHead>, Problem> {
+    let Some(durable) = app.durable.as_ref().filter(|_| !ids.is_empty()) else { return Ok(HashMap::new()) };
+    let found = durable.objects.heads(&app.keys.name_of(owner), ids).await;
+    Ok(found.map_err(|error| unavailable(&error))?.into_iter().collect())
 }
 
 struct Page {
@@ -305,31 +336,26 @@ struct Page {
 }
 
 /// The place of the last cloud of a page in the order of the list: it holds when that cloud is gone. Opaque to clients.
-#[derive(PartialEq, PartialOrd)]
-struct Cursor {
-    nanoseconds: u128,
-    id: CloudId,
-}
+struct Cursor(Listed);
 
 impl Cursor {
-    fn of(stored: &RegisteredCloud) -> Self {
-        let since_epoch = stored.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        Self { nanoseconds: since_epoch.as_nanos(), id: stored.id }
-    }
-
     /// As the pattern of the document: from_str_radix alone takes a sign, capitals and any number of zeros too.
     fn parse(text: &str) -> Option<Self> {
         let (nanoseconds, id) = text.split_once('-')?;
         let is_plain =
             nanoseconds.len() <= 32 && nanoseconds.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f'));
         let nanoseconds = u128::from_str_radix(nanoseconds, 16).ok().filter(|_| is_plain)?;
-        Some(Self { nanoseconds, id: CloudId::parse(id)? })
+        // Behind all of them, where nothing is.
+        let nanoseconds = u64::try_from(nanoseconds).unwrap_or(u64::MAX);
+        let created_at = SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
+        Some(Self(Listed { created_at, id: CloudId::parse(id)? }))
     }
 }
 
 impl fmt::Display for Cursor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:x}-{}", self.nanoseconds, self.id)
+        let since_epoch = self.0.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        write!(f, "{:x}-{}", since_epoch.as_nanos(), self.0.id)
     }
 }
 
@@ -365,9 +391,14 @@ fn etag_of(stored: &RegisteredCloud) -> String {
     format!("W/\"{}\"", stored.id)
 }
 
-fn find(app: &App, owner: Owner, cloud_id: &str) -> Result<Arc<RegisteredCloud>, Problem> {
-    let found = CloudId::parse(cloud_id).and_then(|id| app.clouds.get(owner, id));
-    found.ok_or_else(|| unknown_cloud(cloud_id))
+async fn find(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    cloud_id: &str,
+) -> Result<Arc<RegisteredCloud>, Problem> {
+    let unknown = || unknown_cloud(cloud_id);
+    let id = CloudId::parse(cloud_id).ok_or_else(unknown)?;
+    find_cloud(app, admission, id).await?.ok_or_else(unknown)
 }
 
 /// RFC 9110, section 13.1.2: a list of tags, weak or strong, or `*`.

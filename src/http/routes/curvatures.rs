@@ -116,6 +116,7 @@ pub async fn compute_curvatures(
 }
 
 impl Operation for CurvaturesRequest {
+    const NAME: &'static str = "compute_curvatures";
     type Work = GeometryWork;
     type Answer = CurvaturesResponse;
     const HAS_SURFACE: bool = true;

@@ -13,7 +13,9 @@ use super::surfaces::{
     Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
 };
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{
+    CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
+};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -160,9 +162,14 @@ pub async fn assemble_laplace_beltrami_matrix(
 }
 
 impl Operation for LaplaceBeltramiRequest {
+    const NAME: &'static str = "compute_laplace_beltrami";
     type Work = AppliedWork;
     type Answer = LaplaceBeltramiResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = Arc::new(std::mem::take(&mut self.values));
@@ -213,9 +220,14 @@ impl Operation for LaplaceBeltramiRequest {
 }
 
 impl Operation for LaplaceBeltramiMatrixRequest {
+    const NAME: &'static str = "assemble_laplace_beltrami_matrix";
     type Work = MatrixWork;
     type Answer = LaplaceBeltramiMatrixResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -307,9 +319,14 @@ pub async fn assemble_laplace_beltrami_sparse_matrix(
 }
 
 impl Operation for LaplaceBeltramiSparseMatrixRequest {
+    const NAME: &'static str = "assemble_laplace_beltrami_sparse_matrix";
     type Work = StencilWork;
     type Answer = LaplaceBeltramiSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();

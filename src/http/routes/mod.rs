@@ -3,7 +3,9 @@
 pub mod clouds;
 pub mod curvatures;
 mod doubts;
+pub mod estimate;
 pub mod interpolation;
+pub mod jobs;
 pub mod kernels;
 pub mod laplace_beltrami;
 pub mod model_selection;

@@ -217,6 +217,7 @@ const MAX_PATH_POINTS: usize = 3000;
 const MAX_POINTS: usize = 5000;
 
 impl Operation for ModelSelectionRequest {
+    const NAME: &'static str = "select_model";
     type Work = Work;
     type Answer = ModelSelectionResponse;
     const HAS_SURFACE: bool = false;

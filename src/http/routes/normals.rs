@@ -94,6 +94,7 @@ pub async fn compute_normals(
 }
 
 impl Operation for NormalsRequest {
+    const NAME: &'static str = "compute_normals";
     type Work = GeometryWork;
     type Answer = NormalsResponse;
     const HAS_SURFACE: bool = true;

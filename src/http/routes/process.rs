@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::http::metrics;
 use crate::http::openapi::responses::{ProbeProblems, ReadyProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -51,7 +54,8 @@ pub async fn check_live() -> Json<Health> {
 
 /// Check that the process takes requests
 ///
-/// 503 while its queue is full, while it shuts down, and if its compute threads do not move.
+/// 503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the store is required, while that
+/// does not take what it is given.
 #[utoipa::path(
     get,
     path = "/health/ready",
@@ -64,8 +68,31 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
     if app.draining.is_cancelled() {
         return Err(Problem::overloaded(1));
     }
+    if app.config.store_required && app.durable.as_ref().is_some_and(|durable| !durable.is_up_to_date()) {
+        return Err(Problem::unavailable("the store does not take what it is given", 5));
+    }
     app.compute.check_ready().await?;
     Ok(Json(Health { status: "ok" }))
+}
+
+/// Read the metrics
+///
+/// Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route and status, the queue, memory,
+/// caches, solvers, refusals, the store and the process. No label takes what clients send.
+#[utoipa::path(
+    get,
+    path = "/metrics",
+    operation_id = "get_metrics",
+    tag = "process",
+    responses((status = 200, description = "The metrics", body = String, content_type = "text/plain"), ProbeProblems),
+    security(())
+)]
+pub async fn get_metrics(State(app): State<Arc<App>>) -> Result<Response, Problem> {
+    let text = app.metrics.text(&app).map_err(|error| {
+        tracing::error!(%error, "metrics cannot be written");
+        Problem::internal()
+    })?;
+    Ok(([(header::CONTENT_TYPE, metrics::CONTENT_TYPE)], text).into_response())
 }
 
 /// Describe the build

@@ -11,7 +11,9 @@ use super::surfaces::{
     Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
 };
 use crate::http::compute::JobObserver;
-use crate::http::fields::{Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request};
+use crate::http::fields::{
+    CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
+};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
@@ -145,9 +147,14 @@ pub async fn assemble_surface_gradient_matrix(
 }
 
 impl Operation for SurfaceGradientRequest {
+    const NAME: &'static str = "compute_surface_gradient";
     type Work = AppliedWork;
     type Answer = SurfaceGradientResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
         let values = Arc::new(std::mem::take(&mut self.values));
@@ -201,9 +208,14 @@ impl Operation for SurfaceGradientRequest {
 }
 
 impl Operation for SurfaceGradientMatrixRequest {
+    const NAME: &'static str = "assemble_surface_gradient_matrix";
     type Work = MatrixWork;
     type Answer = SurfaceGradientMatrixResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
     const FORMATS: &[Format] = &[Format::Json, Format::Safetensors, Format::Npy];
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
@@ -294,9 +306,14 @@ pub async fn assemble_surface_gradient_sparse_matrix(
 }
 
 impl Operation for SurfaceGradientSparseMatrixRequest {
+    const NAME: &'static str = "assemble_surface_gradient_sparse_matrix";
     type Work = StencilWork;
     type Answer = SurfaceGradientSparseMatrixResponse;
     const HAS_SURFACE: bool = true;
+
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        self.geometry.as_ref()?.cloud.as_ref()
+    }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = self.take_fit();

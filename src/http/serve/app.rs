@@ -5,10 +5,13 @@ use std::sync::atomic::AtomicUsize;
 
 use tokio_util::sync::CancellationToken;
 
-use super::keys::Keys;
+use super::durable::Durable;
 use super::plan::FitFailure;
 use crate::config::Config;
+use crate::http::access::Keys;
 use crate::http::compute::Compute;
+use crate::http::jobs::Jobs;
+use crate::http::metrics::Metrics;
 use crate::http::problem::Problem;
 use crate::memory::Memory;
 use crate::store::budget::Budget;
@@ -16,14 +19,31 @@ use crate::store::clouds::CloudStore;
 use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
 
+/// Why the service does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    #[error("the store (GRAMIAN_STORE) {0}")]
+    Store(String),
+    #[error("the keys (GRAMIAN_KEYS_FILE): {0}")]
+    Keys(String),
+    #[error("the metrics cannot be named: {0}")]
+    Metrics(#[from] prometheus::Error),
+    #[error("the threads cannot be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
 /// Configuration, stores and compute pool.
 pub struct App {
     pub config: Config,
     pub memory: Memory,
-    pub keys: Keys,
+    pub keys: Arc<Keys>,
+    pub metrics: Metrics,
     /// The memory of bodies that are read, unpacked and parsed, and of requests that wait.
     pub intake: Budget,
     pub clouds: CloudStore<Problem>,
+    /// Where clouds outlive the process, if they do.
+    pub durable: Option<Durable>,
+    pub jobs: Jobs,
     pub prepared: PreparedStore<FitFailure>,
     pub learned: LearnedStore<Problem>,
     pub compute: Arc<Compute>,
@@ -34,28 +54,32 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the compute threads and empty stores.
+    /// Opens the store, and starts the compute threads with empty caches.
     ///
     /// # Errors
-    /// If the operating system refuses the threads.
-    pub fn new(config: Config) -> Result<Arc<Self>, rayon::ThreadPoolBuildError> {
-        let (memory, keys) = (Memory::of(&config), Keys::new(&config.api_keys));
-        let n_owners = keys.n_owners();
+    /// If the store does not work, or the operating system refuses the threads.
+    pub async fn new(config: Config) -> Result<Arc<Self>, StartError> {
+        let durable = match &config.store {
+            None => None,
+            Some(place) => Some(Durable::open(place).await.map_err(StartError::Store)?),
+        };
+        let keys = Keys::new(&config).map_err(StartError::Keys)?;
+        let (memory, n_owners) = (Memory::of(&config), config.n_owners());
         let of_prepared =
             PreparedBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
+        let in_store = durable.as_ref().map(|durable| durable.objects.clone());
+        let (n_threads, max_queue) = (config.n_threads(), config.max_queue);
         Ok(Arc::new(Self {
+            jobs: Jobs::new(in_store, memory.jobs, n_owners, n_threads, max_queue),
             intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
+            durable,
             prepared: PreparedStore::new(of_prepared),
             learned: LearnedStore::default(),
-            compute: Arc::new(Compute::new(
-                config.n_threads(),
-                config.max_queue,
-                n_owners,
-                config.deadline(),
-            )?),
+            compute: Arc::new(Compute::new(n_threads, max_queue, n_owners, config.deadline())?),
             memory,
-            keys,
+            keys: Arc::new(keys),
+            metrics: Metrics::new()?,
             n_requests: AtomicUsize::new(0),
             draining: CancellationToken::new(),
             config,

@@ -2,11 +2,12 @@
 
 use std::sync::{Arc, OnceLock};
 
+use super::factors;
 use super::fitted::{Fits, Fitted};
 use super::plan::{Cost, FitFailure, FitModel, FitPlan};
 use super::report::Report;
 use super::sampling::find_sampling;
-use crate::http::compute::{Admission, JobObserver, StageTimes};
+use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
@@ -165,13 +166,19 @@ impl Fitting<'_> {
         counted
     }
 
-    /// Flops of what a request will compute by itself, as far as can be seen beforehand.
-    pub fn expected_flops(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> f64 {
-        let missing = |(missing, choice, _): (Missing, Choice, Extent)| {
-            let solver = if missing.solver { choice.expected.flops } else { 0.0 };
-            solver + if missing.surface { choice.surface.flops } else { 0.0 }
-        };
-        cost.work.flops + self.missing(&Wanted::of(main, surface, cost)).map(missing).sum::<f64>()
+    /// What a request will compute and take by itself, as far as can be seen beforehand.
+    pub fn outlook(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> Outlook {
+        let wanted = Wanted::of(main, surface, cost);
+        let mut outlook = Outlook { flops: cost.work.flops, n_bytes: n_bytes_of_work(cost), is_cached: true };
+        for (missing, choice, _) in self.missing(&wanted) {
+            let parts = [(missing.solver, choice.expected), (missing.surface, choice.surface)];
+            for (_, price) in parts.into_iter().filter(|(is_missing, _)| *is_missing) {
+                outlook.flops += price.flops;
+                outlook.n_bytes = outlook.n_bytes.saturating_add(price.n_bytes);
+                outlook.is_cached = false;
+            }
+        }
+        outlook
     }
 
     /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
@@ -186,6 +193,14 @@ impl Fitting<'_> {
             |memory: Reservation| prepare(self.app.clone(), self.admission.clone(), plan.clone(), memory);
         match self.app.prepared.get_or_prepare(plan.key, memory, begin).await {
             Ok(Some((stored, outcome))) => {
+                if matches!(outcome, CacheOutcome::Stored | CacheOutcome::NotStored) {
+                    self.app.metrics.prepared(stored.kind());
+                    factors::keep(self.app, plan, &stored);
+                    if stored.is_restored() {
+                        // How long that took says nothing of how long it takes to make one.
+                        self.admission.forget_work();
+                    }
+                }
                 report.found(&stored, outcome);
                 Ok(Some(Fitted { plan: plan.clone(), stored }))
             }
@@ -235,6 +250,23 @@ impl<'a> Wanted<'a> {
     }
 }
 
+/// What lies before a request.
+#[derive(Debug, Clone, Copy)]
+pub struct Outlook {
+    pub flops: f64,
+    /// Of memory that is not held yet.
+    pub n_bytes: usize,
+    /// Nothing is missing.
+    pub is_cached: bool,
+}
+
+impl Outlook {
+    /// As work of an operation.
+    pub fn as_work(self, operation: &'static str) -> Work {
+        Work { operation, is_cached: self.is_cached, flops: self.flops }
+    }
+}
+
 /// How much memory a solver is given.
 #[derive(Clone, Copy)]
 enum Extent {
@@ -268,6 +300,12 @@ async fn prepare(
         FitModel::Local(_) => return Ok(PreparedFit::local(memory)),
     };
     let flops = plan.choice(app.prepared.memory()).at_most.flops;
+    let system = System::new(plan.fitted.clone(), kernel.clone(), regularization.clone());
+    if let Ok(system) = &system
+        && let Some(solver) = factors::restore(&app, &admission, &plan, system).await
+    {
+        return Ok(PreparedFit::restored(solver, memory));
+    }
     let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {
         let (n_taken, mut is_short) = (memory.n_bytes(), false);
@@ -277,7 +315,6 @@ async fn prepare(
             !is_short
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let system = System::new(plan.fitted, kernel, regularization);
         let solver = system.and_then(|system| Solver::dense_in(workspace, system, observer));
         match solver {
             // The memory goes with the job: it may run on for a moment when nobody waits any more.

@@ -12,7 +12,7 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, announced};
-use crate::http::wire::read::body::RequestBody;
+use crate::http::wire::read::body::{RequestBody, UnpackedBody};
 use crate::http::wire::read::limits::{ParseContext, SMALLER_BODY};
 use crate::numerics::observer::Observer;
 use crate::store::Owner;
@@ -42,12 +42,21 @@ impl Intake {
     /// where it cannot wait for it.
     ///
     /// # Errors
-    /// Those of [`RequestBody::parse`], 503 if there is no memory for what it is unpacked to.
+    /// Those of [`Intake::unpack`] and [`UnpackedBody::parse`].
     pub fn parse<T: DeserializeOwned>(
         self,
         app: &App,
         observer: &dyn Observer,
     ) -> Result<(T, Reservation), Problem> {
+        let (body, memory) = self.unpack(app, observer)?;
+        Ok((body.parse(&ParseContext::new(&app.config, observer))?, memory))
+    }
+
+    /// Unpacks it, likewise.
+    ///
+    /// # Errors
+    /// Those of [`RequestBody::unpack`], 503 if there is no memory for what it is unpacked to.
+    pub fn unpack(self, app: &App, observer: &dyn Observer) -> Result<(UnpackedBody, Reservation), Problem> {
         let Self { body, mut memory } = self;
         let (n_packed, parsing) = (body.n_bytes(), body.parsing());
         let make_room = |n_bytes_plain: usize| {
@@ -55,8 +64,8 @@ impl Intake {
             let n_more = n_bytes.saturating_sub(memory.n_bytes());
             if n_more == 0 || memory.try_grow(n_more) { Ok(()) } else { Err(app.compute.out_of_memory()) }
         };
-        let request = body.parse(&ParseContext::new(&app.config, observer), make_room)?;
-        Ok((request, memory))
+        let unpacked = body.unpack(&ParseContext::new(&app.config, observer), make_room)?;
+        Ok((unpacked, memory))
     }
 }
 
@@ -73,6 +82,26 @@ pub async fn read_body(
     formats: &[Format],
 ) -> Result<Intake, Problem> {
     let (format, coding) = announced(headers, formats)?;
+    let (bytes, mut memory) = read_bytes(app, owner, headers, body).await?;
+    let body = RequestBody::new(format, coding, bytes, app.memory.body);
+    // All that parsing takes is taken before it begins, as far as can be seen.
+    let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &app.config);
+    if !app.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
+        return Err(app.compute.out_of_memory());
+    }
+    Ok(Intake { body, memory })
+}
+
+/// Reads a body whatever is in it.
+///
+/// # Errors
+/// Those of [`read_body`] but 415.
+pub async fn read_bytes(
+    app: &App,
+    owner: Owner,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<(Vec<u8>, Reservation), Problem> {
     let limit = app.memory.body;
     let length = announced_length(headers);
     if let Some(required) = length.filter(|&length| length > limit) {
@@ -99,14 +128,8 @@ pub async fn read_body(
         reader.make_room(data.len()).await?;
         reader.bytes.extend_from_slice(&data);
     }
-    let Reader { mut memory, bytes, .. } = reader;
-    let body = RequestBody::new(format, coding, bytes, limit);
-    // All that parsing takes is taken before it begins, as far as can be seen.
-    let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &app.config);
-    if !app.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
-        return Err(app.compute.out_of_memory());
-    }
-    Ok(Intake { body, memory })
+    let Reader { memory, bytes, .. } = reader;
+    Ok((bytes, memory))
 }
 
 fn announced_length(headers: &HeaderMap) -> Option<usize> {

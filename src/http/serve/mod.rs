@@ -1,7 +1,8 @@
 //! How requests are served: what they share, and the way of each from its body to its answer.
 
 pub mod app;
-pub mod keys;
+pub mod durable;
+pub mod factors;
 
 pub mod operation;
 

@@ -8,24 +8,35 @@ use axum::extract::Request;
 use axum::response::Response;
 use serde::de::DeserializeOwned;
 
+use super::durable::{TRUST, find_cloud, keep_all};
 use super::fitted::Fits;
-use super::fitting::Fitting;
+use super::fitting::{Fitting, Outlook};
 use super::intake::{Intake, read_body};
 use super::plan::{Cost, FitPlan, PlannedFit};
 use super::planner::Planner;
 use super::report::Report;
 use super::sampling::find_lacking;
-use crate::http::compute::{Admission, JobObserver, is_light};
+use crate::config::Config;
+use crate::http::compute::{Admission, JobObserver, Work, is_light};
+use crate::http::fields::{CloudRef, HasCloud};
 use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
+use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
+use crate::numerics::solver::kind::SolverKind;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
+use crate::store::clouds::RegisteredCloud;
+use crate::store::key::CloudId;
 
 /// A request that needs a factorization.
-pub trait Operation: DeserializeOwned + Send + 'static {
+pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {
+    /// Its name in the document.
+    const NAME: &'static str;
+
     /// What is left of the request once it is checked.
     type Work: Send + 'static;
     type Answer: Answer;
@@ -35,6 +46,11 @@ pub trait Operation: DeserializeOwned + Send + 'static {
 
     /// Whether it asks about a surface: that of the plan's surface, or of its main fit.
     const HAS_SURFACE: bool;
+
+    /// The cloud of the surface, where it may be another one.
+    fn surface_cloud(&self) -> Option<&CloudRef> {
+        None
+    }
 
     /// Checks everything that can be checked without computing, the cost included.
     ///
@@ -70,6 +86,8 @@ pub struct Resolved<W> {
     pub cost: Cost,
     /// The memory of the request, for as long as it is held.
     intake: Reservation,
+    /// Clouds that came with the request, and are in memory alone.
+    fresh: Vec<Arc<RegisteredCloud>>,
 }
 
 /// Serves one request.
@@ -83,19 +101,94 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let admission = app.compute.admit(owner)?;
 
     let began = Instant::now();
-    let plan = match prepare::<O>(&app, &admission, intake, wanted, began).await? {
-        Prepared::Answered(answered) => return Ok(answered.respond(&app, &admission)),
+    let parsed = |intake: Intake, app: &App, observer: &JobObserver| intake.parse::<O>(app, observer);
+    let plan = match prepare::<O>(&app, &admission, intake, parsed, Some(wanted), began).await? {
+        Prepared::Answered(answered, fresh) => {
+            keep_all(&app, owner, &fresh).await;
+            return Ok(answered.respond(&app, &admission));
+        }
         Prepared::Ready(plan) => plan,
     };
-    let mut report = Report::parsed_in(began.elapsed());
+    let fresh = plan.fresh.clone();
+    let answering = compute::<O>(&app, &admission, plan, wanted, began);
+    // The store takes what it is given while the answer is computed.
+    let (answered, ()) = futures_util::future::join(answering, keep_all(&app, owner, &fresh)).await;
+    Ok(answered?.respond(&app, &admission))
+}
 
-    let fitting = Fitting { app: &app, admission: &admission, has_surface: O::HAS_SURFACE };
-    admission.set_flops(fitting.expected_flops(&plan.main, plan.surface.as_ref(), plan.cost));
+/// Factorizes or finds, computes and encodes.
+async fn compute<O: Operation>(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    plan: Box<Resolved<O::Work>>,
+    wanted: Wanted,
+    began: Instant,
+) -> Result<Answered, Problem> {
+    let mut report = Report::parsed_in(began.elapsed(), plan.main.stored.id);
+
+    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
+    within_deadline(app, admission, admission.set_work(outlook.as_work(O::NAME)))?;
     let (fits, memory) = fitting.fits(&plan.main, plan.surface.as_ref(), plan.cost, &mut report).await?;
     let flops = plan.cost.work.flops;
     let job = move |observer: &JobObserver| answer::<O>(*plan, &fits, memory, report, wanted, observer);
-    let answered = app.compute.run(&admission, flops, job).await?.0?;
-    Ok(answered.respond(&app, &admission))
+    app.compute.run(admission, flops, job).await?.0
+}
+
+/// Work that will not be done in time is not begun. Estimates are within a factor of two in the median, and further off where nothing like
+/// it ran yet.
+const DOUBT: f64 = 4.0;
+
+fn within_deadline(app: &App, admission: &Admission, seconds: f64) -> Result<(), Problem> {
+    let Config { deadline_seconds, job_seconds, .. } = app.config;
+    let deadline = if admission.is_job() { job_seconds } else { deadline_seconds };
+    if seconds <= DOUBT * deadline {
+        return Ok(());
+    }
+    let detail = format!(
+        "this would take about {seconds:.0} s, and answers are waited for {deadline} s; nothing was computed"
+    );
+    Err(Problem::new(Slug::DeadlineExceeded, detail))
+}
+
+/// What a request would take.
+pub struct Estimate {
+    pub solver: SolverKind,
+    pub outlook: Outlook,
+    /// Once its turn has come.
+    pub seconds: f64,
+    /// Whether there is memory and time enough for it, if nothing else is under way.
+    pub is_admissible: bool,
+}
+
+/// Plans a request without answering it. What its clouds say is looked at as for the request itself, which finds that done then.
+///
+/// # Errors
+/// What the request itself would be refused for before anything is computed.
+pub async fn estimate<O: Operation>(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    intake: Intake,
+) -> Result<Estimate, Problem> {
+    let parsed = |intake: Intake, app: &App, observer: &JobObserver| {
+        let (named, memory) = intake.parse::<WithOperation<O>>(app, observer)?;
+        Ok((named.request, memory))
+    };
+    let Prepared::Ready(plan) = prepare::<O>(app, admission, intake, parsed, None, Instant::now()).await?
+    else {
+        return Err(Problem::internal());
+    };
+    keep_all(app, admission.owner, &plan.fresh).await;
+    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
+    let seconds = admission.expected_seconds(outlook.as_work(O::NAME));
+    let has_memory = outlook.n_bytes <= app.prepared.memory();
+    Ok(Estimate {
+        solver: plan.main.choice(app.prepared.memory()).solver,
+        outlook,
+        seconds,
+        is_admissible: has_memory && seconds <= app.config.deadline_seconds,
+    })
 }
 
 /// An answer that only needs to be sent, with its memory.
@@ -133,7 +226,7 @@ fn answer<O: Operation>(
 
 enum Prepared<W> {
     Ready(Box<Resolved<W>>),
-    Answered(Answered),
+    Answered(Box<Answered>, Vec<Arc<RegisteredCloud>>),
 }
 
 /// Parses and plans, and looks at the clouds if something was left out that follows from them. What is small, and has all it
@@ -142,51 +235,101 @@ async fn prepare<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
     intake: Intake,
-    wanted: Wanted,
+    parsed: impl FnOnce(Intake, &App, &JobObserver) -> Result<(O, Reservation), Problem> + Send + 'static,
+    wanted: Option<Wanted>,
     began: Instant,
 ) -> Result<Prepared<O::Work>, Problem> {
     let (shared, admitted) = (app.clone(), admission.clone());
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
-        let (request, mut memory) = intake.parse::<O>(&shared, observer)?;
-        let mut plan = request.plan(&Planner { app: &shared, owner: admitted.owner })?;
-        memory.shrink_to(n_bytes_held(&plan));
-        if lacking_mut(&mut plan).is_some() {
-            return Ok(Parsed::Lacking(Box::new(plan), memory));
+        let (request, memory) = parsed(intake, &shared, observer)?;
+        let elsewhere = elsewhere(&shared, admitted.owner, &request);
+        if !elsewhere.is_empty() {
+            return Ok(Parsed::Elsewhere(Box::new(request), memory, elsewhere));
         }
-        let plan = resolve(plan, memory)?;
-        let mut report = Report::parsed_in(began.elapsed());
-        let fitting = Fitting { app: &shared, admission: &admitted, has_surface: O::HAS_SURFACE };
-        let at_hand = match is_light(plan.cost.work.flops) {
-            true => fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report),
-            false => None,
-        };
-        Ok(match at_hand {
-            None => Parsed::Done(Prepared::Ready(Box::new(plan))),
-            Some((fits, memory)) => {
-                let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
-                Parsed::Done(Prepared::Answered(answered))
-            }
-        })
+        planned::<O>((&shared, &admitted), (request, memory), Vec::new(), wanted, began, observer)
     };
-    let (mut plan, memory) = match app.compute.run(admission, flops, parse).await?.0? {
+    let mut parsed = app.compute.run(admission, flops, parse).await?.0?;
+    if let Parsed::Elsewhere(request, memory, ids) = parsed {
+        let mut found = Vec::new();
+        for id in ids {
+            found.extend(find_cloud(app, admission, id).await?);
+        }
+        let (shared, admitted) = (app.clone(), admission.clone());
+        let plan = move |observer: &JobObserver| {
+            planned::<O>((&shared, &admitted), (*request, memory), found, wanted, began, observer)
+        };
+        parsed = app.compute.run(admission, 0.0, plan).await?.0?;
+    }
+    let (mut plan, memory, fresh) = match parsed {
         Parsed::Done(prepared) => return Ok(prepared),
-        Parsed::Lacking(plan, memory) => (plan, memory),
+        Parsed::Lacking(plan, memory, fresh) => (plan, memory, fresh),
+        Parsed::Elsewhere(..) => return Err(Problem::internal()),
     };
     while let Some(fit) = lacking_mut(&mut plan) {
         find_lacking(app, admission, fit).await?;
     }
     app.compute
-        .run(admission, 0.0, move |_| resolve(*plan, memory))
+        .run(admission, 0.0, move |_| resolve(*plan, memory, fresh))
         .await?
         .0
         .map(|plan| Prepared::Ready(Box::new(plan)))
 }
 
-enum Parsed<W> {
-    Done(Prepared<W>),
+/// Plans what was parsed, with clouds that were found elsewhere than in memory.
+fn planned<O: Operation>(
+    (app, admission): (&Arc<App>, &Arc<Admission>),
+    (request, mut memory): (O, Reservation),
+    found: Vec<Arc<RegisteredCloud>>,
+    wanted: Option<Wanted>,
+    began: Instant,
+    observer: &JobObserver,
+) -> Result<Parsed<O>, Problem> {
+    let planner = Planner::with_clouds(app, admission.owner, found);
+    let mut plan = request.plan(&planner)?;
+    let fresh = planner.into_fresh();
+    memory.shrink_to(n_bytes_held(&plan));
+    if lacking_mut(&mut plan).is_some() {
+        return Ok(Parsed::Lacking(Box::new(plan), memory, fresh));
+    }
+    let plan = resolve(plan, memory, fresh)?;
+    let mut report = Report::parsed_in(began.elapsed(), plan.main.stored.id);
+    let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
+    let wanted = wanted.filter(|_| is_light(plan.cost.work.flops));
+    let at_hand = wanted.and_then(|wanted| {
+        let found = fitting.at_hand(&plan.main, plan.surface.as_ref(), plan.cost, &mut report)?;
+        Some((found, wanted))
+    });
+    Ok(match at_hand {
+        None => Parsed::Done(Prepared::Ready(Box::new(plan))),
+        Some(((fits, memory), wanted)) => {
+            let fresh = plan.fresh.clone();
+            let work = Work { operation: O::NAME, is_cached: true, flops: plan.cost.work.flops };
+            let began = Instant::now();
+            let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
+            admission.did_at_once(work, began.elapsed());
+            Parsed::Done(Prepared::Answered(Box::new(answered), fresh))
+        }
+    })
+}
+
+/// The clouds that a request names and that memory does not have, where there is a store to look in.
+fn elsewhere<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<CloudId> {
+    if app.durable.is_none() {
+        return Vec::new();
+    }
+    let named = [Some(request.cloud()), request.surface_cloud()].into_iter().flatten();
+    let ids = named.filter_map(|cloud| CloudId::parse(cloud.id.as_deref()?));
+    let is_at_hand = |id| app.clouds.get(owner, id).is_some_and(|cloud| cloud.is_trusted(TRUST));
+    ids.filter(|&id| !is_at_hand(id)).collect()
+}
+
+enum Parsed<O: Operation> {
+    Done(Prepared<O::Work>),
     /// Its fits need to know more of their clouds.
-    Lacking(Box<Plan<W>>, Reservation),
+    Lacking(Box<Plan<O::Work>>, Reservation, Vec<Arc<RegisteredCloud>>),
+    /// Some of its clouds are not in memory.
+    Elsewhere(Box<O>, Reservation, Vec<CloudId>),
 }
 
 /// A fit that needs to know more of its cloud or of its values.
@@ -195,10 +338,14 @@ fn lacking_mut<W>(plan: &mut Plan<W>) -> Option<&mut PlannedFit> {
     fits.find(|fit| fit.lacks_anything())
 }
 
-fn resolve<W>(plan: Plan<W>, intake: Reservation) -> Result<Resolved<W>, Problem> {
+fn resolve<W>(
+    plan: Plan<W>,
+    intake: Reservation,
+    fresh: Vec<Arc<RegisteredCloud>>,
+) -> Result<Resolved<W>, Problem> {
     let main = plan.main.resolve()?;
     let surface = plan.surface.map(PlannedFit::resolve).transpose()?;
-    Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake })
+    Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake, fresh })
 }
 
 /// Bytes that a request holds until it is answered: values, queries, and clouds that may not be kept.

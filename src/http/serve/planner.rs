@@ -1,7 +1,9 @@
 //! From the shared objects of a request to validated inputs of the numerics.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
+use super::durable::TRUST;
 use super::plan::{LocalReason, PlannedFit, PlannedValues, Way};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{CloudRef, DuplicatePolicy, Fit, Geometry, Kernel, SolverChoice};
@@ -30,9 +32,32 @@ const BYTES_PER_NUMBER: usize = 25;
 pub struct Planner<'a> {
     pub app: &'a App,
     pub owner: Owner,
+    /// Clouds that were found elsewhere than in memory.
+    found: Vec<Arc<RegisteredCloud>>,
+    /// Clouds that came with the request, and are in memory alone, or were not seen in the store lately.
+    fresh: RefCell<Vec<Arc<RegisteredCloud>>>,
 }
 
-impl Planner<'_> {
+impl<'a> Planner<'a> {
+    pub fn new(app: &'a App, owner: Owner) -> Self {
+        Self::with_clouds(app, owner, Vec::new())
+    }
+
+    /// One that knows clouds which memory may have let go again.
+    pub fn with_clouds(app: &'a App, owner: Owner, found: Vec<Arc<RegisteredCloud>>) -> Self {
+        Self { app, owner, found, fresh: RefCell::default() }
+    }
+
+    /// Clouds that came with the request, and are in memory alone.
+    pub fn into_fresh(self) -> Vec<Arc<RegisteredCloud>> {
+        self.fresh.into_inner()
+    }
+
+    fn registered(&self, id: CloudId) -> Option<Arc<RegisteredCloud>> {
+        let found = self.found.iter().find(|cloud| cloud.id == id).cloned();
+        found.or_else(|| self.app.clouds.get(self.owner, id))
+    }
+
     /// Checks the fit of values. `dense_only` is what is asked that only a dense factorization has, if anything.
     ///
     /// # Errors
@@ -323,7 +348,7 @@ impl Planner<'_> {
                     let detail = "normals are given with points, not with an id";
                     return Err(Problem::invalid_request(format!("{pointer}/normals"), detail));
                 }
-                let found = CloudId::parse(&id).and_then(|id| self.app.clouds.get(self.owner, id));
+                let found = CloudId::parse(&id).and_then(|id| self.registered(id));
                 found.ok_or_else(|| unknown_cloud(&id).at(format!("{pointer}/id")))
             }
             (None, Some(points)) => Ok(self.register(points, cloud.normals, pointer)?.0),
@@ -357,7 +382,12 @@ impl Planner<'_> {
             None => None,
             Some(normals) => Some(check_normals(normals, &cloud, &format!("{pointer}/normals"))?),
         };
-        Ok(self.app.clouds.register(self.owner, cloud, normals))
+        let (stored, is_new) = self.app.clouds.register(self.owner, cloud, normals);
+        let is_there = stored.is_durable() && stored.is_trusted(TRUST);
+        if self.app.durable.is_some() && !is_there {
+            self.fresh.borrow_mut().push(stored.clone());
+        }
+        Ok((stored, is_new))
     }
 
     /// Admits a cloud to the dense solver. This is the one place that holds it to its limit: for solvers that never factorize all

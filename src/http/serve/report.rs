@@ -5,7 +5,9 @@ use std::time::Duration;
 use axum::http::HeaderValue;
 use axum::response::Response;
 
+use crate::http::around::middleware::CLOUD_HEADER;
 use crate::http::compute::StageTimes;
+use crate::store::key::CloudId;
 use crate::store::prepared::{CacheOutcome, PreparedFit};
 
 /// Times and cache, as `Server-Timing` and `Cache-Status`.
@@ -16,12 +18,14 @@ pub struct Report {
     /// Absent if encoding goes on while the answer is sent.
     encode: Option<Duration>,
     cache: Option<CacheOutcome>,
+    /// The cloud that the answer is about.
+    cloud: Option<CloudId>,
 }
 
 impl Report {
     /// Parsing and planning took so long, the wait for a turn included.
-    pub fn parsed_in(parse: Duration) -> Self {
-        Self { parse, ..Self::default() }
+    pub fn parsed_in(parse: Duration, cloud: CloudId) -> Self {
+        Self { parse, cloud: Some(cloud), ..Self::default() }
     }
 
     /// Adds a factor. With two of them the answer is a hit only if both are: the outcomes are ordered by cost.
@@ -54,6 +58,11 @@ impl Report {
             Some(CacheOutcome::NotStored) => "gramian; fwd=miss",
         };
         headers.insert("cache-status", HeaderValue::from_static(cache));
+        if let Some(cloud) = self.cloud
+            && let Ok(cloud) = HeaderValue::from_str(&cloud.to_string())
+        {
+            headers.insert(CLOUD_HEADER, cloud);
+        }
         if let Ok(timing) = HeaderValue::from_str(&self.server_timing()) {
             headers.insert("server-timing", timing);
         }

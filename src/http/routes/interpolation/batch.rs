@@ -101,6 +101,7 @@ pub async fn compute_interpolation_batch(
 }
 
 impl Operation for InterpolationBatchRequest {
+    const NAME: &'static str = "compute_interpolation_batch";
     type Work = Work;
     type Answer = InterpolationBatchResponse;
     const HAS_SURFACE: bool = false;

@@ -124,6 +124,7 @@ impl Work {
 }
 
 impl Operation for InterpolationRequest {
+    const NAME: &'static str = "compute_interpolation";
     type Work = Work;
     type Answer = InterpolationResponse;
     const HAS_SURFACE: bool = false;

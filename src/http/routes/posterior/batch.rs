@@ -120,6 +120,7 @@ pub async fn compute_posterior_batch(
 }
 
 impl Operation for PosteriorBatchRequest {
+    const NAME: &'static str = "compute_posterior_batch";
     type Work = Work;
     type Answer = PosteriorBatchResponse;
     const HAS_SURFACE: bool = false;

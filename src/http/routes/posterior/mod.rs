@@ -155,6 +155,7 @@ pub async fn compute_posterior(
 }
 
 impl Operation for PosteriorRequest {
+    const NAME: &'static str = "compute_posterior";
     type Work = Work;
     type Answer = PosteriorResponse;
     const HAS_SURFACE: bool = false;

@@ -63,22 +63,43 @@ impl RequestBody {
         }
     }
 
-    /// Decompresses and parses, on the pool. `make_room` is told how many bytes there are before they are unpacked.
+    /// Decompresses it, on the pool. `make_room` is told how many bytes there are before they are unpacked.
     ///
     /// # Errors
-    /// Those of `make_room`, 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its format, 422 with a
-    /// pointer for what is, but not this request.
-    pub fn parse<T: DeserializeOwned>(
+    /// Those of `make_room`, 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its coding.
+    pub fn unpack(
         self,
         context: &ParseContext<'_>,
         make_room: impl FnOnce(usize) -> Result<(), Problem>,
-    ) -> Result<T, Problem> {
+    ) -> Result<UnpackedBody, Problem> {
         let bytes = decompress(self.bytes, self.coding, self.limit, context.observer, make_room)?;
+        Ok(UnpackedBody { format: self.format, bytes })
+    }
+}
+
+/// A request without compression.
+pub struct UnpackedBody {
+    format: Format,
+    bytes: Vec<u8>,
+}
+
+impl UnpackedBody {
+    /// To be parsed as something else later.
+    pub fn into_request(self, limit: usize) -> RequestBody {
+        RequestBody::new(self.format, Coding::Identity, self.bytes, limit)
+    }
+
+    /// Parses it, on the pool.
+    ///
+    /// # Errors
+    /// 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its format, 422 with a pointer for what is, but
+    /// not this request.
+    pub fn parse<T: DeserializeOwned>(&self, context: &ParseContext<'_>) -> Result<T, Problem> {
         match self.format {
-            Format::Json => parse_json(&bytes, context),
-            Format::Safetensors => parse_safetensors(&bytes, context),
-            Format::Npy => parse_npy(&bytes, context),
-            Format::Ply => parse_ply(&bytes, context),
+            Format::Json => parse_json(&self.bytes, context),
+            Format::Safetensors => parse_safetensors(&self.bytes, context),
+            Format::Npy => parse_npy(&self.bytes, context),
+            Format::Ply => parse_ply(&self.bytes, context),
         }
     }
 }

@@ -5,6 +5,7 @@ pub mod limits;
 pub mod members;
 pub mod parse;
 pub mod points;
+pub mod without;
 
 mod guarded;
 mod plain_json;

@@ -1,0 +1,73 @@
+//! How much a key may ask: so many requests a minute, and so many at once.
+
+use std::num::NonZeroU32;
+use std::sync::Arc;
+
+use governor::clock::{Clock, DefaultClock};
+use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+/// When to come back to a key that has all the requests it may have under way.
+const SECONDS_UNTIL_ONE_ENDS: u64 = 1;
+
+/// The limits of a key; absent, there is none.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Rule {
+    pub requests_per_minute: Option<NonZeroU32>,
+    /// Requests at once after a pause; absent, a tenth of those of a minute.
+    pub burst: Option<NonZeroU32>,
+    pub concurrent_requests: Option<NonZeroU32>,
+}
+
+/// A rule, and what was counted by it.
+#[derive(Default)]
+pub(super) struct Limits {
+    pub rule: Rule,
+    rate: Option<DefaultDirectRateLimiter>,
+    under_way: Option<Arc<Semaphore>>,
+}
+
+/// A request that is under way.
+pub struct Entered(Option<OwnedSemaphorePermit>);
+
+/// Beyond a limit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TooMany {
+    pub limit: String,
+    pub retry_after_seconds: u64,
+}
+
+impl Limits {
+    pub(super) fn new(rule: Rule) -> Self {
+        let rate = rule.requests_per_minute.map(|a_minute| {
+            let a_tenth = NonZeroU32::new(a_minute.get() / 10).unwrap_or(NonZeroU32::MIN);
+            RateLimiter::direct(Quota::per_minute(a_minute).allow_burst(rule.burst.unwrap_or(a_tenth)))
+        });
+        let under_way = rule.concurrent_requests.map(|n| Arc::new(Semaphore::new(n.get() as usize)));
+        Self { rule, rate, under_way }
+    }
+
+    pub(super) fn enter(&self) -> Result<Entered, TooMany> {
+        let permit = self.under_way.as_ref().map(|under_way| under_way.clone().try_acquire_owned());
+        let permit = permit.transpose().map_err(|_| {
+            let n = self.rule.concurrent_requests.map_or(0, NonZeroU32::get);
+            TooMany { limit: format!("{n} requests at once"), retry_after_seconds: SECONDS_UNTIL_ONE_ENDS }
+        })?;
+        if let Some(rate) = &self.rate {
+            rate.check().map_err(|until| {
+                let wait = until.wait_time_from(DefaultClock::default().now());
+                let n = self.rule.requests_per_minute.map_or(0, NonZeroU32::get);
+                let retry_after_seconds = wait.as_secs_f64().ceil().max(1.0) as u64;
+                TooMany { limit: format!("{n} requests a minute"), retry_after_seconds }
+            })?;
+        }
+        Ok(Entered(permit))
+    }
+}
+
+impl Drop for Entered {
+    /// The permit goes back.
+    fn drop(&mut self) {
+        self.0.take();
+    }
+}

@@ -1,0 +1,233 @@
+//! What is told of a job.
+
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use futures_util::TryStreamExt;
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use super::{Here, unknown_job};
+use crate::http::compute::Snapshot;
+use crate::http::problem::Problem;
+use crate::http::serve::app::App;
+use crate::http::serve::durable::unavailable;
+use crate::numerics::observer::Stage;
+use crate::store::Owner;
+use crate::store::objects::jobs::{FoundResult, JobId, JobResult, Lease, Outcome};
+
+/// Bytes that the document of a problem may have.
+const MAX_PROBLEM_BYTES: u64 = 1 << 20;
+
+/// Where a job is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = JobStatus)]
+pub enum Status {
+    /// It waits for its turn.
+    Queued,
+    /// It is being computed.
+    Running,
+    /// Its result is there.
+    Succeeded,
+    /// Its problem is there.
+    Failed,
+    /// It was deleted before it ended.
+    Cancelled,
+}
+
+/// How far a job is.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = JobProgress)]
+pub struct ProgressView {
+    /// What is being done: `queued`, then the stages of `Server-Timing`: `parse`, `gram`, `factor`, `solve`, `evaluate`; `done` in the end.
+    stage: String,
+    /// The part of the time it is expected to take that has gone by, from 0 to 1.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    fraction: f64,
+    /// Of the last solve, relative; absent before there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0)]
+    residual: Option<f64>,
+    /// Seconds until it is done, by what ran on this machine; absent while that is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0)]
+    seconds_left: Option<f64>,
+}
+
+/// A job.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = Job)]
+pub struct JobView {
+    /// The id of the job.
+    #[schema(value_type = crate::http::fields::schemas::JobIdSchema)]
+    job_id: String,
+    /// Where it is.
+    pub status: Status,
+    /// How far it is.
+    progress: ProgressView,
+    /// When it was asked for, in UTC.
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// When it ended, in UTC; absent before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, format = DateTime)]
+    ended_at: Option<String>,
+    /// Until when its result is kept, in UTC; absent before there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, format = DateTime)]
+    expires_at: Option<String>,
+    /// Why it failed: the problem that the request would have been answered with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
+    problem: Option<Value>,
+}
+
+/// A job of this process.
+pub fn view_of_here(here: &Here) -> JobView {
+    let (status, progress) = match here.is_running() {
+        true => (Status::Running, of_snapshot(here.progress.now())),
+        false => (Status::Queued, at("queued", 0.0)),
+    };
+    view(here.id, status, progress)
+}
+
+/// A job of an owner, wherever it is.
+///
+/// # Errors
+/// 404 `unknown-job`; 503 if the store does not answer.
+pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
+    if let Some(here) = here_of(app, owner, id) {
+        return Ok(view_of_here(&here));
+    }
+    let (objects, name) = (&app.jobs.objects, app.keys.name_of(owner));
+    let refused = |error| unavailable(&error);
+    let found = objects.find_job(&name, id).await.map_err(refused)?;
+    let found = found.filter(|job| job.has_request || job.ended_at.is_some());
+    let Some(job) = found else { return Err(unknown_job(&id.to_string())) };
+    if job.ended_at.is_some() {
+        let result = objects.get_result(&name, id).await.map_err(refused)?;
+        let Some(result) = result else { return Err(unknown_job(&id.to_string())) };
+        return view_of_result(app, id, result).await;
+    }
+    let lease = match job.lease {
+        Some((attempt, _)) => objects.get_lease(&name, id, attempt).await.map_err(refused)?,
+        None => None,
+    };
+    Ok(match lease.filter(|lease| !lease.is_released) {
+        Some(lease) => view(id, Status::Running, of_lease(lease)),
+        None => view(id, Status::Queued, at("queued", 0.0)),
+    })
+}
+
+/// A job of this process, if it is the owner's.
+pub fn here_of(app: &App, owner: Owner, id: JobId) -> Option<Arc<Here>> {
+    app.jobs.find(id).filter(|here| here.owner == owner)
+}
+
+/// Resolves once a job has ended.
+///
+/// # Errors
+/// Those of [`look`].
+pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
+    loop {
+        if let Some(here) = here_of(app, owner, id) {
+            here.over.cancelled().await;
+        }
+        let view = look(app, owner, id).await?;
+        if view.has_ended() {
+            return Ok(view);
+        }
+        tokio::time::sleep(LOOKING).await;
+    }
+}
+
+/// How often it is looked how far a job of another process is.
+pub const LOOKING: Duration = Duration::from_secs(1);
+
+impl JobView {
+    pub fn has_ended(&self) -> bool {
+        !matches!(self.status, Status::Queued | Status::Running)
+    }
+}
+
+/// The document of the problem of a job that failed.
+///
+/// # Errors
+/// 500 if it is not what was written.
+pub async fn problem_of(found: FoundResult) -> Result<Value, Problem> {
+    let unreadable = |error: &dyn std::fmt::Display| {
+        tracing::error!(%error, "the problem of a job cannot be read");
+        Problem::internal()
+    };
+    if found.n_body_bytes > MAX_PROBLEM_BYTES {
+        return Err(unreadable(&"it is too long"));
+    }
+    let bytes: Vec<_> = found.body.try_collect().await.map_err(|error| unreadable(&error))?;
+    serde_json::from_slice(&bytes.concat()).map_err(|error| unreadable(&error))
+}
+
+async fn view_of_result(app: &App, id: JobId, found: FoundResult) -> Result<JobView, Problem> {
+    let FoundResult { head: JobResult { outcome, .. }, ended_at, .. } = found;
+    let status = match outcome {
+        Outcome::Succeeded => Status::Succeeded,
+        Outcome::Failed => Status::Failed,
+        Outcome::Cancelled => Status::Cancelled,
+    };
+    let fraction = if outcome == Outcome::Succeeded { 1.0 } else { 0.0 };
+    let mut view = view(id, status, at("done", fraction));
+    view.ended_at = Some(written(ended_at));
+    view.expires_at = Some(written(ended_at + app.config.job_result()));
+    if outcome == Outcome::Failed {
+        view.problem = Some(problem_of(found).await?);
+    }
+    Ok(view)
+}
+
+fn view(id: JobId, status: Status, progress: ProgressView) -> JobView {
+    let created_at = written(id.created_at());
+    JobView {
+        job_id: id.to_string(),
+        status,
+        progress,
+        created_at,
+        ended_at: None,
+        expires_at: None,
+        problem: None,
+    }
+}
+
+fn written(time: SystemTime) -> String {
+    humantime::format_rfc3339_millis(time).to_string()
+}
+
+fn at(stage: &str, fraction: f64) -> ProgressView {
+    ProgressView { stage: stage.to_owned(), fraction, residual: None, seconds_left: None }
+}
+
+fn of_snapshot(now: Snapshot) -> ProgressView {
+    let Snapshot { stage, fraction, residual, seconds_left } = now;
+    ProgressView { stage: name_of(stage).to_owned(), fraction, residual, seconds_left }
+}
+
+fn of_lease(lease: Lease) -> ProgressView {
+    let Lease { stage, fraction, residual, seconds_left, .. } = lease;
+    ProgressView {
+        stage: stage.unwrap_or_else(|| name_of(None).to_owned()),
+        fraction,
+        residual,
+        seconds_left,
+    }
+}
+
+/// As `Server-Timing` has it.
+pub fn name_of(stage: Option<Stage>) -> &'static str {
+    match stage {
+        None => "parse",
+        Some(Stage::Gram) => "gram",
+        Some(Stage::Factor | Stage::Condition) => "factor",
+        Some(Stage::Solve) => "solve",
+        Some(Stage::Evaluate) => "evaluate",
+    }
+}

@@ -1,0 +1,222 @@
+//! Long work as jobs: `Prefer: respond-async` (RFC 7240) is answered 202 at once, and the answer is kept until it is fetched.
+//!
+//! WHERE. A job is objects in the store (store/objects/jobs.rs), of which all processes see the same; without a store it is objects in memory,
+//! within a part of the budget. What follows needs no second way of doing things.
+//!
+//! WHO. The process that took a request works on it when its turn has come; as many run at once as there are threads, owner after owner.
+//! A job that nobody works on, or whose process has ended, is anybody's (rounds.rs).
+//!
+//! HOW. The request goes through the routes as any other (run.rs), without a deadline. An answer that asks to come back later is not
+//! one: the job comes back.
+
+mod accept;
+mod look;
+mod rounds;
+mod run;
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::Router;
+use tokio_util::sync::CancellationToken;
+
+use crate::http::compute::{Progress, Turns};
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::store::Owner;
+use crate::store::budget::{Budget, Reservation};
+use crate::store::objects::jobs::{JobId, JobObjects};
+use crate::store::objects::{Objects, OwnerName, Unavailable};
+pub use accept::respond_async;
+pub use look::{JobView, Status, look, look_until_ended, problem_of};
+
+/// The memory that a job takes beside its request and its result.
+const LEAST_BYTES: usize = 4096;
+
+/// The jobs of this process, and where all of them are.
+pub struct Jobs {
+    pub objects: Arc<Objects>,
+    here: Mutex<HashMap<JobId, Arc<Here>>>,
+    /// What jobs hold where they are in memory.
+    memory: Option<Budget>,
+    held: Mutex<HashMap<JobId, Reservation>>,
+    turns: Arc<Turns>,
+    n_turns: usize,
+    /// Jobs that may wait or run here.
+    most: usize,
+}
+
+/// A job that this process works on, or will.
+pub struct Here {
+    pub id: JobId,
+    pub owner: Owner,
+    pub progress: Arc<Progress>,
+    is_running: AtomicBool,
+    cancelled: CancellationToken,
+    /// Cancelled when it is not here any more.
+    over: CancellationToken,
+}
+
+/// What works on jobs: the routes without deadline and keys.
+#[derive(Clone)]
+pub struct Runner {
+    pub app: Arc<App>,
+    pub routes: Router,
+}
+
+/// How many jobs wait, and how many run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Load {
+    pub n_waiting: usize,
+    pub n_running: usize,
+}
+
+impl Jobs {
+    /// Jobs in the store, or, where there is none, in so much memory.
+    pub fn new(
+        store: Option<Arc<Objects>>,
+        n_bytes: usize,
+        n_owners: usize,
+        n_turns: usize,
+        max_queue: usize,
+    ) -> Self {
+        Self {
+            memory: store.is_none().then(|| Budget::new(n_bytes, n_owners)),
+            objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
+            here: Mutex::default(),
+            held: Mutex::default(),
+            turns: Turns::new(n_turns),
+            n_turns,
+            most: n_turns.saturating_add(max_queue),
+        }
+    }
+
+    /// Those of this process.
+    pub fn load(&self) -> Load {
+        let here = self.here();
+        let n_running = here.values().filter(|job| job.is_running()).count();
+        Load { n_waiting: here.len() - n_running, n_running }
+    }
+
+    /// Bytes of jobs in memory.
+    pub fn n_bytes(&self) -> usize {
+        self.memory.as_ref().map_or(0, Budget::n_held)
+    }
+
+    /// Resolves once no job is here any more.
+    pub async fn all_left(&self) {
+        loop {
+            let Some(job) = self.here().values().next().cloned() else { return };
+            job.over.cancelled().await;
+        }
+    }
+
+    fn find(&self, id: JobId) -> Option<Arc<Here>> {
+        self.here().get(&id).cloned()
+    }
+
+    /// Makes a job one of this process, unless it is, or there are too many.
+    fn add(&self, id: JobId, owner: Owner) -> Option<Arc<Here>> {
+        let mut here = self.here();
+        if here.len() >= self.most || here.contains_key(&id) {
+            return None;
+        }
+        let job = Arc::new(Here {
+            id,
+            owner,
+            progress: Arc::default(),
+            is_running: AtomicBool::new(false),
+            cancelled: CancellationToken::new(),
+            over: CancellationToken::new(),
+        });
+        here.insert(id, job.clone());
+        Some(job)
+    }
+
+    fn remove(&self, job: &Here) {
+        self.here().remove(&job.id);
+        job.over.cancel();
+    }
+
+    /// Whether another job could begin at once.
+    fn has_turn(&self) -> bool {
+        self.turns.load(self.n_turns).0 < self.n_turns
+    }
+
+    /// Takes memory for a job, where jobs are in memory; says whether there is any.
+    fn hold(&self, job: JobId, owner: Owner, n_bytes: usize) -> bool {
+        let Some(memory) = &self.memory else { return true };
+        let mut held = self.held();
+        match held.get_mut(&job) {
+            Some(reservation) => reservation.try_grow(n_bytes),
+            None => match memory.try_reserve(owner, n_bytes + LEAST_BYTES) {
+                Some(reservation) => held.insert(job, reservation).is_none(),
+                None => false,
+            },
+        }
+    }
+
+    /// Says what a job holds in the end.
+    fn shrink(&self, job: JobId, n_bytes: usize) {
+        if let Some(reservation) = self.held().get_mut(&job) {
+            reservation.shrink_to(n_bytes + LEAST_BYTES);
+        }
+    }
+
+    /// Ends a job without a result, unless it has one; says whether it had none. Who works on it elsewhere finds out when it next says so.
+    ///
+    /// # Errors
+    /// If the store does not answer.
+    pub async fn cancel(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        let is_cancelled = self.objects.cancel_job(owner, id).await?;
+        if let Some(here) = self.find(id).filter(|_| is_cancelled) {
+            here.cancelled.cancel();
+        }
+        Ok(is_cancelled)
+    }
+
+    /// Resolves when a job of this process is not here any more; never for others.
+    pub async fn until_over(&self, id: JobId) {
+        match self.find(id) {
+            Some(here) => here.over.cancelled().await,
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Forgets a job wherever it is.
+    ///
+    /// # Errors
+    /// If the store does not answer.
+    pub async fn forget(&self, job: &JobObjects) -> Result<(), Unavailable> {
+        self.objects.delete_job(job).await?;
+        self.held().remove(&job.id);
+        Ok(())
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
+    fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<Here>>> {
+        self.here.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
+    fn held(&self) -> MutexGuard<'_, HashMap<JobId, Reservation>> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Here {
+    fn is_running(&self) -> bool {
+        self.is_running.load(Ordering::Relaxed)
+    }
+}
+
+/// 404 for a job that nobody knows.
+pub fn unknown_job(id: &str) -> Problem {
+    let id: String = id.chars().take(64).collect();
+    Problem::new(
+        Slug::UnknownJob,
+        format!("there is no job {id} for this key: it never was, or is forgotten"),
+    )
+}

@@ -1,0 +1,175 @@
+//! What the service does, in numbers for Prometheus: counted as it happens (here), or read when they are asked for (gauges.rs).
+//!
+//! Names and labels are an interface like any other: dashboards and alerts are built on them, `docs/operations.md` lists them. No label
+//! takes what clients send: routes are those of the router, methods those of HTTP.
+
+mod gauges;
+
+use std::time::Duration;
+
+use axum::http::{Method, StatusCode};
+use prometheus::{
+    Encoder, Error, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry,
+    TextEncoder,
+};
+
+use super::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::store::objects::jobs::Outcome;
+use gauges::Gauges;
+
+/// The media type of [`Metrics::text`].
+pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+/// Bounds of the histogram, in seconds: cached answers take a millisecond, factorizations a minute.
+const SECONDS: [f64; 16] =
+    [0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0];
+
+/// The status of requests whose client left before there was one; no answer has it.
+const ABANDONED: &str = "499";
+
+/// The label of requests that no route has, or whose method HTTP does not know.
+const OTHER: &str = "other";
+
+/// Everything that is counted.
+pub struct Metrics {
+    registry: Registry,
+    requests: IntCounterVec,
+    durations: HistogramVec,
+    in_flight: IntGauge,
+    problems: IntCounterVec,
+    rate_limited: IntCounter,
+    cache_requests: IntCounterVec,
+    solvers: IntCounterVec,
+    jobs: IntCounterVec,
+    gauges: Gauges,
+}
+
+impl Metrics {
+    /// # Errors
+    /// None but for two families of one name.
+    pub fn new() -> Result<Self, Error> {
+        let registry = Registry::new();
+        let counters = |name: &str, help: &str, labels: &[&str]| {
+            let counters = IntCounterVec::new(Opts::new(name, help), labels)?;
+            registry.register(Box::new(counters.clone())).map(|()| counters)
+        };
+        let durations = HistogramOpts::new(
+            "gramian_http_request_duration_seconds",
+            "Time from the head of a request to the head of its answer",
+        );
+        let durations = HistogramVec::new(durations.buckets(SECONDS.to_vec()), &["method", "route"])?;
+        registry.register(Box::new(durations.clone()))?;
+        let in_flight = IntGauge::new(
+            "gramian_http_requests_in_flight",
+            "Requests between their arrival and the head of their answer",
+        )?;
+        registry.register(Box::new(in_flight.clone()))?;
+        let rate_limited =
+            IntCounter::new("gramian_rate_limited_total", "Requests beyond the rate of their key")?;
+        registry.register(Box::new(rate_limited.clone()))?;
+        let metrics = Self {
+            requests: counters(
+                "gramian_http_requests_total",
+                "Requests by status; 499 where the client left first",
+                &["method", "route", "status"],
+            )?,
+            durations,
+            in_flight,
+            problems: counters("gramian_problems_total", "Refusals by type of problem", &["type"])?,
+            rate_limited,
+            cache_requests: counters(
+                "gramian_cache_requests_total",
+                "Answers by where what they were computed from came from",
+                &["outcome"],
+            )?,
+            solvers: counters("gramian_solvers_prepared_total", "Solvers made ready, by kind", &["kind"])?,
+            jobs: counters("gramian_jobs_ended_total", "Jobs that ended, by how", &["outcome"])?,
+            gauges: Gauges::new(&registry)?,
+            registry,
+        };
+        metrics.begin_at_zero();
+        Ok(metrics)
+    }
+
+    /// Rates of what has not happened yet are 0, not absent.
+    fn begin_at_zero(&self) {
+        for slug in Slug::ALL {
+            self.problems.with_label_values(&[slug.as_str()]);
+        }
+        for outcome in ["hit", "miss", "collapsed"] {
+            self.cache_requests.with_label_values(&[outcome]);
+        }
+        for outcome in ["succeeded", "failed"] {
+            self.jobs.with_label_values(&[outcome]);
+        }
+        for kind in ["dense", "pivoted", "moving", "local", "restored"] {
+            self.solvers.with_label_values(&[kind]);
+        }
+    }
+
+    /// A request came.
+    pub fn arrived(&self) {
+        self.in_flight.inc();
+    }
+
+    /// It was answered, or, without a status, its client left.
+    pub fn left(&self, method: &Method, route: Option<&str>, status: Option<StatusCode>, took: Duration) {
+        let (method, route) = (method_label(method), route.unwrap_or(OTHER));
+        self.in_flight.dec();
+        let status = status.as_ref().map_or(ABANDONED, StatusCode::as_str);
+        self.requests.with_label_values(&[method, route, status]).inc();
+        self.durations.with_label_values(&[method, route]).observe(took.as_secs_f64());
+    }
+
+    /// It was refused.
+    pub fn refused(&self, slug: Slug) {
+        self.problems.with_label_values(&[slug.as_str()]).inc();
+        if slug == Slug::RateLimited {
+            self.rate_limited.inc();
+        }
+    }
+
+    /// What the `Cache-Status` of an answer says.
+    pub fn cached(&self, cache_status: &str) {
+        let outcome = match cache_status {
+            "gramian; hit" => "hit",
+            _ if cache_status.ends_with("collapsed") => "collapsed",
+            _ => "miss",
+        };
+        self.cache_requests.with_label_values(&[outcome]).inc();
+    }
+
+    /// A solver was made ready.
+    pub fn prepared(&self, kind: &str) {
+        self.solvers.with_label_values(&[kind]).inc();
+    }
+
+    /// A job came to its end.
+    pub fn job_ended(&self, outcome: Outcome) {
+        let outcome = if outcome == Outcome::Succeeded { "succeeded" } else { "failed" };
+        self.jobs.with_label_values(&[outcome]).inc();
+    }
+
+    /// All of it in the text format of Prometheus, version 0.0.4, with what holds now.
+    ///
+    /// # Errors
+    /// None but for a family without a name.
+    pub fn text(&self, app: &App) -> Result<Vec<u8>, Error> {
+        self.gauges.read(app);
+        let mut text = Vec::new();
+        TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
+        Ok(text)
+    }
+}
+
+fn method_label(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        _ => OTHER,
+    }
+}

@@ -1,0 +1,26 @@
+//! Bodies as requests, without a service: for programs that try to break the reading of them (fuzz/).
+
+use super::problem::Problem;
+use super::routes::estimate;
+use super::wire::negotiation::{Coding, Format};
+use super::wire::read::body::RequestBody;
+use super::wire::read::limits::ParseContext;
+use crate::numerics::observer::Unobserved;
+
+/// Operations that compute, by name; every other name is the registration of a cloud.
+pub const OPERATIONS: &[&str] = estimate::NAMES;
+
+/// Bytes that a body may have once it is unpacked.
+const LIMIT: usize = 1 << 22;
+
+const CONTEXT: ParseContext<'static> =
+    ParseContext { max_points: 1000, max_queries: 1000, max_dimension: 16, observer: &Unobserved };
+
+/// Reads a body as a request of an operation, and forgets it.
+///
+/// # Errors
+/// What the request would be refused with.
+pub fn read_as(operation: &str, format: Format, coding: Coding, bytes: &[u8]) -> Result<(), Problem> {
+    let body = RequestBody::new(format, coding, bytes.to_vec(), LIMIT).unpack(&CONTEXT, |_| Ok(()))?;
+    estimate::read_as(operation, &body, &CONTEXT)
+}

@@ -1,0 +1,198 @@
+//! `POST /v1/estimate`.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::{Extension, Json};
+use serde::Serialize;
+use serde::de::IgnoredAny;
+use utoipa::openapi::schema::{AdditionalProperties, RefBuilder, Schema, SchemaType, Type};
+use utoipa::openapi::{ObjectBuilder, RefOr};
+use utoipa::{PartialSchema, ToSchema};
+
+use super::curvatures::CurvaturesRequest;
+use super::interpolation::{InterpolationBatchRequest, InterpolationRequest};
+use super::laplace_beltrami::{
+    LaplaceBeltramiMatrixRequest, LaplaceBeltramiRequest, LaplaceBeltramiSparseMatrixRequest,
+};
+use super::model_selection::ModelSelectionRequest;
+use super::normals::NormalsRequest;
+use super::posterior::{PosteriorBatchRequest, PosteriorRequest};
+use super::surface_gradient::{
+    SurfaceGradientMatrixRequest, SurfaceGradientRequest, SurfaceGradientSparseMatrixRequest,
+};
+use crate::http::compute::{Admission, JobObserver};
+use crate::http::fields::SolverUsed;
+use crate::http::openapi::responses::ComputeProblems;
+use crate::http::problem::Problem;
+use crate::http::routes::clouds::CloudRequest;
+use crate::http::serve::app::App;
+use crate::http::serve::intake::{Intake, read_body};
+use crate::http::serve::operation::{self, Operation, REQUEST_FORMATS};
+use crate::http::wire::read::body::UnpackedBody;
+use crate::http::wire::read::limits::ParseContext;
+use crate::http::wire::read::without::WithOperation;
+use crate::numerics::solver::kind::SolverKind;
+use crate::store::Owner;
+
+/// A request of another operation, with the name of that operation.
+pub struct EstimateRequest;
+
+impl PartialSchema for EstimateRequest {
+    fn schema() -> RefOr<Schema> {
+        let operation = RefBuilder::new()
+            .ref_location_from_schema_name("OperationName")
+            .description(Some("The operation whose request this is."));
+        let request = ObjectBuilder::new()
+            .description(Some(
+                "The members of a request of this operation, and `operation` beside them: see the schema of that request.",
+            ))
+            .property("operation", operation)
+            .required("operation")
+            .additional_properties(Some(AdditionalProperties::FreeForm(true)));
+        request.into()
+    }
+}
+
+impl ToSchema for EstimateRequest {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((OperationName::name().into_owned(), OperationName::schema()));
+    }
+}
+
+/// The schema of the name of an operation.
+struct OperationName;
+
+impl PartialSchema for OperationName {
+    fn schema() -> RefOr<Schema> {
+        let text = "An operation that computes, by its `operationId`.";
+        let names = ObjectBuilder::new().schema_type(SchemaType::Type(Type::String));
+        names.enum_values(Some(NAMES.iter().copied())).description(Some(text)).into()
+    }
+}
+
+impl ToSchema for OperationName {}
+
+/// What a request would take.
+#[derive(Serialize, ToSchema)]
+pub struct EstimateResponse {
+    /// The operation, repeated.
+    operation: &'static str,
+    /// What it would be served by.
+    solver: SolverUsed,
+    /// Floating-point operations, as counted beforehand.
+    #[schema(minimum = 0.0)]
+    flops: f64,
+    /// Memory that it would take beside what is held already.
+    bytes: u64,
+    /// Seconds from its turn to its answer, by what ran on this machine since the server started.
+    #[schema(minimum = 0.0)]
+    seconds: f64,
+    /// Whether all factorizations that it needs are there.
+    cached: bool,
+    /// Whether there is memory and time enough for it, if nothing else is under way.
+    admissible: bool,
+}
+
+/// Estimate a request
+///
+/// What another request would take, before it is sent: the body is that of the other request, with the name of its operation as one member
+/// more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the request itself would do. What
+/// would be refused is refused here as well, with the same problem; times are learned from what ran on this machine.
+#[utoipa::path(
+    post,
+    path = "/v1/estimate",
+    operation_id = "estimate",
+    tag = "process",
+    request_body = EstimateRequest,
+    responses((status = 200, description = "The estimate", body = EstimateResponse), ComputeProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn estimate(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    request: Request,
+) -> Result<Json<EstimateResponse>, Problem> {
+    let (parts, body) = request.into_parts();
+    let intake = read_body(&app, owner, &parts.headers, body, &REQUEST_FORMATS).await?;
+    let admission = app.compute.admit(owner)?;
+    let (shared, flops) = (app.clone(), intake.body.flops_to_parse());
+    let named = move |observer: &JobObserver| name_of(intake, &shared, observer);
+    let (operation, intake) = app.compute.run(&admission, flops, named).await?.0?;
+    estimate_of(&operation, &app, &admission, intake).await
+}
+
+/// The operation, and the body to be read once more as a request of it.
+fn name_of(intake: Intake, app: &App, observer: &JobObserver) -> Result<(String, Intake), Problem> {
+    let (body, memory) = intake.unpack(app, observer)?;
+    let named: WithOperation<IgnoredAny> = body.parse(&ParseContext::new(&app.config, observer))?;
+    let missing = || Problem::invalid_request("/operation", "name the operation whose request this is");
+    let operation = named.operation.ok_or_else(missing)?;
+    Ok((operation, Intake { body: body.into_request(app.memory.body), memory }))
+}
+
+macro_rules! operations {
+    ($($request:ty),* $(,)?) => {
+        /// All operations that can be estimated.
+        pub const NAMES: &[&str] = &[$(<$request as Operation>::NAME),*];
+
+        async fn estimate_of(
+            operation: &str,
+            app: &Arc<App>,
+            admission: &Arc<Admission>,
+            intake: Intake,
+        ) -> Result<Json<EstimateResponse>, Problem> {
+            $(if operation == <$request as Operation>::NAME {
+                let estimate = operation::estimate::<$request>(app, admission, intake).await?;
+                return Ok(EstimateResponse::of(<$request as Operation>::NAME, estimate));
+            })*
+            let detail = format!("no operation of this name can be estimated; there are {}", NAMES.join(", "));
+            Err(Problem::invalid_request("/operation", detail))
+        }
+
+        /// Reads a body as a request of an operation, and forgets it.
+        ///
+        /// # Errors
+        /// What the request would be refused with.
+        pub fn read_as(operation: &str, body: &UnpackedBody, context: &ParseContext<'_>) -> Result<(), Problem> {
+            $(if operation == <$request as Operation>::NAME {
+                return body.parse::<$request>(context).map(drop);
+            })*
+            body.parse::<CloudRequest>(context).map(drop)
+        }
+    };
+}
+
+operations!(
+    InterpolationRequest,
+    InterpolationBatchRequest,
+    PosteriorRequest,
+    PosteriorBatchRequest,
+    ModelSelectionRequest,
+    NormalsRequest,
+    CurvaturesRequest,
+    SurfaceGradientRequest,
+    SurfaceGradientMatrixRequest,
+    SurfaceGradientSparseMatrixRequest,
+    LaplaceBeltramiRequest,
+    LaplaceBeltramiMatrixRequest,
+    LaplaceBeltramiSparseMatrixRequest,
+);
+
+impl EstimateResponse {
+    fn of(operation: &'static str, estimate: operation::Estimate) -> Json<Self> {
+        let operation::Estimate { solver, outlook, seconds, is_admissible } = estimate;
+        Json(Self {
+            operation,
+            solver: match solver {
+                SolverKind::Dense => SolverUsed::Dense,
+                SolverKind::Local => SolverUsed::Local,
+            },
+            flops: outlook.flops,
+            bytes: outlook.n_bytes as u64,
+            seconds,
+            cached: outlook.is_cached,
+            admissible: is_admissible,
+        })
+    }
+}

@@ -1,0 +1,199 @@
+//! `/v1/jobs`: work that was asked for with `Prefer: respond-async`.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Extension;
+use axum::body::Body;
+use axum::extract::{Path, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::Stream;
+
+use crate::http::around::middleware::Documented;
+use crate::http::fields::schemas::JobIdSchema;
+use crate::http::jobs::{JobView, look, look_until_ended, problem_of, unknown_job};
+use crate::http::openapi::responses::{AnyJobProblems, JobProblems, JobResultProblems};
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::http::serve::app::App;
+use crate::http::serve::durable::unavailable;
+use crate::store::Owner;
+use crate::store::objects::jobs::{JobId, Outcome};
+
+/// How often those who follow a job are told how far it is, if it is any further.
+const TELLING: Duration = Duration::from_millis(500);
+
+/// How much sooner than the deadline of its request a wait for a result ends.
+const MARGIN: Duration = Duration::from_secs(1);
+
+/// Look at a job
+///
+/// Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{job_id}",
+    operation_id = "get_job",
+    tag = "jobs",
+    params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
+    responses((status = 200, description = "The job", body = JobView), JobProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn get_job(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(job_id): Path<String>,
+) -> Result<axum::Json<JobView>, Problem> {
+    look(&app, owner, parse(&job_id)?).await.map(axum::Json)
+}
+
+/// Delete a job
+///
+/// Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+#[utoipa::path(
+    delete,
+    path = "/v1/jobs/{job_id}",
+    operation_id = "delete_job",
+    tag = "jobs",
+    params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
+    responses((status = 204, description = "Cancelled or forgotten"), AnyJobProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn delete_job(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(job_id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    let (id, name) = (parse(&job_id)?, app.keys.name_of(owner));
+    let refused = |error| unavailable(&error);
+    let found = app.jobs.objects.find_job(&name, id).await.map_err(refused)?;
+    let Some(job) = found.filter(|job| job.has_request || job.ended_at.is_some()) else {
+        return Err(unknown_job(&job_id));
+    };
+    let is_cancelled = job.ended_at.is_none() && app.jobs.cancel(&name, id).await.map_err(refused)?;
+    if !is_cancelled {
+        app.jobs.forget(&job).await.map_err(refused)?;
+    }
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Follow a job
+///
+/// Server-sent events: `progress`, with the job as its data, whenever it is further than before; `done`, with the job, when it has ended, and
+/// then nothing more.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{job_id}/events",
+    operation_id = "follow_job",
+    tag = "jobs",
+    params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
+    responses((status = 200, description = "The events", body = String, content_type = "text/event-stream"), AnyJobProblems),
+    security((), ("bearer" = []))
+)]
+pub async fn follow_job(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(job_id): Path<String>,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Problem> {
+    let id = parse(&job_id)?;
+    let first = look(&app, owner, id).await?;
+    let events = futures_util::stream::unfold(Following::First(Box::new(first)), move |following| {
+        let app = app.clone();
+        async move {
+            let view = match following {
+                Following::First(view) => *view,
+                Following::Further(last) => further(&app, owner, id, &last).await?,
+                Following::Ended => return None,
+            };
+            let name = if view.has_ended() { "done" } else { "progress" };
+            let event = Event::default().event(name).json_data(&view).ok()?;
+            let next = if view.has_ended() { Following::Ended } else { Following::Further(Box::new(view)) };
+            Some((Ok(event), next))
+        }
+    });
+    Ok(Sse::new(events).keep_alive(KeepAlive::default()))
+}
+
+/// What somebody who follows a job is told next.
+enum Following {
+    First(Box<JobView>),
+    Further(Box<JobView>),
+    Ended,
+}
+
+/// The job when it is any further; nothing if it is gone, or this process is to end: who follows asks again.
+async fn further(app: &App, owner: Owner, id: JobId, last: &JobView) -> Option<JobView> {
+    loop {
+        tokio::select! {
+            () = tokio::time::sleep(TELLING) => {}
+            () = app.jobs.until_over(id) => {}
+            () = app.draining.cancelled() => return None,
+        }
+        let view = look(app, owner, id).await.ok()?;
+        if view != *last {
+            return Some(view);
+        }
+    }
+}
+
+/// Fetch the result of a job
+///
+/// What the request is answered with, its problem included; a success is 200 with the media type that the request asked for. Waits for the job
+/// to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{job_id}/result",
+    operation_id = "get_job_result",
+    tag = "jobs",
+    params(("job_id" = JobIdSchema, Path, description = "The id of a job", example = "0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c")),
+    responses(
+        (status = 200, description = "The answer", content(
+            (serde_json::Value = "application/json"),
+            (String = "application/x-safetensors"),
+            (String = "application/x-npy"),
+        )),
+        JobResultProblems
+    ),
+    security((), ("bearer" = []))
+)]
+pub async fn get_job_result(
+    State(app): State<Arc<App>>,
+    Extension(owner): Extension<Owner>,
+    Path(job_id): Path<String>,
+) -> Result<Response, Problem> {
+    let id = parse(&job_id)?;
+    let deadline = app.config.deadline();
+    let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
+    match tokio::time::timeout(patience, look_until_ended(&app, owner, id)).await {
+        Ok(view) => view?,
+        Err(_) => {
+            let detail = "the job has not ended: it goes on, ask for its result again";
+            return Err(Problem::new(Slug::DeadlineExceeded, detail));
+        }
+    };
+    let found = app.jobs.objects.get_result(&app.keys.name_of(owner), id).await;
+    let found = found.map_err(|error| unavailable(&error))?.ok_or_else(|| unknown_job(&job_id))?;
+    if found.head.outcome == Outcome::Cancelled {
+        return Err(Problem::new(Slug::UnknownJob, "the job was cancelled: there is no result"));
+    }
+    if found.head.outcome == Outcome::Failed {
+        let status = StatusCode::from_u16(found.head.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let document = problem_of(found).await?;
+        return Ok((status, Extension(Documented(document))).into_response());
+    }
+    let mut response = Body::from_stream(found.body).into_response();
+    for (name, value) in &found.head.headers {
+        if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
+        {
+            response.headers_mut().insert(name, value);
+        }
+    }
+    response.headers_mut().insert(header::CONTENT_LENGTH, found.n_body_bytes.into());
+    Ok(response)
+}
+
+fn parse(job_id: &str) -> Result<JobId, Problem> {
+    JobId::parse(job_id).ok_or_else(|| unknown_job(job_id))
+}

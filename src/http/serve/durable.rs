@@ -1,0 +1,315 @@
+//! Clouds that outlive the process, where there is a store: written before they are acknowledged, read again where memory has let them go.
+
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
+
+use tokio::sync::Notify;
+
+use super::app::App;
+use crate::http::compute::{Admission, JobObserver};
+use crate::http::problem::Problem;
+use crate::store::Owner;
+use crate::store::clouds::RegisteredCloud;
+use crate::store::key::CloudId;
+use crate::store::objects::cloud_object::{decode, encode};
+use crate::store::objects::{Listed, Objects, Place, Retention, Swept, Unavailable, Written};
+
+/// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
+const SECONDS_UNTIL_BACK: u64 = 5;
+
+/// How often it is looked what of the store is to go, unless more comes than may be there.
+const SWEEPING: Duration = Duration::from_secs(600);
+
+/// How long a cloud in memory is taken to be in the store as well: another process may have deleted it there.
+pub const TRUST: Duration = Duration::from_secs(10);
+
+/// How long an object waits for memory before the request is refused.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Work of hashing and copying a byte.
+const FLOPS_PER_BYTE: f64 = 8.0;
+
+/// The store, and whether it takes what it is given.
+pub struct Durable {
+    pub objects: Arc<Objects>,
+    /// Clouds that it did not take, and how many of them it has been offered again since.
+    n_refused: AtomicU64,
+    n_made_up: AtomicU64,
+    /// What the last sweep found, and what was written since.
+    n_clouds: AtomicU64,
+    n_bytes: AtomicU64,
+    pub(super) n_factor_bytes: AtomicU64,
+    pub(super) is_full: Notify,
+    /// Held while a factor is written.
+    pub(super) writing_factor: tokio::sync::Mutex<()>,
+}
+
+impl Durable {
+    /// # Errors
+    /// Says what is wrong with the place.
+    pub async fn open(place: &Place) -> Result<Self, String> {
+        let variables = std::env::vars_os();
+        let variables =
+            variables.filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+        let objects = Objects::open(place, variables).await?;
+        Ok(Self {
+            objects: Arc::new(objects),
+            n_refused: AtomicU64::new(0),
+            n_made_up: AtomicU64::new(0),
+            n_clouds: AtomicU64::new(0),
+            n_bytes: AtomicU64::new(0),
+            n_factor_bytes: AtomicU64::new(0),
+            is_full: Notify::new(),
+            writing_factor: tokio::sync::Mutex::default(),
+        })
+    }
+
+    /// Whether all that was acknowledged outlives the process.
+    pub fn is_up_to_date(&self) -> bool {
+        self.n_made_up.load(Ordering::Acquire) == self.n_refused.load(Ordering::Acquire)
+    }
+
+    /// Bytes of factors in the store, about.
+    pub fn factor_bytes(&self) -> u64 {
+        self.n_factor_bytes.load(Ordering::Relaxed)
+    }
+
+    /// How many clouds the store has, and bytes of them, about.
+    pub fn size(&self) -> (u64, u64) {
+        (self.n_clouds.load(Ordering::Relaxed), self.n_bytes.load(Ordering::Relaxed))
+    }
+
+    fn grew_by(&self, n_bytes: u64, limits: Retention) {
+        self.n_clouds.fetch_add(1, Ordering::Relaxed);
+        let n_bytes = n_bytes + self.n_bytes.fetch_add(n_bytes, Ordering::Relaxed);
+        if limits.n_bytes.is_some_and(|most| n_bytes > most) {
+            self.is_full.notify_one();
+        }
+    }
+
+    fn fell_behind(&self, error: &Unavailable) {
+        let was_up_to_date = self.is_up_to_date();
+        self.n_refused.fetch_add(1, Ordering::AcqRel);
+        if was_up_to_date {
+            tracing::error!(%error, "clouds are kept in memory alone until the store takes them");
+        }
+    }
+}
+
+/// 503 where the store does not answer.
+pub fn unavailable(error: &Unavailable) -> Problem {
+    tracing::error!(%error, "the store does not answer");
+    Problem::unavailable("the store of clouds does not answer", SECONDS_UNTIL_BACK)
+}
+
+/// A cloud of the owner who was admitted, from memory or from the store.
+///
+/// # Errors
+/// 503 if the store does not answer, or there is no memory for the cloud.
+pub async fn find_cloud(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    id: CloudId,
+) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
+    let owner = admission.owner;
+    let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
+    if let Some(cloud) = app.clouds.get(owner, id).filter(|cloud| !cloud.is_trusted(TRUST)) {
+        match objects.cloud_bytes(&app.keys.name_of(owner), id).await {
+            Ok(None) => forget_in_memory(app, owner, id),
+            // It is served from memory while the store does not answer.
+            Ok(Some(_)) | Err(_) => cloud.trust(),
+        }
+    }
+    let (shared, admitted) = (app.clone(), admission.clone());
+    app.clouds.get_or_read(admission.owner, id, || read_cloud(shared, admitted, id)).await
+}
+
+async fn read_cloud(
+    app: Arc<App>,
+    admission: Arc<Admission>,
+    id: CloudId,
+) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
+    let Some(Durable { objects, .. }) = &app.durable else { return Ok(None) };
+    let (owner, name) = (admission.owner, app.keys.name_of(admission.owner));
+    let refused = |error: Unavailable| unavailable(&error);
+    let Some(n_bytes) = objects.cloud_bytes(&name, id).await.map_err(refused)? else { return Ok(None) };
+    // Its bytes, and the numbers that they become.
+    let n_reserved = usize::try_from(n_bytes).ok().and_then(|n| n.checked_mul(3)).unwrap_or(usize::MAX);
+    let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
+    if !app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
+        return Err(app.compute.out_of_memory());
+    }
+    let Some(bytes) = objects.get_cloud(&name, id).await.map_err(refused)? else { return Ok(None) };
+    let shared = app.clone();
+    let job = move |_: &JobObserver| {
+        let _memory = memory;
+        decode(id, &bytes).map(|cloud| shared.clouds.adopt(owner, cloud))
+    };
+    match app.compute.run(&admission, n_bytes as f64 * FLOPS_PER_BYTE, job).await?.0 {
+        Err(damaged) => {
+            objects.put_aside(&name, id, damaged).await;
+            Ok(None)
+        }
+        // Deleted while it was read: it must not come back.
+        Ok(_) if objects.cloud_bytes(&name, id).await.map_err(refused)?.is_none() => {
+            app.clouds.remove(owner, id);
+            Ok(None)
+        }
+        Ok(cloud) => Ok(Some(cloud)),
+    }
+}
+
+/// Writes clouds that are in memory alone. A store that does not take them is reported, and offered them again: they are served from memory
+/// meanwhile.
+pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredCloud>]) {
+    for cloud in clouds {
+        keep(app, owner, cloud).await;
+    }
+}
+
+/// The same of one; says whether it is new to the store, or there is none.
+pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
+    let Some(Durable { objects, .. }) = &app.durable else { return true };
+    // An answer says that it is there: also if another process has deleted it meanwhile.
+    if cloud.is_durable()
+        && !matches!(objects.cloud_bytes(&app.keys.name_of(owner), cloud.id).await, Ok(None))
+    {
+        cloud.trust();
+        return true;
+    }
+    let (shared, kept) = (app.clone(), cloud.clone());
+    app.clouds.write(owner, cloud.id, || write_cloud(shared, owner, kept)).await
+}
+
+async fn write_cloud(app: Arc<App>, owner: Owner, cloud: Arc<RegisteredCloud>) -> bool {
+    let Some(durable) = &app.durable else { return true };
+    let (encoded, named) = (cloud.clone(), (cloud.id, cloud.created_at()));
+    let Ok(pieces) = app.compute.run_small(owner, move || encode(&encoded)).await else { return true };
+    let n_bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+    match durable.objects.put_cloud(&app.keys.name_of(owner), named, pieces).await {
+        Ok(Written::Now) => {
+            cloud.set_durable(None);
+            durable.grew_by(n_bytes, app.config.retention());
+            true
+        }
+        Ok(Written::Before(since)) => {
+            cloud.set_durable(Some(since));
+            false
+        }
+        Err(error) => {
+            durable.fell_behind(&error);
+            true
+        }
+    }
+}
+
+/// The clouds of the owner who was admitted behind a place of the list, in its order and no more than `limit` of them, those in memory with what
+/// is known of them; and whether they are the last.
+///
+/// # Errors
+/// 503 if the store does not answer.
+pub async fn list_clouds(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    after: Option<Listed>,
+    limit: usize,
+) -> Result<(Vec<(Listed, Option<Arc<RegisteredCloud>>)>, bool), Problem> {
+    let owner = admission.owner;
+    let stored = match &app.durable {
+        None => Vec::new(),
+        Some(Durable { objects, .. }) => {
+            objects.list(&app.keys.name_of(owner), after).await.map_err(|error| unavailable(&error))?
+        }
+    };
+    let shared = app.clone();
+    // Nothing is computed: it only takes longer than an async worker may be held.
+    let job = move |_: &JobObserver| {
+        let mut all: BTreeMap<Listed, Option<Arc<RegisteredCloud>>> =
+            stored.into_iter().map(|listed| (listed, None)).collect();
+        // What is in memory alone is there as well; what was in the store and is no longer is nowhere.
+        let in_store: HashSet<CloudId> = all.keys().map(|listed| listed.id).collect();
+        let is_there = |cloud: &Arc<RegisteredCloud>| !cloud.is_durable() || in_store.contains(&cloud.id);
+        for cloud in shared.clouds.list(owner).into_iter().filter(is_there) {
+            let listed = Listed { created_at: cloud.created_at(), id: cloud.id };
+            if after.is_none_or(|last| listed > last) {
+                all.insert(listed, Some(cloud));
+            }
+        }
+        let is_last = all.len() <= limit;
+        (all.into_iter().take(limit).collect(), is_last)
+    };
+    Ok(app.compute.run(admission, 0.0, job).await?.0)
+}
+
+/// Forgets a cloud wherever it is; says whether it was anywhere.
+///
+/// # Errors
+/// 503 if the store does not answer: nothing is forgotten then.
+pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
+    let was_stored = match &app.durable {
+        None => false,
+        Some(Durable { objects, .. }) => {
+            objects.delete_cloud(&app.keys.name_of(owner), id).await.map_err(|error| unavailable(&error))?
+        }
+    };
+    let was_kept = app.clouds.get(owner, id).is_some();
+    forget_in_memory(app, owner, id);
+    Ok(was_stored || was_kept)
+}
+
+fn forget_in_memory(app: &App, owner: Owner, id: CloudId) {
+    app.clouds.remove(owner, id);
+    app.prepared.forget_cloud(owner, id);
+    app.learned.forget_cloud(owner, id);
+}
+
+/// Lets go of what the store is not to keep, for as long as the process lives.
+pub async fn retain(app: Arc<App>) {
+    let Some(durable) = &app.durable else { return };
+    let mut ticks = tokio::time::interval(SWEEPING);
+    loop {
+        tokio::select! {
+            _ = ticks.tick() => {}
+            () = durable.is_full.notified() => {}
+        }
+        match durable.objects.sweep(app.config.retention(), SystemTime::now()).await {
+            Err(error) => tracing::error!(%error, "clouds are not let go"),
+            Ok(Swept { n_clouds, n_bytes, n_factor_bytes, gone }) => {
+                durable.n_factor_bytes.store(n_factor_bytes, Ordering::Relaxed);
+                durable.n_clouds.store(n_clouds, Ordering::Relaxed);
+                durable.n_bytes.store(n_bytes, Ordering::Relaxed);
+                if !gone.is_empty() {
+                    tracing::info!(n_gone = gone.len(), n_clouds, n_bytes, "clouds were let go");
+                }
+                for (owner, id) in gone {
+                    if let Some(owner) = app.keys.owner_named(&owner) {
+                        forget_in_memory(&app, owner, id);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Offers what the store has not taken to it again, for as long as the process lives.
+pub async fn catch_up(app: Arc<App>) {
+    let Some(durable) = &app.durable else { return };
+    let mut ticks = tokio::time::interval(Duration::from_secs(SECONDS_UNTIL_BACK));
+    loop {
+        ticks.tick().await;
+        if durable.is_up_to_date() {
+            continue;
+        }
+        let n_refused = durable.n_refused.load(Ordering::Acquire);
+        for owner in app.keys.owners() {
+            keep_all(&app, owner, &app.clouds.list(owner)).await;
+        }
+        // What was refused meanwhile has its turn next time.
+        durable.n_made_up.store(n_refused, Ordering::Release);
+        if durable.is_up_to_date() {
+            tracing::info!("the store has taken all clouds");
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! A cloud as the bytes of an object.
+//!
+//! ```text
+//! head     "gramian cloud 1\n"                      16 bytes
+//!          created_at  n  d  has_normals  n_duplicates   u64 each; nanoseconds since 1970
+//!          least, greatest value of each coordinate      2 d f64
+//!          BLAKE3 of the head so far                32 bytes
+//! points   n d f64, row by row
+//! normals  n d f64, if there are any
+//! BLAKE3 of points and normals                      32 bytes
+//! ```
+//!
+//! Numbers are little-endian. The head has a hash of its own so that a list of clouds needs no points. What is read is what was
+//! written, or refused: hashes, lengths, and the cloud's own name, which is the hash of its points.
+
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use bytes::Bytes;
+
+use super::Damaged;
+use crate::numerics::points::cloud::Cloud;
+use crate::store::clouds::RegisteredCloud;
+use crate::store::key::CloudId;
+
+const MAGIC: &[u8; 16] = b"gramian cloud 1\n";
+const N_COUNTS: usize = 5;
+const HASH_BYTES: usize = 32;
+/// Where the number of coordinates stands.
+const DIMENSION_AT: usize = MAGIC.len() + 16;
+
+/// What a list of clouds says of each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CloudHead {
+    pub created_at: SystemTime,
+    pub n_points: usize,
+    pub dimension: usize,
+    pub has_normals: bool,
+    pub n_duplicates: usize,
+    /// The least and the greatest value of each coordinate.
+    pub bounding_box: (Vec<f64>, Vec<f64>),
+}
+
+/// Bytes that a head has for points of so many coordinates.
+fn head_bytes(dimension: usize) -> usize {
+    MAGIC.len() + 8 * (N_COUNTS + 2 * dimension) + HASH_BYTES
+}
+
+/// Bytes that a head has by its own account, which may be wrong; 0 where it is none.
+pub(super) fn head_bytes_of(bytes: &[u8]) -> u64 {
+    let dimension = bytes.get(DIMENSION_AT..DIMENSION_AT + 8).and_then(|word| word.try_into().ok());
+    let dimension = dimension.map_or(0, u64::from_le_bytes).min(1 << 30);
+    head_bytes(dimension as usize) as u64
+}
+
+/// Bytes of the object of a cloud.
+fn object_bytes(head: &CloudHead) -> Option<usize> {
+    let lists = if head.has_normals { 2 } else { 1 };
+    let numbers = head.n_points.checked_mul(head.dimension)?.checked_mul(8 * lists)?;
+    numbers.checked_add(head_bytes(head.dimension))?.checked_add(HASH_BYTES)
+}
+
+impl CloudHead {
+    pub fn of(cloud: &RegisteredCloud) -> Self {
+        Self {
+            created_at: cloud.created_at(),
+            n_points: cloud.cloud.n_points(),
+            dimension: cloud.cloud.dimension(),
+            has_normals: cloud.normals.is_some(),
+            n_duplicates: cloud.n_duplicates,
+            bounding_box: cloud.bounding_box.clone(),
+        }
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        let since_epoch = self.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let counts = [
+            u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX),
+            self.n_points as u64,
+            self.dimension as u64,
+            u64::from(self.has_normals),
+            self.n_duplicates as u64,
+        ];
+        counts.iter().for_each(|count| bytes.extend(count.to_le_bytes()));
+        let (least, greatest) = &self.bounding_box;
+        least.iter().chain(greatest).for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend(blake3::hash(&bytes).as_bytes());
+        bytes
+    }
+
+    /// Reads the head of an object from as many of its first bytes as there are.
+    ///
+    /// # Errors
+    /// [`Damaged`] for what is no head, or not as it was written.
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, Damaged> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or(Damaged("its first bytes are those of no cloud"))?;
+        let counts = rest.get(..8 * N_COUNTS).ok_or(CUT)?;
+        let mut counts =
+            counts.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
+        let mut next = || counts.next().unwrap_or_default();
+        let (nanoseconds, n_points, dimension, has_normals, n_duplicates) =
+            (next(), next(), next(), next(), next());
+        let count = |x: u64| usize::try_from(x).map_err(|_| Damaged("a number is beyond this machine"));
+        let (n_points, dimension) = (count(n_points)?, count(dimension)?);
+        // Before anything is made of it: the hash.
+        if dimension > bytes.len() {
+            return Err(CUT);
+        }
+        let head = bytes.get(..head_bytes(dimension)).ok_or(CUT)?;
+        let (head, hash) = head.split_at(head.len() - HASH_BYTES);
+        if blake3::hash(head).as_bytes() != hash {
+            return Err(OTHER);
+        }
+        let box_of = floats(&head[MAGIC.len() + 8 * N_COUNTS..]);
+        let (least, greatest) = box_of.split_at(dimension);
+        Ok(Self {
+            created_at: SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds),
+            n_points,
+            dimension,
+            has_normals: has_normals != 0,
+            n_duplicates: count(n_duplicates)?,
+            bounding_box: (least.to_vec(), greatest.to_vec()),
+        })
+    }
+}
+
+const CUT: Damaged = Damaged("it ends too early");
+const OTHER: Damaged = Damaged("its bytes are not those that were written");
+
+/// The object of a cloud, in pieces. Its numbers are those of the cloud, not copies.
+pub fn encode(cloud: &Arc<RegisteredCloud>) -> Vec<Bytes> {
+    let head = CloudHead::of(cloud).encode();
+    let points = Numbers { cloud: cloud.clone(), of_normals: false };
+    let normals = cloud.normals.is_some().then(|| Numbers { cloud: cloud.clone(), of_normals: true });
+    let mut hasher = blake3::Hasher::new();
+    let mut pieces = vec![Bytes::from(head)];
+    for numbers in [Some(points), normals].into_iter().flatten() {
+        let piece = numbers.into_bytes();
+        hasher.update(&piece);
+        pieces.push(piece);
+    }
+    pieces.push(Bytes::copy_from_slice(hasher.finalize().as_bytes()));
+    pieces
+}
+
+/// The numbers of a cloud, for as long as they are written.
+struct Numbers {
+    cloud: Arc<RegisteredCloud>,
+    of_normals: bool,
+}
+
+impl Numbers {
+    fn floats(&self) -> &[f64] {
+        match (&self.cloud.normals, self.of_normals) {
+            (Some(normals), true) => normals.coordinates(),
+            (None, true) => &[],
+            (_, false) => self.cloud.cloud.coordinates(),
+        }
+    }
+
+    fn into_bytes(self) -> Bytes {
+        match cfg!(target_endian = "little") {
+            true => Bytes::from_owner(self),
+            false => self.floats().iter().flat_map(|x| x.to_le_bytes()).collect(),
+        }
+    }
+}
+
+impl AsRef<[u8]> for Numbers {
+    fn as_ref(&self) -> &[u8] {
+        bytemuck::cast_slice(self.floats())
+    }
+}
+
+/// Reads the cloud `id` from its object.
+///
+/// # Errors
+/// [`Damaged`] unless it is whole and as it was written.
+pub fn decode(id: CloudId, bytes: &[u8]) -> Result<RegisteredCloud, Damaged> {
+    let head = CloudHead::decode(bytes)?;
+    if object_bytes(&head) != Some(bytes.len()) {
+        return Err(CUT);
+    }
+    let (rest, hash) = bytes.split_at(bytes.len() - HASH_BYTES);
+    let numbers = &rest[head_bytes(head.dimension)..];
+    if blake3::hash(numbers).as_bytes() != hash {
+        return Err(OTHER);
+    }
+    let (points, normals) = numbers.split_at(8 * head.n_points * head.dimension);
+    let cloud_of = |bytes: &[u8]| {
+        Cloud::new(floats(bytes), head.dimension).map_err(|_| Damaged("its numbers are no cloud"))
+    };
+    let cloud = cloud_of(points)?;
+    let normals = head.has_normals.then(|| cloud_of(normals)).transpose()?;
+    if CloudId::of(&cloud, normals.as_ref()) != id {
+        return Err(Damaged("it is another cloud than its name says"));
+    }
+    Ok(RegisteredCloud::restored(id, cloud, normals, head))
+}
+
+fn floats(bytes: &[u8]) -> Vec<f64> {
+    bytes.chunks_exact(8).map(|word| f64::from_le_bytes(word.try_into().unwrap_or_default())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Owner;
+    use crate::store::clouds::CloudStore;
+
+    fn registered(with_normals: bool) -> Arc<RegisteredCloud> {
+        let cloud = Cloud::new(vec![-0.0, 1.5, 2.0, -3.0, 2.0, -3.0], 2).unwrap();
+        let normals = with_normals.then(|| Cloud::new(vec![1.0, 0.0, 0.0, 2.0, 1.0, 1.0], 2).unwrap());
+        CloudStore::<()>::new(1 << 20).register(Owner(0), cloud, normals).0
+    }
+
+    #[test]
+    fn a_cloud_is_read_as_it_was_written() {
+        for with_normals in [false, true] {
+            let cloud = registered(with_normals);
+            let bytes = encode(&cloud).concat();
+            let found = decode(cloud.id, &bytes).unwrap();
+            assert_eq!(found.cloud.coordinates(), cloud.cloud.coordinates());
+            assert_eq!(
+                found.normals.as_ref().map(Cloud::coordinates),
+                cloud.normals.as_ref().map(Cloud::coordinates)
+            );
+            assert_eq!((found.n_duplicates, found.created_at()), (1, cloud.created_at()));
+            assert_eq!(found.bounding_box, cloud.bounding_box);
+            assert_eq!(CloudHead::decode(&bytes[..head_bytes(2)]), Ok(CloudHead::of(&cloud)));
+        }
+    }
+
+    #[test]
+    fn every_other_byte_and_every_other_length_is_refused() {
+        let cloud = registered(true);
+        let bytes = encode(&cloud).concat();
+        for at in 0..bytes.len() {
+            for bit in [0, 7] {
+                let mut other = bytes.clone();
+                other[at] ^= 1 << bit;
+                assert!(decode(cloud.id, &other).is_err(), "byte {at}");
+            }
+            assert!(decode(cloud.id, &bytes[..at]).is_err(), "the first {at}");
+        }
+        assert!(decode(cloud.id, &[&bytes[..], &[0]].concat()).is_err());
+        let name = registered(false).id;
+        assert_eq!(decode(name, &bytes).err(), Some(Damaged("it is another cloud than its name says")));
+    }
+}

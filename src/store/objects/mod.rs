@@ -1,0 +1,333 @@
+//! What outlives the process: clouds as objects in a directory or in object storage.
+//!
+//! NAMES. `<owner>/clouds/<cloud id>` is a cloud. `<owner>/listed/<nanoseconds since 1970, 20 digits>-<cloud id>` is empty and says by its
+//! name when the cloud was registered: lists are in that order, and need no object of a cloud but those that they show.
+//!
+//! WRITES are whole or not at all: a file is written beside its name, flushed and then renamed; a bucket has an object when all of it has come. A
+//! cloud is written once: whoever comes second finds it. It is listed after it is there, and gone from the list before it goes.
+//!
+//! FACTORS are under `<owner>/factors/`, see factors.rs, and go with their clouds.
+//!
+//! JOBS are under `<owner>/jobs/`: see jobs.rs.
+//!
+//! READS are of what was written, or of nothing: see cloud_object.rs. What is damaged is put aside, under `damaged/`, and reported; it is not there
+//! any more then, and can be posted again.
+//!
+//! WHAT GOES. Clouds beyond an age or a number of bytes: see retention.rs.
+
+pub mod cloud_object;
+pub mod factors;
+pub mod jobs;
+mod place;
+mod retention;
+mod tally;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
+
+use bytes::Bytes;
+use futures_util::{StreamExt, TryStreamExt};
+use object_store::path::Path;
+use object_store::{
+    Error, GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload,
+};
+use uuid::Uuid;
+
+use super::key::CloudId;
+use cloud_object::CloudHead;
+pub use place::Place;
+pub use retention::{Retention, Swept};
+pub use tally::{Tally, Verb};
+
+/// Why an object is not what was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Damaged(pub &'static str);
+
+/// Why the store does not answer.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("the store failed to {verb} {name}: {reason}")]
+pub struct Unavailable {
+    verb: Verb,
+    name: String,
+    reason: String,
+}
+
+/// How long a store may take to say whether it works, at the start.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Heads that are read at once.
+const HEADS_AT_ONCE: usize = 32;
+
+/// Bytes that the head of most clouds is within, and that of any.
+const FIRST_BYTES: u64 = 1024;
+const MAX_HEAD_BYTES: u64 = 1 << 20;
+
+/// The store behind all memory.
+pub struct Objects {
+    store: Arc<dyn ObjectStore>,
+    root: Path,
+    tally: Tally,
+    n_damaged: AtomicU64,
+}
+
+/// Whose objects are meant, by a name that outlives the order of keys in a configuration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OwnerName(pub String);
+
+/// A cloud in a list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Listed {
+    pub created_at: SystemTime,
+    pub id: CloudId,
+}
+
+/// What came of writing a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Written {
+    Now,
+    /// It was there, since then.
+    Before(SystemTime),
+}
+
+impl Objects {
+    /// Opens a place, and sees that it can be written to and read.
+    ///
+    /// # Errors
+    /// Says what is wrong with it.
+    pub async fn open(
+        place: &Place,
+        variables: impl IntoIterator<Item = (String, String)>,
+    ) -> Result<Self, String> {
+        let (store, root) = place.open(variables)?;
+        let objects = Self { store, root, tally: Tally::default(), n_damaged: AtomicU64::new(0) };
+        let name = objects.path(&["probe", &Uuid::now_v7().to_string()]);
+        let probe = async {
+            objects.store.put(&name, PutPayload::from_static(b"probe")).await?;
+            objects.store.get(&name).await?.bytes().await?;
+            objects.store.delete(&name).await
+        };
+        match tokio::time::timeout(PATIENCE, probe).await {
+            Ok(Ok(())) => Ok(objects),
+            Ok(Err(error)) => Err(format!("does not work: {error}")),
+            Err(_) => Err(format!("does not answer within {} s", PATIENCE.as_secs())),
+        }
+    }
+
+    /// A store in memory, as large as memory.
+    pub fn in_memory() -> Self {
+        let store = Arc::new(object_store::memory::InMemory::new());
+        Self { store, root: Path::default(), tally: Tally::default(), n_damaged: AtomicU64::new(0) }
+    }
+
+    /// What was asked of the store since the start.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Objects that were not what was written.
+    pub fn n_damaged(&self) -> u64 {
+        self.n_damaged.load(Ordering::Relaxed)
+    }
+
+    /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it is there, and lists it.
+    ///
+    /// # Errors
+    /// [`Unavailable`]: then it is not listed, but it may be there.
+    pub async fn put_cloud(
+        &self,
+        owner: &OwnerName,
+        (id, created_at): (CloudId, SystemTime),
+        pieces: Vec<Bytes>,
+    ) -> Result<Written, Unavailable> {
+        let name = self.cloud(owner, id);
+        let payload: PutPayload = pieces.into_iter().collect();
+        let created = PutOptions::from(PutMode::Create);
+        let written = match self.store.put_opts(&name, payload.clone(), created).await {
+            Ok(_) => Written::Now,
+            Err(Error::AlreadyExists { .. }) => match self.head(owner, id).await? {
+                Some(head) => Written::Before(head.created_at),
+                // It is damaged, or has gone meanwhile.
+                None => {
+                    self.put(&name, payload).await?;
+                    Written::Now
+                }
+            },
+            Err(error) => return Err(self.failed(Verb::Write, &name, error)),
+        };
+        let since = match written {
+            Written::Now => created_at,
+            Written::Before(since) => since,
+        };
+        self.put(&self.listed(owner, Listed { created_at: since, id }), PutPayload::default()).await?;
+        Ok(written)
+    }
+
+    /// How many bytes the object of a cloud has, if it is there.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn cloud_bytes(&self, owner: &OwnerName, id: CloudId) -> Result<Option<u64>, Unavailable> {
+        let name = self.cloud(owner, id);
+        let found = self.counted(Verb::Find, &name, self.store.head(&name).await)?;
+        Ok(found.map(|found| found.size))
+    }
+
+    /// The object of a cloud, if it is there: for [`cloud_object::decode`].
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn get_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<Option<Bytes>, Unavailable> {
+        let name = self.cloud(owner, id);
+        let found = async { self.store.get(&name).await?.bytes().await };
+        self.counted(Verb::Read, &name, found.await)
+    }
+
+    /// What lists say of a cloud, if it is there and whole as far as that.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn head(&self, owner: &OwnerName, id: CloudId) -> Result<Option<CloudHead>, Unavailable> {
+        let name = self.cloud(owner, id);
+        let Some(bytes) = self.first_bytes(&name).await? else { return Ok(None) };
+        match CloudHead::decode(&bytes) {
+            Ok(head) => Ok(Some(head)),
+            Err(damaged) => {
+                self.put_aside(owner, id, damaged).await;
+                Ok(None)
+            }
+        }
+    }
+
+    /// The heads of some clouds, without those that are gone or damaged.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn heads(
+        &self,
+        owner: &OwnerName,
+        ids: Vec<CloudId>,
+    ) -> Result<Vec<(CloudId, CloudHead)>, Unavailable> {
+        let heads = futures_util::stream::iter(ids)
+            .map(|id| async move { Ok(self.head(owner, id).await?.map(|head| (id, head))) })
+            .buffered(HEADS_AT_ONCE);
+        heads.try_filter_map(|found| async move { Ok(found) }).try_collect().await
+    }
+
+    /// The clouds of an owner behind a place of the list, in no order.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn list(&self, owner: &OwnerName, after: Option<Listed>) -> Result<Vec<Listed>, Unavailable> {
+        let folder = self.path(&[&owner.0, "listed"]);
+        let names = match after {
+            None => self.store.list(Some(&folder)),
+            Some(last) => self.store.list_with_offset(Some(&folder), &self.listed(owner, last)),
+        };
+        let names =
+            self.counted(Verb::List, &folder, names.try_collect::<Vec<_>>().await)?.unwrap_or_default();
+        Ok(names.iter().filter_map(|found| Listed::parse(found.location.filename()?)).collect())
+    }
+
+    /// Forgets a cloud; says whether it was there.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn delete_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<bool, Unavailable> {
+        let name = self.cloud(owner, id);
+        let head = self.head(owner, id).await?;
+        if let Some(CloudHead { created_at, .. }) = head {
+            self.delete(&self.listed(owner, Listed { created_at, id })).await?;
+        }
+        self.delete(&name).await?;
+        self.delete_factors(owner, id).await?;
+        Ok(head.is_some())
+    }
+
+    /// Puts aside what is not what was written.
+    pub async fn put_aside(&self, owner: &OwnerName, id: CloudId, damaged: Damaged) {
+        let (name, aside) = (self.cloud(owner, id), self.path(&[&owner.0, "damaged", &id.to_string()]));
+        self.n_damaged.fetch_add(1, Ordering::Relaxed);
+        let is_aside = self.store.rename(&name, &aside).await.is_ok();
+        tracing::error!(object = %name, reason = damaged.0, %aside, is_aside, "an object is damaged");
+    }
+
+    /// As many as a head has.
+    async fn first_bytes(&self, name: &Path) -> Result<Option<Bytes>, Unavailable> {
+        let mut n_bytes = FIRST_BYTES;
+        loop {
+            let options = GetOptions { range: Some(GetRange::Bounded(0..n_bytes)), ..GetOptions::default() };
+            let found = async { self.store.get_opts(name, options).await?.bytes().await };
+            let Some(bytes) = self.counted(Verb::Read, name, found.await)? else { return Ok(None) };
+            // Points of many coordinates have a long head.
+            let n_needed = cloud_object::head_bytes_of(&bytes).min(MAX_HEAD_BYTES);
+            if n_needed <= n_bytes {
+                return Ok(Some(bytes));
+            }
+            n_bytes = n_needed;
+        }
+    }
+
+    /// Says whether it was there, as far as the store tells: buckets do not.
+    async fn delete(&self, name: &Path) -> Result<bool, Unavailable> {
+        Ok(self.counted(Verb::Delete, name, self.store.delete(name).await)?.is_some())
+    }
+
+    async fn put(&self, name: &Path, payload: PutPayload) -> Result<(), Unavailable> {
+        let written = self.store.put(name, payload).await;
+        written
+            .map(|_| self.tally.add(Verb::Write, true))
+            .map_err(|error| self.failed(Verb::Write, name, error))
+    }
+
+    /// What the store answered, nothing where there is no such object.
+    fn counted<T>(
+        &self,
+        verb: Verb,
+        name: &Path,
+        answer: Result<T, Error>,
+    ) -> Result<Option<T>, Unavailable> {
+        let found = match answer {
+            Ok(found) => Some(found),
+            Err(Error::NotFound { .. }) => None,
+            Err(error) => return Err(self.failed(verb, name, error)),
+        };
+        self.tally.add(verb, true);
+        Ok(found)
+    }
+
+    fn failed(&self, verb: Verb, name: &Path, error: Error) -> Unavailable {
+        self.tally.add(verb, false);
+        Unavailable { verb, name: name.to_string(), reason: error.to_string() }
+    }
+
+    fn path(&self, parts: &[&str]) -> Path {
+        self.root.parts().chain(parts.iter().map(|&part| part.into())).collect()
+    }
+
+    fn cloud(&self, owner: &OwnerName, id: CloudId) -> Path {
+        self.path(&[&owner.0, "clouds", &id.to_string()])
+    }
+
+    fn listed(&self, owner: &OwnerName, listed: Listed) -> Path {
+        self.path(&[&owner.0, "listed", &listed.to_string()])
+    }
+}
+
+impl Listed {
+    fn parse(name: &str) -> Option<Self> {
+        let (nanoseconds, id) = name.split_once('-')?;
+        let since_epoch = Duration::from_nanos(nanoseconds.parse().ok()?);
+        Some(Self { created_at: SystemTime::UNIX_EPOCH + since_epoch, id: CloudId::parse(id)? })
+    }
+}
+
+impl std::fmt::Display for Listed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let since_epoch = self.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        write!(f, "{:020}-{}", since_epoch.as_nanos(), self.id)
+    }
+}

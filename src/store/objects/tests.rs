@@ -1,0 +1,161 @@
+use object_store::memory::InMemory;
+
+use super::*;
+use crate::numerics::points::cloud::Cloud;
+use crate::store::Owner;
+use crate::store::clouds::{CloudStore, RegisteredCloud};
+
+fn objects() -> Objects {
+    Objects {
+        store: Arc::new(InMemory::new()),
+        root: Path::from("some/prefix"),
+        tally: Tally::default(),
+        n_damaged: AtomicU64::new(0),
+    }
+}
+
+fn owner(name: &str) -> OwnerName {
+    OwnerName(name.to_owned())
+}
+
+fn registered(first: f64, dimension: usize) -> Arc<RegisteredCloud> {
+    let cloud = Cloud::new((0..2 * dimension).map(|i| first + i as f64).collect(), dimension).unwrap();
+    CloudStore::<()>::new(1 << 20).register(Owner(0), cloud, None).0
+}
+
+async fn put(objects: &Objects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>) -> Written {
+    let pieces = cloud_object::encode(cloud);
+    objects.put_cloud(owner, (cloud.id, cloud.created_at()), pieces).await.unwrap()
+}
+
+#[tokio::test]
+async fn clouds_are_written_once_read_listed_and_deleted() {
+    let (objects, owner) = (objects(), owner("one"));
+    let clouds: Vec<_> = (0..5).map(|k| registered(f64::from(k), 3)).collect();
+    for cloud in &clouds {
+        assert_eq!(put(&objects, &owner, cloud).await, Written::Now);
+    }
+    // The same points at another time are the cloud that is there.
+    let again = registered(2.0, 3);
+    assert_eq!(put(&objects, &owner, &again).await, Written::Before(clouds[2].created_at()));
+    let mut listed = objects.list(&owner, None).await.unwrap();
+    listed.sort();
+    let of = |cloud: &Arc<RegisteredCloud>| Listed { created_at: cloud.created_at(), id: cloud.id };
+    assert_eq!(listed, clouds.iter().map(of).collect::<Vec<_>>());
+    let mut behind = objects.list(&owner, Some(listed[1])).await.unwrap();
+    behind.sort();
+    assert_eq!(behind, listed[2..]);
+    let bytes = objects.get_cloud(&owner, clouds[3].id).await.unwrap().unwrap();
+    assert_eq!(objects.cloud_bytes(&owner, clouds[3].id).await.unwrap(), Some(bytes.len() as u64));
+    let read = cloud_object::decode(clouds[3].id, &bytes).unwrap();
+    assert_eq!(read.cloud.coordinates(), clouds[3].cloud.coordinates());
+    assert!(objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
+    assert!(!objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
+    assert_eq!(objects.get_cloud(&owner, clouds[3].id).await.unwrap(), None);
+    assert_eq!(objects.list(&owner, None).await.unwrap().len(), 4);
+    let ids = clouds.iter().map(|cloud| cloud.id).collect();
+    assert_eq!(objects.heads(&owner, ids).await.unwrap().len(), 4);
+    assert_eq!(objects.n_damaged(), 0);
+    assert!(Verb::ALL.into_iter().all(|verb| objects.tally().of(verb)[1] == 0));
+    // Three of clouds, and one of factors with each deletion.
+    assert_eq!(objects.tally().of(Verb::List), [5, 0]);
+}
+
+#[tokio::test]
+async fn owners_see_nothing_of_each_other() {
+    let objects = objects();
+    let cloud = registered(0.0, 2);
+    put(&objects, &owner("one"), &cloud).await;
+    let other = owner("two");
+    assert_eq!(objects.get_cloud(&other, cloud.id).await.unwrap(), None);
+    assert!(objects.list(&other, None).await.unwrap().is_empty());
+    assert!(!objects.delete_cloud(&other, cloud.id).await.unwrap());
+    assert!(objects.head(&owner("one"), cloud.id).await.unwrap().is_some());
+}
+
+#[tokio::test]
+async fn heads_of_many_coordinates_are_read_whole() {
+    let (objects, owner) = (objects(), owner("one"));
+    let cloud = registered(0.5, 300);
+    put(&objects, &owner, &cloud).await;
+    let head = objects.head(&owner, cloud.id).await.unwrap().unwrap();
+    assert_eq!((head.dimension, head.n_points), (300, 2));
+    assert_eq!(head.bounding_box, cloud.bounding_box);
+}
+
+#[tokio::test]
+async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
+    let (objects, owner) = (objects(), owner("one"));
+    let cloud = registered(0.0, 2);
+    put(&objects, &owner, &cloud).await;
+    let name = objects.cloud(&owner, cloud.id);
+    objects.store.put(&name, PutPayload::from_static(b"gramian cloud 1\nand nothing else")).await.unwrap();
+    assert_eq!(objects.head(&owner, cloud.id).await.unwrap(), None);
+    assert_eq!((objects.n_damaged(), objects.get_cloud(&owner, cloud.id).await.unwrap()), (1, None));
+    assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
+    // Also where it is found on writing.
+    objects.store.put(&name, PutPayload::from_static(b"something else")).await.unwrap();
+    assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
+    let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
+    assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
+}
+
+#[tokio::test]
+async fn the_oldest_clouds_go_by_age_and_by_bytes() {
+    let (objects, one, two) = (objects(), owner("one"), owner("two"));
+    let now = SystemTime::now();
+    let clouds: Vec<_> = (0..6).map(|k| registered(f64::from(k), 3)).collect();
+    let mut n_bytes = 0;
+    for (k, cloud) in clouds.iter().enumerate() {
+        // A day between two of them, of two owners in turn; the last one is of today.
+        let since = now - Duration::from_secs(86400 * (5 - k as u64));
+        cloud.set_durable(Some(since));
+        let pieces = cloud_object::encode(cloud);
+        n_bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+        objects.put_cloud([&one, &two][k % 2], (cloud.id, since), pieces).await.unwrap();
+    }
+    let none = Retention::default();
+    let all = objects.sweep(none, now).await.unwrap();
+    assert_eq!(all, Swept { n_clouds: 6, n_bytes: 6 * n_bytes, n_factor_bytes: 0, gone: Vec::new() });
+    let days =
+        Retention { age: Some(Duration::from_secs(86400 * 4 + 3600)), n_bytes: None, n_factor_bytes: 0 };
+    let swept = objects.sweep(days, now).await.unwrap();
+    assert_eq!(swept.gone, [(one.clone(), clouds[0].id)]);
+    let bytes = Retention { age: None, n_bytes: Some(3 * n_bytes), n_factor_bytes: 0 };
+    let swept = objects.sweep(bytes, now).await.unwrap();
+    assert_eq!(swept.gone, [(two.clone(), clouds[1].id), (one.clone(), clouds[2].id)]);
+    assert_eq!((swept.n_clouds, swept.n_bytes), (3, 3 * n_bytes));
+    assert!(objects.get_cloud(&one, clouds[2].id).await.unwrap().is_none());
+    assert_eq!(objects.list(&one, None).await.unwrap().len(), 1);
+    assert_eq!(objects.list(&two, None).await.unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn what_is_half_written_or_half_deleted_is_put_in_order() {
+    let (objects, owner) = (objects(), owner("one"));
+    let (unlisted, gone) = (registered(0.0, 2), registered(1.0, 2));
+    for cloud in [&unlisted, &gone] {
+        put(&objects, &owner, cloud).await;
+    }
+    let listed = |cloud: &RegisteredCloud| {
+        objects.listed(&owner, Listed { created_at: cloud.created_at(), id: cloud.id })
+    };
+    objects.store.delete(&listed(&unlisted)).await.unwrap();
+    objects.store.delete(&objects.cloud(&owner, gone.id)).await.unwrap();
+    let now = SystemTime::now();
+    assert_eq!(objects.sweep(Retention::default(), now).await.unwrap().n_clouds, 1);
+    assert!(objects.list(&owner, None).await.unwrap().is_empty());
+    // What nobody lists is as old as its object.
+    let hour = Retention { age: Some(Duration::from_secs(3600)), n_bytes: None, n_factor_bytes: 0 };
+    assert!(objects.sweep(hour, now).await.unwrap().gone.is_empty());
+    let later = now + Duration::from_secs(7200);
+    assert_eq!(objects.sweep(hour, later).await.unwrap().gone, [(owner.clone(), unlisted.id)]);
+    // What was damaged goes after a week.
+    put(&objects, &owner, &gone).await;
+    objects.put_aside(&owner, gone.id, Damaged("for the test")).await;
+    let aside = objects.path(&["one", "damaged", &gone.id.to_string()]);
+    for (days, is_there) in [(6, true), (8, false)] {
+        objects.sweep(Retention::default(), now + Duration::from_secs(86400 * days)).await.unwrap();
+        assert_eq!(objects.store.head(&aside).await.is_ok(), is_there);
+    }
+}

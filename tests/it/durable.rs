@@ -1,0 +1,372 @@
+//! Clouds that outlive the process.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::common::random::Random;
+use crate::process::Process;
+use crate::support::{fibonacci_sphere, receive};
+
+/// A folder that goes with the test.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("gramian-{name}-{}", std::process::id()));
+        fs::remove_dir_all(&path).ok();
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    pub fn flags(&self) -> [&str; 2] {
+        ["--store", self.0.to_str().unwrap()]
+    }
+
+    /// Files below, by the last part of their names.
+    fn files(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        let mut folders = vec![self.0.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() { folders.push(path) } else { files.push(path) }
+            }
+        }
+        files
+    }
+
+    fn object(&self, id: &str) -> PathBuf {
+        let is_meant = |path: &Path| path.file_name().is_some_and(|name| name == id);
+        self.files().into_iter().find(|path| is_meant(path)).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+fn points(shift: f64, n: usize) -> Value {
+    let moved = |x: &[f64; 3]| [x[0] + shift, x[1], x[2]];
+    json!(fibonacci_sphere(n).iter().map(moved).collect::<Vec<_>>())
+}
+
+async fn post(process: &Process, path: &str, body: &Value) -> (u16, Value) {
+    let client = reqwest::Client::new();
+    let answer = receive(client.post(process.url(path)).json(body)).await;
+    (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
+}
+
+async fn get(process: &Process, path: &str) -> (u16, Value) {
+    let answer = receive(reqwest::Client::new().get(process.url(path))).await;
+    (answer.status, serde_json::from_slice(&answer.bytes).unwrap())
+}
+
+fn kill(mut process: Process) {
+    process.child.kill().unwrap();
+    process.child.wait().unwrap();
+}
+
+#[tokio::test]
+async fn clouds_are_there_after_the_process_was_killed() {
+    let folder = Folder::new("killed");
+    let process = Process::start(&folder.flags());
+    let (status, first) =
+        post(&process, "/v1/clouds", &json!({"points": points(0.0, 50), "normals": points(0.0, 50)})).await;
+    assert_eq!(status, 201);
+    // Points in a request are registered as well.
+    let values: Vec<f64> = (0..40).map(f64::from).collect();
+    let body = json!({"cloud": {"points": points(1.0, 40)}, "values": values, "kernel": {"family": "gauss"}});
+    let (status, answer) = post(&process, "/v1/interpolation", &body).await;
+    assert_eq!(status, 200);
+    let inline = answer["diagnostics"]["cloud_id"].as_str().unwrap().to_owned();
+    kill(process);
+
+    let process = Process::start(&folder.flags());
+    let id = first["cloud_id"].as_str().unwrap();
+    let (_, list) = get(&process, "/v1/clouds").await;
+    let listed: Vec<&Value> =
+        list["clouds"].as_array().unwrap().iter().map(|cloud| &cloud["cloud_id"]).collect();
+    assert_eq!(listed, [&json!(id), &json!(inline)]);
+    assert_eq!(list["clouds"][0]["created_at"], first["created_at"]);
+    let (status, again) = get(&process, &format!("/v1/clouds/{id}")).await;
+    assert_eq!((status, &again), (200, &first));
+    let by_id = json!({"cloud": {"id": inline}, "values": values, "kernel": {"family": "gauss"}});
+    let (status, other) = post(&process, "/v1/interpolation", &by_id).await;
+    assert_eq!((status, &other["values"]), (200, &answer["values"]));
+    // The same points are known, by whoever and whenever they come.
+    let (status, known) = post(&process, "/v1/clouds", &json!({"points": points(1.0, 40)})).await;
+    assert_eq!((status, &known["cloud_id"]), (200, &json!(inline)));
+    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    assert_eq!(deleted.status, 204);
+    kill(process);
+
+    let process = Process::start(&folder.flags());
+    assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 404);
+    assert!(!folder.files().iter().any(|path| path.to_str().unwrap().contains(id)), "{:?}", folder.files());
+}
+
+#[tokio::test]
+async fn no_moment_to_be_killed_at_loses_what_was_acknowledged() {
+    let folder = Folder::new("moments");
+    let mut random = Random(1);
+    let mut acknowledged: Vec<(String, Value)> = Vec::new();
+    for moment in 0..100 {
+        let process = Process::start(&folder.flags());
+        // One of the earlier ones, whole and right.
+        if let Some((id, points)) = acknowledged.get((random.uniform() * acknowledged.len() as f64) as usize)
+        {
+            let n = points.as_array().unwrap().len();
+            let body = json!({"cloud": {"id": id}, "values": vec![1.0; n], "kernel": {"family": "gauss"}});
+            let (status, by_id) = post(&process, "/v1/interpolation", &body).await;
+            assert_eq!(status, 200, "{moment}: {by_id}");
+            assert_eq!(by_id["diagnostics"]["cloud_id"], json!(id));
+        }
+        let url = process.url("/v1/clouds");
+        let mut posting = tokio::spawn(async move {
+            let mut done = Vec::new();
+            for k in 0..40 {
+                let points = points(f64::from(100 * moment + k), 60);
+                let request = reqwest::Client::new().post(&url).json(&json!({"points": points}));
+                let Ok(answer) = request.send().await else { break };
+                let Ok(text) = answer.text().await else { break };
+                let Ok(cloud) = serde_json::from_str::<Value>(&text) else { break };
+                done.push((cloud["cloud_id"].as_str().unwrap().to_owned(), points));
+            }
+            done
+        });
+        let until = std::time::Duration::from_micros((random.uniform() * 60e3) as u64);
+        let in_time = tokio::time::timeout(until, &mut posting).await;
+        kill(process);
+        let done = match in_time {
+            Ok(done) => done,
+            Err(_) => posting.await,
+        };
+        acknowledged.extend(done.unwrap());
+    }
+    println!("{} clouds were acknowledged before 100 ends", acknowledged.len());
+    assert!(acknowledged.len() > 100, "{}", acknowledged.len());
+    let process = Process::start(&folder.flags());
+    let (mut listed, mut cursor) = (Vec::new(), String::new());
+    loop {
+        let (_, page) = get(&process, &format!("/v1/clouds?limit=1000{cursor}")).await;
+        listed.extend(
+            page["clouds"].as_array().unwrap().iter().map(|c| c["cloud_id"].as_str().unwrap().to_owned()),
+        );
+        let Some(next) = page["next"].as_str() else { break };
+        cursor = format!("&cursor={next}");
+    }
+    for (id, _) in &acknowledged {
+        assert!(listed.contains(id), "{id} is lost");
+    }
+}
+
+/// A request whose factor is worth keeping.
+fn large_fit() -> Value {
+    let kernel = json!({"family": "matern", "length_scale": 0.3});
+    let values: Vec<f64> = (0..4000).map(|i| f64::from(i).sin()).collect();
+    json!({"cloud": {"points": points(0.0, 4000)}, "values": values, "kernel": kernel, "alpha": 1e-6})
+}
+
+/// How many solvers of a kind a process has made ready, and how many objects it found damaged.
+async fn counts(process: &Process, kind: &str) -> (String, String) {
+    let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await;
+    let text = String::from_utf8(metrics.bytes).unwrap();
+    let value = |name: &str| {
+        let line = text.lines().find(|line| line.starts_with(name)).unwrap();
+        line.rsplit_once(' ').unwrap().1.to_owned()
+    };
+    let of_kind = format!("gramian_solvers_prepared_total{{kind=\"{kind}\"}}");
+    (value(&of_kind), value("gramian_store_damaged_total"))
+}
+
+#[tokio::test]
+async fn a_factor_is_read_instead_of_made_again() {
+    let folder = Folder::new("factors");
+    let factors = || {
+        let is_factor = |path: &PathBuf| path.to_str().unwrap().contains("/factors/");
+        // What is being written has another name.
+        let is_whole = |path: &PathBuf| !path.to_str().unwrap().contains('#');
+        folder.files().into_iter().filter(|path| is_factor(path) && is_whole(path)).collect::<Vec<_>>()
+    };
+    let wait_for_factor = async || {
+        while factors().is_empty() {
+            tokio::task::yield_now().await;
+        }
+    };
+    let process = Process::start(&folder.flags());
+    let (status, first) = post(&process, "/v1/interpolation", &large_fit()).await;
+    assert_eq!((status, counts(&process, "dense").await.0.as_str()), (200, "1"));
+    wait_for_factor().await;
+    kill(process);
+
+    let began = std::time::Instant::now();
+    let process = Process::start(&folder.flags());
+    let (status, again) = post(&process, "/v1/interpolation", &large_fit()).await;
+    println!("answered from the store {:.3} s after the start", began.elapsed().as_secs_f64());
+    assert_eq!((status, &again), (200, &first), "to the last bit");
+    assert_eq!(counts(&process, "restored").await, ("1".to_owned(), "0".to_owned()));
+    kill(process);
+
+    // A byte of it is another one: it is made again, written again, and told.
+    let path = factors().pop().unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let process = Process::start(&folder.flags());
+    let (status, again) = post(&process, "/v1/interpolation", &large_fit()).await;
+    assert_eq!((status, &again), (200, &first));
+    assert_eq!(counts(&process, "dense").await, ("1".to_owned(), "1".to_owned()));
+    wait_for_factor().await;
+
+    let id = first["diagnostics"]["cloud_id"].as_str().unwrap();
+    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    assert_eq!((deleted.status, factors()), (204, vec![]));
+}
+
+#[tokio::test]
+async fn what_is_damaged_is_not_served() {
+    let folder = Folder::new("damaged");
+    let process = Process::start(&folder.flags());
+    let (_, cloud) = post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await;
+    let id = cloud["cloud_id"].as_str().unwrap();
+    kill(process);
+    let object = folder.object(id);
+    let mut bytes = fs::read(&object).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&object, bytes).unwrap();
+    let process = Process::start(&folder.flags());
+    let (status, problem) = get(&process, &format!("/v1/clouds/{id}")).await;
+    assert_eq!((status, &problem["type"]), (404, &json!("/problems/unknown-cloud")));
+    // It can be posted again.
+    assert_eq!(post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.0, 201);
+    assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
+    process.terminate();
+    let (_, log) = process.finish();
+    assert!(log.iter().any(|line| line.contains("an object is damaged") && line.contains(id)), "{log:?}");
+}
+
+#[tokio::test]
+async fn a_store_that_takes_nothing_leaves_memory_and_catches_up() {
+    let folder = Folder::new("full");
+    let process = Process::start(&[&folder.flags()[..], &["--store-required", "true"]].concat());
+    // A file where a folder should be takes no file, whoever asks.
+    let owner = folder.0.join("everyone");
+    fs::write(&owner, b"").unwrap();
+    let (status, cloud) = post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await;
+    assert_eq!(status, 201);
+    let path = format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
+    assert_eq!(get(&process, &path).await.0, 200);
+    assert_eq!(get(&process, "/health/ready").await.0, 503);
+    fs::remove_file(&owner).unwrap();
+    while get(&process, "/health/ready").await.0 != 200 {
+        tokio::task::yield_now().await;
+    }
+    kill(process);
+    let process = Process::start(&folder.flags());
+    assert_eq!(get(&process, &path).await.0, 200);
+}
+
+#[tokio::test]
+async fn what_another_process_deletes_is_gone_and_can_be_posted_again() {
+    let folder = Folder::new("shared");
+    let [one, two] = [Process::start(&folder.flags()), Process::start(&folder.flags())];
+    let body = json!({"points": points(0.0, 30)});
+    let (_, cloud) = post(&one, "/v1/clouds", &body).await;
+    let path = format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
+    assert_eq!(get(&two, &path).await, (200, cloud));
+    let deleted = receive(reqwest::Client::new().delete(two.url(&path))).await;
+    assert_eq!((deleted.status, get(&two, &path).await.0), (204, 404));
+    // The first one has it in memory; its list is that of the store, and an acknowledgement is kept.
+    assert_eq!(get(&one, "/v1/clouds").await.1["clouds"], json!([]));
+    let (status, again) = post(&one, "/v1/clouds", &body).await;
+    assert_eq!((status, get(&two, &path).await), (200, (200, again)));
+    receive(reqwest::Client::new().delete(two.url(&path))).await;
+    // After ten seconds at most.
+    while get(&one, &path).await.0 == 200 {
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test]
+async fn a_store_that_is_full_lets_the_oldest_go() {
+    let folder = Folder::new("retention");
+    let flags = [&folder.flags()[..], &["--store-bytes", "8192"]].concat();
+    let process = Process::start(&flags);
+    // 30 points take 1 KB.
+    let mut ids = Vec::new();
+    for k in 0..20 {
+        let (status, cloud) =
+            post(&process, "/v1/clouds", &json!({"points": points(f64::from(k), 30)})).await;
+        assert_eq!(status, 201);
+        ids.push(cloud["cloud_id"].as_str().unwrap().to_owned());
+    }
+    let listed = || async {
+        let (_, list) = get(&process, "/v1/clouds").await;
+        let clouds = list["clouds"].as_array().unwrap();
+        clouds.iter().map(|cloud| cloud["cloud_id"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    while listed().await.len() > 9 {
+        tokio::task::yield_now().await;
+    }
+    let left = listed().await;
+    assert!(left.len() >= 5 && ids.ends_with(&left), "{} are left", left.len());
+    // Also from memory.
+    assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[0])).await.0, 404);
+    assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[19])).await.0, 200);
+}
+
+/// Copies of one cloud under other names: their heads are whole, and nothing else is looked at before they are asked for.
+#[tokio::test]
+async fn ten_thousand_clouds_are_no_reason_to_be_late() {
+    let folder = Folder::new("many");
+    let process = Process::start(&folder.flags());
+    let (_, cloud) = post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await;
+    let id = cloud["cloud_id"].as_str().unwrap();
+    kill(process);
+    let object = folder.object(id);
+    let listed = folder.files().into_iter().find(|path| path.to_str().unwrap().contains("listed")).unwrap();
+    for k in 0..10_000 {
+        let other = blake3::hash(&u64::to_le_bytes(k)).to_hex();
+        fs::hard_link(&object, object.with_file_name(other.as_str())).unwrap();
+        fs::write(listed.with_file_name(format!("{:020}-{other}", 1_700_000_000_000_000_000 + k)), b"")
+            .unwrap();
+    }
+    // To its first line of the log, and to its first answer.
+    let began = std::time::Instant::now();
+    let process = Process::start(&folder.flags());
+    assert_eq!(get(&process, "/health/ready").await.0, 200);
+    let took = began.elapsed();
+    println!("ready with 10,000 clouds after {:.3} s", took.as_secs_f64());
+    let began = std::time::Instant::now();
+    let bare = Process::start(&[]);
+    assert_eq!(get(&bare, "/health/ready").await.0, 200);
+    println!("with none after {:.3} s", began.elapsed().as_secs_f64());
+    // A second, as is asked, and a wide margin for a machine that is busy with other tests.
+    assert!(took < 4 * began.elapsed().max(std::time::Duration::from_millis(250)), "{took:?}");
+    let (_, page) = get(&process, "/v1/clouds?limit=1000").await;
+    assert_eq!(page["clouds"].as_array().unwrap().len(), 1000);
+    assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
+}
+
+#[test]
+fn a_place_that_does_not_work_ends_the_start() {
+    for place in ["/proc/nothing", "s3://", "http://example.org"] {
+        let mut command = crate::process::gramian();
+        let ended = command.args(["--bind", "127.0.0.1:0", "--store", place]).output().unwrap();
+        assert!(!ended.status.success());
+        assert!(
+            String::from_utf8_lossy(&ended.stderr).contains("GRAMIAN_STORE")
+                || String::from_utf8_lossy(&ended.stderr).contains("--store")
+        );
+    }
+}
