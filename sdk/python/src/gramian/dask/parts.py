@@ -1,0 +1,162 @@
+"""Points on their way from the blocks of an array to tiles, and the nearest ones across the sides of cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..tensors import Array
+from .cut import Cut, Ints
+from .thinning import distinct
+
+SLACK = 1 + 1e-9
+"""By how much more is taken than distances say, which are rounded."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some of the points of a cloud.
+
+    Attributes
+    ----------
+    index
+        `[n]`, ascending. Their rows in the cloud.
+    points
+        `[n, d]`, L.
+    values
+        `[n]`, V; None where there are none.
+    """
+
+    index: Ints
+    points: Array
+    values: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def __getitem__(self, rows: Ints) -> Part:
+        values = None if self.values is None else self.values[rows]
+        return Part(self.index[rows], self.points[rows], values)
+
+
+@dataclass(frozen=True)
+class Looking:
+    """Positions that may have neighbours beyond the sides of their cell: `points` `[n, d]` within `radii` `[n]`, L."""
+
+    points: Array
+    radii: Array
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Which neighbours count.
+
+    Attributes
+    ----------
+    count
+        How many of each position.
+    are_distinct
+        Whether points that coincide count once, by the first of them.
+    stretch
+        `[d]`. What coordinates are multiplied with before distances are taken; None for 1.
+    """
+
+    count: int
+    are_distinct: bool = True
+    stretch: tuple[float, ...] | None = None
+
+    @property
+    def factors(self) -> Array | None:
+        """The stretch as an array."""
+        return None if self.stretch is None else np.array(self.stretch)
+
+    def stretched(self, points: Array) -> Array:
+        """Returns points in the coordinates in which distances are taken."""
+        return points if self.stretch is None else points * np.array(self.stretch)
+
+    def candidates(self, part: Part) -> Part:
+        """Returns the points that count."""
+        return part[distinct(part.points)] if self.are_distinct else part
+
+
+def checked(block: Array, first: int) -> Array:
+    """Returns a block as float64, row by row.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    block = np.ascontiguousarray(block, dtype=np.float64)
+    if not np.isfinite(block).all():
+        row, axis = np.argwhere(~np.isfinite(block))[0].tolist()
+        raise ValueError(f"points[{first + row}, {axis}] is {block[row, axis]}, and only finite numbers can be sent")
+    return block
+
+
+def split(block: Array, first: int, cut: Cut, values: Array | None = None) -> list[Part]:
+    """Sorts the rows of a block, of which the first is row `first` of the cloud, into cells."""
+    block = checked(block, first)
+    cells = cut.cells_of(block)
+    order = np.argsort(cells, kind="stable")
+    bounds = np.searchsorted(cells[order], np.arange(cut.n_cells + 1))
+    whole = Part(np.arange(first, first + len(block)), block, values)
+    return [whole[order[start:end]] for start, end in pairwise(bounds.tolist())]
+
+
+def join(parts: Sequence[Part]) -> Part:
+    """Puts parts together in the order of the cloud; points that are in several are taken once."""
+    index = np.concatenate([part.index for part in parts])
+    index, rows = np.unique(index, return_index=True)
+    values = [part.values for part in parts if part.values is not None]
+    points = np.concatenate([part.points for part in parts])[rows]
+    return Part(index, points, np.concatenate(values)[rows] if values else None)
+
+
+def look(core: Part, cell: int, cut: Cut, reach: Reach, queries: Part | None = None) -> Looking:
+    """Finds the positions of a cell that may have one of their nearest points in another cell.
+
+    These are those of queries, or the core's own points. The nearest ones of the core bound how far they look.
+    """
+    own = reach.candidates(core)
+    points = own.points if queries is None else queries.points
+    if len(points) == 0:
+        return Looking(points, np.empty(0))
+    radii = np.full(len(points), np.inf)
+    if len(own) >= reach.count:
+        tree = cKDTree(reach.stretched(own.points))
+        radii = tree.query(reach.stretched(points), [reach.count])[0][:, 0]
+    beyond = radii * SLACK >= cut.depths(cell, points, reach.factors)
+    return Looking(points[beyond], radii[beyond])
+
+
+def rim(core: Part, looking: Looking, reach: Reach) -> Part:
+    """Returns the points of a core that may be among the nearest of those who look from another cell."""
+    nobody = core[np.arange(0)]
+    if len(core) == 0 or len(looking.points) == 0:
+        return nobody
+    places, own = reach.stretched(looking.points), reach.stretched(core.points)
+    lower, upper = own.min(axis=0), own.max(axis=0)
+    away = np.linalg.norm(np.maximum(0, np.maximum(lower - places, places - upper)), axis=1)
+    places, radii = places[away <= looking.radii * SLACK], looking.radii[away <= looking.radii * SLACK]
+    if len(places) == 0:
+        return nobody
+    low, high = (places - radii[:, None] * SLACK).min(axis=0), (places + radii[:, None] * SLACK).max(axis=0)
+    near = reach.candidates(core[np.flatnonzero(((own >= low) & (own <= high)).all(axis=1))])
+    return near[nearest(near, places, reach, radii)] if len(near) else nobody
+
+
+def nearest(part: Part, places: Array, reach: Reach, radii: Array | None = None) -> Ints:
+    """Returns the rows of a part that are among the nearest of some stretched places `[n, d]`; ascending, each once."""
+    count = min(reach.count, len(part))
+    bound = np.inf if radii is None else float(radii.max()) * 2
+    distances, rows = cKDTree(reach.stretched(part.points)).query(places, count, distance_upper_bound=bound)
+    distances, rows = distances.reshape(len(places), count), rows.reshape(len(places), count)
+    found = np.isfinite(distances)
+    if radii is not None:
+        found &= distances <= (radii * SLACK)[:, None]
+    return np.unique(rows[found])

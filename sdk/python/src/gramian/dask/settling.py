@@ -1,0 +1,185 @@
+"""What comes before all answers of a tile: the coarse cloud, and tiles that learn what the cloud would.
+
+Where the cloud has noise the service tries means of points instead of points, and takes what promises less deviation.
+Which points a mean is of differs from tile to tile, so that a tile may decide otherwise than the cloud. It is asked,
+and if so is given more of the neighbourhoods that are learned from until it does not. The replica keeps what it
+computed for the answers.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..client import Client
+from ..cloud import Cloud
+from ..fit import Fit, Kernel
+from ..tensors import Array
+from .cut import Ints
+from .parts import Part
+from .plan import N_SITES
+from .replicas import Replicas
+from .signs import Regions
+from .thinning import scales
+from .tile import Tile, widened
+
+SAME = 1e-6
+"""Relative difference of what is learned from points, up to rounding."""
+
+SIMILAR = 0.25
+"""That of what is learned from means, which are never the same."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What local regressions learn from the sample.
+
+    Attributes
+    ----------
+    noise, length_scale
+        σ of the points, and ℓ of the heights, L.
+    deviation
+        Of curvatures at the sites, in the median, 1/L; NaN where none has any.
+    are_means
+        Whether they regress on means of points.
+    """
+
+    noise: float
+    length_scale: float
+    deviation: float = np.nan
+    are_means: bool = False
+
+    def is_like(self, other: Learned) -> bool:
+        """Whether another cloud has learned the same, if there is anything to learn."""
+        tolerance = SIMILAR if self.are_means else SAME
+        return np.isnan(self.deviation) or abs(other.length_scale - self.length_scale) <= tolerance * self.length_scale
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A signature function of few points, by which the service says which side is outward.
+
+    Attributes
+    ----------
+    part
+        The points `[c, d]`.
+    normals
+        `[c, d]`, consistent and outward; NaN where there is none.
+    fit
+        Kernel, α and solver.
+    """
+
+    part: Part
+    normals: Array
+    fit: Fit
+
+    def directions(self, client: Client, points: Array) -> Array:
+        """Returns unit vectors outward of it at points, `[n, d]`: minus the gradient, never of length 0."""
+        ones = np.ones(len(self.part))
+        cloud = client.cloud(self.part.points)
+        answer = cloud.interpolate(ones, points, derivatives=1, mean="zero", **self.fit)
+        directions: Array = -np.asarray(answer.gradients)
+        lengths = np.linalg.norm(directions, axis=1)
+        directions[lengths == 0, 0] = 1
+        return directions / np.where(lengths == 0, 1, lengths)[:, None]
+
+
+def learn(replicas: Replicas, tile: Tile) -> Learned:
+    """Asks what the neighbourhoods of the sites say of noise and size, and how surely curvatures are known there."""
+
+    def call(client: Client) -> Learned:
+        cloud = client.cloud(tile.points)
+        answer = cloud.curvatures(solver="local", deviations=True)  # at points, whose noise counts
+        at_sites = np.asarray(answer.principal_curvature_deviations)[:: max(cloud.n_points // N_SITES, 1)]
+        known = at_sites.max(axis=1)[~np.isnan(at_sites).any(axis=1)]
+        deviation = float(np.median(known)) if len(known) else np.nan
+        return replace(_learned(cloud), deviation=deviation)
+
+    return replicas.ask(0, call)
+
+
+def orient(replicas: Replicas, part: Part, noise: float) -> Coarse:
+    """Fits the coarse cloud as the service does for local regressions, and asks for its normals."""
+    extent, spacing = scales(part.points)
+    length_scale = max(0.45 * extent, 4 * spacing)
+    kernel = Kernel("laplace", length_scale=length_scale, epsilon=(0.4 * spacing / length_scale) ** 2)
+    fit = Fit(solver="dense", kernel=kernel, alpha=max(1e-3, 5 * (noise / spacing) ** 1.5))
+    normals = replicas.ask(0, lambda client: client.cloud(part.points).normals(**fit).normals)
+    return Coarse(part, normals, fit)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A tile that learns what the cloud would.
+
+    Attributes
+    ----------
+    tile
+        Its points.
+    directions
+        `[n, d]`. Unit vectors outward at these, by the coarse function.
+    labels
+        `[n]`. The region of each point, 0 for those that are neither in its cell nor in the halo.
+    regions
+        What they say of one another.
+    """
+
+    tile: Tile
+    directions: Array
+    labels: Ints
+    regions: Regions
+
+    @classmethod
+    def of(cls, client: Client, tile: Tile, directions: Array, coarse: Coarse) -> Settled:
+        """Asks for normals, and finds the regions."""
+        normals = client.cloud(tile.points, directions).normals(solver="local").normals
+        labels = np.zeros(len(tile.points), dtype=np.int64)
+        near, known = np.flatnonzero(tile.is_near), ~np.isnan(coarse.normals[:, 0])
+        place = np.empty(len(tile.points), dtype=np.int64)
+        place[near] = np.arange(len(near))
+        labels[near], regions = Regions.of(
+            index=tile.index[near],
+            points=tile.points[near],
+            normals=np.nan_to_num(normals[near]),
+            outward=directions[near],
+            own=place[tile.own],
+            coarse=(coarse.part.index[known], coarse.normals[known]),
+        )
+        return cls(tile, directions, labels, regions)
+
+    def cloud(self, client: Client) -> Cloud:
+        """Returns it as a cloud of a replica, with these sides."""
+        return client.cloud(self.tile.points, self.directions)
+
+    def shared(self, halos: Sequence[Ints]) -> tuple[Ints, Ints]:
+        """Returns which of its own points are in the halos of tiles, by their rows in the cloud, and their regions."""
+        shared = self.tile.own[np.isin(self.tile.rows, np.concatenate(halos))]
+        return self.tile.index[shared], self.labels[shared]
+
+
+def settle(
+    replicas: Replicas, tile: Tile, coarse: Coarse, learned: Learned, more: Sequence[Part], sites: Ints, spare: Part
+) -> Settled:
+    """Prepares a tile on its replica, with more of the sample where it would learn something else without."""
+
+    def call(client: Client) -> Settled:
+        candidate, directions = tile, coarse.directions(client, tile.points)
+        for carried in [*more, None]:
+            if learned.is_like(_learned(client.cloud(candidate.points, directions))):
+                break
+            if carried is None:
+                logging.getLogger(__name__).warning("tile %d learns something else than the cloud", tile.number)
+                break
+            candidate = widened(tile, carried, sites, spare)
+            directions = coarse.directions(client, candidate.points)
+        return Settled.of(client, candidate, directions, coarse)
+
+    return replicas.ask(tile.number, call)
+
+
+def _learned(cloud: Cloud) -> Learned:
+    used = cloud.normals(cloud.points[:1] if cloud.points is not None else None, solver="local").diagnostics
+    return Learned(float(used.alpha or 0) ** 0.5, float(used.kernel.length_scale or 0))

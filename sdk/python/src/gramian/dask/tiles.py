@@ -1,0 +1,168 @@
+"""Clouds in tiles, and what can be asked about them."""
+
+from __future__ import annotations
+
+import dask
+import dask.array as da
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix
+
+from ..fit import KernelLike, Mean, Number, ValuesFit
+from ..keywords import suggest_names
+from . import answers, graph, kriging, parts, requests
+from .gathering import gathered
+from .plan import Plan
+from .replicas import Replicas
+from .sampled import SurfaceTiles
+
+NO_REASONS = np.empty(0, dtype=requests.REASON)
+
+
+@suggest_names
+class Tiles:
+    """A cloud of any size, cut into tiles that replicas answer one by one.
+
+    Methods return Dask arrays; the work is done when Dask computes them, with its progress, its retries
+    (`dask.compute(answer, retries=3)`) and its dashboard. Ask for several things in one `dask.compute`, and each tile
+    is cut once.
+
+    Answers are those of one request for all points with `solver="local"`, up to ties of distance and the sides of
+    single points. Where the cloud has so much noise that the service regresses on means of points, these are means of
+    other points, and answers differ as those of two samples do, by less than their deviations at most points.
+
+    Attributes
+    ----------
+    plan
+        What tiles have in common: cells, coarse cloud, samples.
+    """
+
+    def __init__(self, replicas: Replicas, points: npt.ArrayLike | da.Array, n_tiles: int) -> None:
+        """Looks at the points; `Service.tiles` makes tiles."""
+        self._replicas = replicas
+        self._points = graph.rows_of(points)
+        self._surface: SurfaceTiles | None = None
+        self.plan = Plan.of(self._points, n_tiles)
+
+    def __repr__(self) -> str:
+        n, d = self._points.shape
+        return f"Tiles(n_points={n}, dimension={d}, n_tiles={self.n_tiles})"
+
+    @property
+    def n_tiles(self) -> int:
+        """The number of tiles."""
+        return self.plan.cut.n_cells
+
+    def cells(self) -> da.Array:
+        """Says in which tile each point is, `[n]`, from 0."""
+        return self._points.map_blocks(self.plan.cut.cells_of, drop_axis=1, dtype=np.int64)
+
+    def normals(self, *, deviations: bool = False) -> answers.Normals:
+        """Computes unit normals at the points, outward as the coarse cloud has it, with `deviations` if asked for."""
+        found = self._of_surface("normals", deviations)
+        return answers.Normals(**{name: found.get(name) for name in answers.Normals.__dataclass_fields__})
+
+    def curvatures(self, *, deviations: bool = False) -> answers.Curvatures:
+        """Computes curvatures at the points, with `deviations` if asked for; a sphere of radius r has +1/r."""
+        found = self._of_surface("curvatures", deviations)
+        return answers.Curvatures(**{name: found.get(name) for name in answers.Curvatures.__dataclass_fields__})
+
+    def laplace_beltrami(self) -> answers.SparseOperator:
+        """Assembles the sparse Laplace–Beltrami operator on values at the points, 1/L²."""
+        return self._operator("laplace_beltrami", 1)
+
+    def surface_gradient(self) -> answers.SparseOperator:
+        """Assembles the d components of the sparse surface gradient of values at the points, 1/L."""
+        return self._operator("surface_gradient", self.plan.dimension)
+
+    def interpolate(
+        self,
+        values: npt.ArrayLike | da.Array,
+        queries: npt.ArrayLike | da.Array | None = None,
+        *,
+        derivatives: int = 0,
+        deviations: bool = False,
+        kernel: KernelLike | None = None,
+        alpha: Number | None = None,
+        mean: Mean | None = None,
+    ) -> answers.Interpolation:
+        """Kriges values at queries, each from the 128 points nearest to it.
+
+        Kernel, noise and mean are one for all tiles. What is not given (a length scale, `alpha`, the coefficients of a
+        mean) is learned here and now, from up to 256 values: those that the service would look at if it had all.
+
+        Parameters
+        ----------
+        values : array_like or dask.array.Array, `[n]`
+            At the points, V.
+        queries : array_like or dask.array.Array, `[m, d]`, optional
+            The points if absent.
+        derivatives : 0, 1 or 2, optional
+            1 for gradients, 2 for Hessians as well.
+        deviations : bool, optional
+            Whether standard deviations are wanted.
+        kernel, alpha, mean
+            As for `gramian.Cloud.interpolate`.
+
+        Returns
+        -------
+        Interpolation
+            Dask arrays in the order of the queries.
+        """
+        own = graph.aligned(values, self._points)
+        fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
+        law = kriging.given_law(fit) or self._law(own, fit)
+        cores = graph.cores(self._points, self.plan, own)
+        asked = self._points if queries is None else graph.rows_of(queries)
+        wanted = cores if queries is None else graph.cores(asked, self.plan)
+        rims = graph.rims(cores, self.plan, kriging.reach_of(law.kernel), wanted)
+        krige = dask.delayed(kriging.krige, pure=True)
+        asks = [
+            krige(self._replicas, cell, cores[cell], rims[cell], wanted[cell], law, derivatives, deviations)
+            for cell in range(self.n_tiles)
+        ]
+        d = self.plan.dimension
+        shapes = {"values": (), "gradients": (d,), "hessians": (d, d)}
+        names = list(shapes)[: derivatives + 1]
+        kinds = {name: np.empty((0, *shapes[name])) for name in names}
+        if deviations:
+            kinds |= {f"{name[:-1]}_deviations": np.empty((0, *shapes[name])) for name in names}
+        found = gathered(asks, asked.chunks[0], kinds)
+        return answers.Interpolation(**{name: found.get(name) for name in answers.Interpolation.__dataclass_fields__})
+
+    def _law(self, values: da.Array, fit: ValuesFit) -> kriging.Law:
+        rows = self.plan.learning.index
+        sample = parts.Part(rows, self.plan.learning.points, np.asarray(values[rows].compute(), dtype=np.float64))
+        law: kriging.Law = dask.delayed(kriging.learn_law)(self._replicas, sample, fit).compute()
+        return law
+
+    def _of_surface(self, what: str, deviations: bool) -> dict[str, da.Array]:
+        surface, ask = self._in_tiles(), dask.delayed(requests.surface, pure=True)
+        pairs = zip(surface.tiles, surface.sides, strict=True)
+        rows = [ask(self._replicas, tile, sides, what, deviations) for tile, sides in pairs]
+        d = self.plan.dimension
+        shapes: dict[str, tuple[int, ...]] = {"normals": (d,), "levels": ()}
+        known: dict[str, tuple[int, ...]] = {"normal": ()}
+        if what == "curvatures":
+            known |= {"principal_curvature": (d - 1,), "mean_curvature": (), "gaussian_curvature": ()}
+            shapes |= {f"{name}s": shape for name, shape in known.items()}
+            shapes["principal_directions"] = (d - 1, d)
+            shapes["normals"] = (d,)
+        if deviations:
+            shapes |= {f"{name}_deviations": shape for name, shape in known.items()}
+        kinds = {name: np.empty((0, *shape)) for name, shape in shapes.items()}
+        return gathered(rows, self._points.chunks[0], {**kinds, "reasons": NO_REASONS})
+
+    def _operator(self, what: str, n_components: int) -> answers.SparseOperator:
+        n = self.plan.n_points
+        names = [f"matrix {component}" for component in range(n_components)]
+        kinds = {"reasons": NO_REASONS, **{name: csr_matrix((0, n)) for name in names}}
+        ask = dask.delayed(requests.operator, pure=True)
+        rows = [ask(self._replicas, tile, what, n) for tile in self._in_tiles().tiles]
+        found = gathered(rows, self._points.chunks[0], kinds)
+        return answers.SparseOperator(tuple(found[name] for name in names), found["reasons"])
+
+    def _in_tiles(self) -> SurfaceTiles:
+        if self._surface is None:
+            self._surface = SurfaceTiles.of(self._replicas, self._points, self.plan)
+        return self._surface
