@@ -1,6 +1,7 @@
 // Compares the generated types with the document. Every property, parameter, body and answer must have exactly the type
 // that its schema asks for: so there is no `any` or `unknown`, no anonymous object, and null where the document allows
-// it and nowhere else. Enumerations must be objects of their values.
+// it and nowhere else. Enumerations must be objects of their values. One answer is `unknown`: that of a job, whose type is
+// that of the answer to its request.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import ts from "typescript";
@@ -37,6 +38,7 @@ interface Document {
 
 const document: Document = JSON.parse(readFileSync("../../openapi/openapi.json", "utf8"));
 const aliases = typeAliases("generated/types.gen.ts");
+const answersOfAnyType = new Set(["get_job_result"]);
 
 for (const [name, schema] of Object.entries(document.components.schemas)) checkSchema(name, schema);
 for (const path of Object.values(document.paths)) Object.values(path).forEach(checkOperation);
@@ -56,7 +58,9 @@ function checkOperation({ operationId, parameters = [], requestBody, responses }
     }
     const answers = new Map([...members(aliases.get(`${name}Errors`)), ...members(aliases.get(`${name}Responses`))]);
     for (const [status, body] of Object.entries(responses).filter(([, { content }]) => content)) {
-        assert.equal(answers.get(status)?.type?.getText(), typeOfBody(body), `${name}: ${status}`);
+        const isOfAnyType = status === "200" && answersOfAnyType.has(operationId);
+        const expected = isOfAnyType ? "unknown" : typeOfBody(body);
+        assert.equal(answers.get(status)?.type?.getText(), expected, `${name}: ${status}`);
     }
 }
 

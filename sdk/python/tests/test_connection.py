@@ -281,7 +281,7 @@ def test_a_client_needs_no_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_argument_of_a_client_may_be_none() -> None:
-    names = ["base_url", "api_key", "timeout", "retries", "max_wait", "format", "transport"]
+    names = ["base_url", "api_key", "timeout", "retries", "max_wait", "format", "progress", "transport"]
     with gramian.Client(**dict.fromkeys(names)) as client:
         assert client.version().name == "gramian"
         http = client._connection.http

@@ -74,6 +74,8 @@ def test_requests_have_no_later_members() -> None:
     sent = (models.CloudRef, models.Kernel, models.Geometry, models.Samples, models.FreeParameter)
     for model in OBJECTS:
         is_request = model.__name__.endswith("Request") or model in sent
+        if model is models.EstimateRequest:  # has the members of whichever request is meant
+            continue
         assert (LATER_MEMBERS not in attrs.fields_dict(model)) == is_request, model
 
 

@@ -497,6 +497,40 @@ where that has no answer.*/
             value.parse()
         }
     }
+    ///The members of a request of this operation, and `operation` beside them: see the schema of that request.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct EstimateRequest {
+        ///The operation whose request this is.
+        pub operation: OperationName,
+    }
+    impl EstimateRequest {
+        pub fn builder() -> builder::EstimateRequest {
+            Default::default()
+        }
+    }
+    ///What a request would take.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct EstimateResponse {
+        ///Whether there is memory and time enough for it, if nothing else is under way.
+        pub admissible: bool,
+        ///Memory that it would take beside what is held already.
+        pub bytes: i64,
+        ///Whether all factorizations that it needs are there.
+        pub cached: bool,
+        ///Floating-point operations, as counted beforehand.
+        pub flops: f64,
+        ///The operation, repeated.
+        pub operation: ::std::string::String,
+        ///Seconds from its turn to its answer, by what ran on this machine since the server started.
+        pub seconds: f64,
+        ///What it would be served by.
+        pub solver: SolverUsed,
+    }
+    impl EstimateResponse {
+        pub fn builder() -> builder::EstimateResponse {
+            Default::default()
+        }
+    }
     /**How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 answer has them yet.*/
     #[derive(
@@ -858,6 +892,182 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     impl InterpolationResponse {
         pub fn builder() -> builder::InterpolationResponse {
             Default::default()
+        }
+    }
+    ///A job.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct Job {
+        ///When it was asked for, in UTC.
+        pub created_at: ::chrono::DateTime<::chrono::offset::Utc>,
+        ///When it ended, in UTC; absent before.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub ended_at: ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+        ///Until when its result is kept, in UTC; absent before there is one.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub expires_at: ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+        ///The id of the job.
+        pub job_id: JobId,
+        ///Why it failed: the problem that the request would have been answered with.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub problem: ::std::option::Option<Problem>,
+        ///How far it is.
+        pub progress: JobProgress,
+        ///Where it is.
+        pub status: JobStatus,
+    }
+    impl Job {
+        pub fn builder() -> builder::Job {
+            Default::default()
+        }
+    }
+    ///The id of a job: a UUID of version 7, in lower case.
+    #[derive(::serde::Serialize, Clone, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
+    #[serde(transparent)]
+    pub struct JobId(::std::string::String);
+    impl ::std::ops::Deref for JobId {
+        type Target = ::std::string::String;
+        fn deref(&self) -> &::std::string::String {
+            &self.0
+        }
+    }
+    impl ::std::convert::From<JobId> for ::std::string::String {
+        fn from(value: JobId) -> Self {
+            value.0
+        }
+    }
+    impl ::std::str::FromStr for JobId {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            static PATTERN: ::std::sync::LazyLock<::regress::Regex> = ::std::sync::LazyLock::new(||
+            {
+                ::regress::Regex::new(
+                        "^[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}$",
+                    )
+                    .unwrap()
+            });
+            if PATTERN.find(value).is_none() {
+                return Err(
+                    "doesn't match pattern \"^[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}$\""
+                        .into(),
+                );
+            }
+            Ok(Self(value.to_string()))
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for JobId {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for JobId {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl<'de> ::serde::Deserialize<'de> for JobId {
+        fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
+        where
+            D: ::serde::Deserializer<'de>,
+        {
+            ::std::string::String::deserialize(deserializer)?
+                .parse()
+                .map_err(|e: self::error::ConversionError| {
+                    <D::Error as ::serde::de::Error>::custom(e.to_string())
+                })
+        }
+    }
+    ///How far a job is.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct JobProgress {
+        ///The part of the time it is expected to take that has gone by, from 0 to 1.
+        pub fraction: f64,
+        ///Of the last solve, relative; absent before there is one.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub residual: ::std::option::Option<f64>,
+        ///Seconds until it is done, by what ran on this machine; absent while that is unknown.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub seconds_left: ::std::option::Option<f64>,
+        ///What is being done: `queued`, then the stages of `Server-Timing`: `parse`, `gram`, `factor`, `solve`, `evaluate`; `done` in the end.
+        pub stage: ::std::string::String,
+    }
+    impl JobProgress {
+        pub fn builder() -> builder::JobProgress {
+            Default::default()
+        }
+    }
+    ///Where a job is.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum JobStatus {
+        #[serde(rename = "queued")]
+        Queued,
+        #[serde(rename = "running")]
+        Running,
+        #[serde(rename = "succeeded")]
+        Succeeded,
+        #[serde(rename = "failed")]
+        Failed,
+        #[serde(rename = "cancelled")]
+        Cancelled,
+    }
+    impl ::std::fmt::Display for JobStatus {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::Queued => f.write_str("queued"),
+                Self::Running => f.write_str("running"),
+                Self::Succeeded => f.write_str("succeeded"),
+                Self::Failed => f.write_str("failed"),
+                Self::Cancelled => f.write_str("cancelled"),
+            }
+        }
+    }
+    impl ::std::str::FromStr for JobStatus {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "queued" => Ok(Self::Queued),
+                "running" => Ok(Self::Running),
+                "succeeded" => Ok(Self::Succeeded),
+                "failed" => Ok(Self::Failed),
+                "cancelled" => Ok(Self::Cancelled),
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for JobStatus {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for JobStatus {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
         }
     }
     /**A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
@@ -1488,6 +1698,123 @@ there is no answer or none is known.*/
     impl NormalsResponse {
         pub fn builder() -> builder::NormalsResponse {
             Default::default()
+        }
+    }
+    ///An operation that computes, by its `operationId`.
+    #[derive(
+        ::serde::Deserialize,
+        ::serde::Serialize,
+        Clone,
+        Copy,
+        Debug,
+        Eq,
+        Hash,
+        Ord,
+        PartialEq,
+        PartialOrd
+    )]
+    pub enum OperationName {
+        #[serde(rename = "compute_interpolation")]
+        ComputeInterpolation,
+        #[serde(rename = "compute_interpolation_batch")]
+        ComputeInterpolationBatch,
+        #[serde(rename = "compute_posterior")]
+        ComputePosterior,
+        #[serde(rename = "compute_posterior_batch")]
+        ComputePosteriorBatch,
+        #[serde(rename = "select_model")]
+        SelectModel,
+        #[serde(rename = "compute_normals")]
+        ComputeNormals,
+        #[serde(rename = "compute_curvatures")]
+        ComputeCurvatures,
+        #[serde(rename = "compute_surface_gradient")]
+        ComputeSurfaceGradient,
+        #[serde(rename = "assemble_surface_gradient_matrix")]
+        AssembleSurfaceGradientMatrix,
+        #[serde(rename = "assemble_surface_gradient_sparse_matrix")]
+        AssembleSurfaceGradientSparseMatrix,
+        #[serde(rename = "compute_laplace_beltrami")]
+        ComputeLaplaceBeltrami,
+        #[serde(rename = "assemble_laplace_beltrami_matrix")]
+        AssembleLaplaceBeltramiMatrix,
+        #[serde(rename = "assemble_laplace_beltrami_sparse_matrix")]
+        AssembleLaplaceBeltramiSparseMatrix,
+    }
+    impl ::std::fmt::Display for OperationName {
+        fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+            match *self {
+                Self::ComputeInterpolation => f.write_str("compute_interpolation"),
+                Self::ComputeInterpolationBatch => {
+                    f.write_str("compute_interpolation_batch")
+                }
+                Self::ComputePosterior => f.write_str("compute_posterior"),
+                Self::ComputePosteriorBatch => f.write_str("compute_posterior_batch"),
+                Self::SelectModel => f.write_str("select_model"),
+                Self::ComputeNormals => f.write_str("compute_normals"),
+                Self::ComputeCurvatures => f.write_str("compute_curvatures"),
+                Self::ComputeSurfaceGradient => f.write_str("compute_surface_gradient"),
+                Self::AssembleSurfaceGradientMatrix => {
+                    f.write_str("assemble_surface_gradient_matrix")
+                }
+                Self::AssembleSurfaceGradientSparseMatrix => {
+                    f.write_str("assemble_surface_gradient_sparse_matrix")
+                }
+                Self::ComputeLaplaceBeltrami => f.write_str("compute_laplace_beltrami"),
+                Self::AssembleLaplaceBeltramiMatrix => {
+                    f.write_str("assemble_laplace_beltrami_matrix")
+                }
+                Self::AssembleLaplaceBeltramiSparseMatrix => {
+                    f.write_str("assemble_laplace_beltrami_sparse_matrix")
+                }
+            }
+        }
+    }
+    impl ::std::str::FromStr for OperationName {
+        type Err = self::error::ConversionError;
+        fn from_str(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            match value {
+                "compute_interpolation" => Ok(Self::ComputeInterpolation),
+                "compute_interpolation_batch" => Ok(Self::ComputeInterpolationBatch),
+                "compute_posterior" => Ok(Self::ComputePosterior),
+                "compute_posterior_batch" => Ok(Self::ComputePosteriorBatch),
+                "select_model" => Ok(Self::SelectModel),
+                "compute_normals" => Ok(Self::ComputeNormals),
+                "compute_curvatures" => Ok(Self::ComputeCurvatures),
+                "compute_surface_gradient" => Ok(Self::ComputeSurfaceGradient),
+                "assemble_surface_gradient_matrix" => {
+                    Ok(Self::AssembleSurfaceGradientMatrix)
+                }
+                "assemble_surface_gradient_sparse_matrix" => {
+                    Ok(Self::AssembleSurfaceGradientSparseMatrix)
+                }
+                "compute_laplace_beltrami" => Ok(Self::ComputeLaplaceBeltrami),
+                "assemble_laplace_beltrami_matrix" => {
+                    Ok(Self::AssembleLaplaceBeltramiMatrix)
+                }
+                "assemble_laplace_beltrami_sparse_matrix" => {
+                    Ok(Self::AssembleLaplaceBeltramiSparseMatrix)
+                }
+                _ => Err("invalid value".into()),
+            }
+        }
+    }
+    impl ::std::convert::TryFrom<&str> for OperationName {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: &str,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
+        }
+    }
+    impl ::std::convert::TryFrom<::std::string::String> for OperationName {
+        type Error = self::error::ConversionError;
+        fn try_from(
+            value: ::std::string::String,
+        ) -> ::std::result::Result<Self, self::error::ConversionError> {
+            value.parse()
         }
     }
     ///Which way normals point.
@@ -4072,6 +4399,192 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         #[derive(Clone, Debug)]
+        pub struct EstimateRequest {
+            operation: ::std::result::Result<
+                super::OperationName,
+                ::std::string::String,
+            >,
+        }
+        impl ::std::default::Default for EstimateRequest {
+            fn default() -> Self {
+                Self {
+                    operation: Err("no value supplied for operation".to_string()),
+                }
+            }
+        }
+        impl EstimateRequest {
+            pub fn operation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::OperationName>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.operation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for operation: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<EstimateRequest> for super::EstimateRequest {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: EstimateRequest,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    operation: value.operation?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::EstimateRequest> for EstimateRequest {
+            fn from(value: super::EstimateRequest) -> Self {
+                Self {
+                    operation: Ok(value.operation),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct EstimateResponse {
+            admissible: ::std::result::Result<bool, ::std::string::String>,
+            bytes: ::std::result::Result<i64, ::std::string::String>,
+            cached: ::std::result::Result<bool, ::std::string::String>,
+            flops: ::std::result::Result<f64, ::std::string::String>,
+            operation: ::std::result::Result<
+                ::std::string::String,
+                ::std::string::String,
+            >,
+            seconds: ::std::result::Result<f64, ::std::string::String>,
+            solver: ::std::result::Result<super::SolverUsed, ::std::string::String>,
+        }
+        impl ::std::default::Default for EstimateResponse {
+            fn default() -> Self {
+                Self {
+                    admissible: Err("no value supplied for admissible".to_string()),
+                    bytes: Err("no value supplied for bytes".to_string()),
+                    cached: Err("no value supplied for cached".to_string()),
+                    flops: Err("no value supplied for flops".to_string()),
+                    operation: Err("no value supplied for operation".to_string()),
+                    seconds: Err("no value supplied for seconds".to_string()),
+                    solver: Err("no value supplied for solver".to_string()),
+                }
+            }
+        }
+        impl EstimateResponse {
+            pub fn admissible<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<bool>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.admissible = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for admissible: {e}")
+                    });
+                self
+            }
+            pub fn bytes<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<i64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.bytes = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for bytes: {e}")
+                    });
+                self
+            }
+            pub fn cached<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<bool>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.cached = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for cached: {e}")
+                    });
+                self
+            }
+            pub fn flops<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.flops = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for flops: {e}")
+                    });
+                self
+            }
+            pub fn operation<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::string::String>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.operation = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for operation: {e}")
+                    });
+                self
+            }
+            pub fn seconds<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.seconds = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for seconds: {e}")
+                    });
+                self
+            }
+            pub fn solver<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::SolverUsed>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.solver = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for solver: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<EstimateResponse> for super::EstimateResponse {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: EstimateResponse,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    admissible: value.admissible?,
+                    bytes: value.bytes?,
+                    cached: value.cached?,
+                    flops: value.flops?,
+                    operation: value.operation?,
+                    seconds: value.seconds?,
+                    solver: value.solver?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::EstimateResponse> for EstimateResponse {
+            fn from(value: super::EstimateResponse) -> Self {
+                Self {
+                    admissible: Ok(value.admissible),
+                    bytes: Ok(value.bytes),
+                    cached: Ok(value.cached),
+                    flops: Ok(value.flops),
+                    operation: Ok(value.operation),
+                    seconds: Ok(value.seconds),
+                    solver: Ok(value.solver),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct FamilyScore {
             family: ::std::result::Result<super::KernelFamily, ::std::string::String>,
             nu: ::std::result::Result<::std::option::Option<f64>, ::std::string::String>,
@@ -5313,6 +5826,256 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     hessians: Ok(value.hessians),
                     value_deviations: Ok(value.value_deviations),
                     values: Ok(value.values),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct Job {
+            created_at: ::std::result::Result<
+                ::chrono::DateTime<::chrono::offset::Utc>,
+                ::std::string::String,
+            >,
+            ended_at: ::std::result::Result<
+                ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+                ::std::string::String,
+            >,
+            expires_at: ::std::result::Result<
+                ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+                ::std::string::String,
+            >,
+            job_id: ::std::result::Result<super::JobId, ::std::string::String>,
+            problem: ::std::result::Result<
+                ::std::option::Option<super::Problem>,
+                ::std::string::String,
+            >,
+            progress: ::std::result::Result<super::JobProgress, ::std::string::String>,
+            status: ::std::result::Result<super::JobStatus, ::std::string::String>,
+        }
+        impl ::std::default::Default for Job {
+            fn default() -> Self {
+                Self {
+                    created_at: Err("no value supplied for created_at".to_string()),
+                    ended_at: Ok(Default::default()),
+                    expires_at: Ok(Default::default()),
+                    job_id: Err("no value supplied for job_id".to_string()),
+                    problem: Ok(Default::default()),
+                    progress: Err("no value supplied for progress".to_string()),
+                    status: Err("no value supplied for status".to_string()),
+                }
+            }
+        }
+        impl Job {
+            pub fn created_at<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::chrono::DateTime<::chrono::offset::Utc>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.created_at = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for created_at: {e}")
+                    });
+                self
+            }
+            pub fn ended_at<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.ended_at = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for ended_at: {e}")
+                    });
+                self
+            }
+            pub fn expires_at<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<
+                    ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
+                >,
+                T::Error: ::std::fmt::Display,
+            {
+                self.expires_at = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for expires_at: {e}")
+                    });
+                self
+            }
+            pub fn job_id<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::JobId>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.job_id = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for job_id: {e}")
+                    });
+                self
+            }
+            pub fn problem<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::Problem>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.problem = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for problem: {e}")
+                    });
+                self
+            }
+            pub fn progress<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::JobProgress>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.progress = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for progress: {e}")
+                    });
+                self
+            }
+            pub fn status<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<super::JobStatus>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.status = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for status: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<Job> for super::Job {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: Job,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    created_at: value.created_at?,
+                    ended_at: value.ended_at?,
+                    expires_at: value.expires_at?,
+                    job_id: value.job_id?,
+                    problem: value.problem?,
+                    progress: value.progress?,
+                    status: value.status?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::Job> for Job {
+            fn from(value: super::Job) -> Self {
+                Self {
+                    created_at: Ok(value.created_at),
+                    ended_at: Ok(value.ended_at),
+                    expires_at: Ok(value.expires_at),
+                    job_id: Ok(value.job_id),
+                    problem: Ok(value.problem),
+                    progress: Ok(value.progress),
+                    status: Ok(value.status),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
+        pub struct JobProgress {
+            fraction: ::std::result::Result<f64, ::std::string::String>,
+            residual: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            seconds_left: ::std::result::Result<
+                ::std::option::Option<f64>,
+                ::std::string::String,
+            >,
+            stage: ::std::result::Result<::std::string::String, ::std::string::String>,
+        }
+        impl ::std::default::Default for JobProgress {
+            fn default() -> Self {
+                Self {
+                    fraction: Err("no value supplied for fraction".to_string()),
+                    residual: Ok(Default::default()),
+                    seconds_left: Ok(Default::default()),
+                    stage: Err("no value supplied for stage".to_string()),
+                }
+            }
+        }
+        impl JobProgress {
+            pub fn fraction<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<f64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.fraction = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for fraction: {e}")
+                    });
+                self
+            }
+            pub fn residual<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.residual = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for residual: {e}")
+                    });
+                self
+            }
+            pub fn seconds_left<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<f64>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.seconds_left = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for seconds_left: {e}")
+                    });
+                self
+            }
+            pub fn stage<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::string::String>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.stage = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for stage: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<JobProgress> for super::JobProgress {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: JobProgress,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    fraction: value.fraction?,
+                    residual: value.residual?,
+                    seconds_left: value.seconds_left?,
+                    stage: value.stage?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::JobProgress> for JobProgress {
+            fn from(value: super::JobProgress) -> Self {
+                Self {
+                    fraction: Ok(value.fraction),
+                    residual: Ok(value.residual),
+                    seconds_left: Ok(value.seconds_left),
+                    stage: Ok(value.stage),
                 }
             }
         }
@@ -10414,7 +11177,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
 #[derive(Clone, Debug)]
 /**Client for gramian
 
-Geometric kernel interpolation and regression on point clouds, after Guidotti. Post points once; the factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, lengths are in the client's unit, a null marks an entry without a meaningful value, and every error is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so are computed answers in JSON if Accept-Encoding asks for it. This document is for tools that stop at OpenAPI 3.0: it has bodies in JSON only, no links and no pages, and declares problem documents, which are sent as application/problem+json, as application/json.
+Geometric kernel interpolation and regression on point clouds, after Guidotti. Post points once; the factorization of their Gram matrix K + αI is kept, and interpolation, normals, curvatures, surface operators and Gaussian-process posteriors are served from it. Arrays keep the order of the request, lengths are in the client's unit, a null marks an entry without a meaningful value, and every error is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so are computed answers in JSON if Accept-Encoding asks for it. Every request that computes is answered 202 at once, with a job and its Location, if it is sent with `Prefer: respond-async`. This document is for tools that stop at OpenAPI 3.0: it has bodies in JSON only, no links and no pages, and declares problem documents, which are sent as application/problem+json, as application/json.
 
 Version: 0.1.0*/
 pub struct Client {
@@ -10566,6 +11329,75 @@ let response = client.list_kernels()
 ```*/
     pub fn list_kernels(&self) -> builder::ListKernels<'_> {
         builder::ListKernels::new(self)
+    }
+    /**Estimate a request
+
+What another request would take, before it is sent: the body is that of the other request, with the name of its operation as one member
+more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the request itself would do. What
+would be refused is refused here as well, with the same problem; times are learned from what ran on this machine.
+
+Sends a `POST` request to `/v1/estimate`
+
+```ignore
+let response = client.estimate()
+    .body(body)
+    .send()
+    .await;
+```*/
+    pub fn estimate(&self) -> builder::Estimate<'_> {
+        builder::Estimate::new(self)
+    }
+    /**Look at a job
+
+Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+
+Sends a `GET` request to `/v1/jobs/{job_id}`
+
+Arguments:
+- `job_id`: The id of a job
+```ignore
+let response = client.get_job()
+    .job_id(job_id)
+    .send()
+    .await;
+```*/
+    pub fn get_job(&self) -> builder::GetJob<'_> {
+        builder::GetJob::new(self)
+    }
+    /**Delete a job
+
+Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+
+Sends a `DELETE` request to `/v1/jobs/{job_id}`
+
+Arguments:
+- `job_id`: The id of a job
+```ignore
+let response = client.delete_job()
+    .job_id(job_id)
+    .send()
+    .await;
+```*/
+    pub fn delete_job(&self) -> builder::DeleteJob<'_> {
+        builder::DeleteJob::new(self)
+    }
+    /**Fetch the result of a job
+
+What the request is answered with, its problem included; a success is 200 with the media type that the request asked for. Waits for the job
+to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+
+Sends a `GET` request to `/v1/jobs/{job_id}/result`
+
+Arguments:
+- `job_id`: The id of a job
+```ignore
+let response = client.get_job_result()
+    .job_id(job_id)
+    .send()
+    .await;
+```*/
+    pub fn get_job_result(&self) -> builder::GetJobResult<'_> {
+        builder::GetJobResult::new(self)
     }
     /**Interpolate values
 
@@ -10804,7 +11636,8 @@ let response = client.check_live()
     }
     /**Check that the process takes requests
 
-503 while its queue is full, while it shuts down, and if its compute threads do not move.
+503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the store is required, while that
+does not take what it is given.
 
 Sends a `GET` request to `/health/ready`
 
@@ -10939,6 +11772,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -11096,6 +11936,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -11209,6 +12056,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -11313,6 +12167,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -11384,6 +12245,7 @@ pub mod builder {
                 400u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 401u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 404u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
+                429u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 500u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 503u16 => Err(Error::ErrorResponse(ResponseValue::empty(response))),
                 _ => Err(Error::UnexpectedResponse(response)),
@@ -11455,6 +12317,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -11463,6 +12332,538 @@ pub mod builder {
                     )
                 }
                 503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::estimate`]
+
+[`Client::estimate`]: super::Client::estimate*/
+    #[derive(Debug, Clone)]
+    pub struct Estimate<'a> {
+        client: &'a super::Client,
+        body: Result<types::builder::EstimateRequest, String>,
+    }
+    impl<'a> Estimate<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                body: Ok(::std::default::Default::default()),
+            }
+        }
+        pub fn body<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::EstimateRequest>,
+            <V as std::convert::TryInto<
+                types::EstimateRequest,
+            >>::Error: std::fmt::Display,
+        {
+            self.body = value
+                .try_into()
+                .map(From::from)
+                .map_err(|s| {
+                    format!("conversion to `EstimateRequest` for body failed: {}", s)
+                });
+            self
+        }
+        pub fn body_map<F>(mut self, f: F) -> Self
+        where
+            F: std::ops::FnOnce(
+                types::builder::EstimateRequest,
+            ) -> types::builder::EstimateRequest,
+        {
+            self.body = self.body.map(f);
+            self
+        }
+        ///Sends a `POST` request to `/v1/estimate`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::EstimateResponse>, Error<types::Problem>> {
+            let Self { client, body } = self;
+            let body = body
+                .and_then(|v| {
+                    types::EstimateRequest::try_from(v).map_err(|e| e.to_string())
+                })
+                .map_err(Error::InvalidRequest)?;
+            let url = format!("{}/v1/estimate", client.baseurl,);
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .post(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .json(&body)
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "estimate",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                408u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::get_job`]
+
+[`Client::get_job`]: super::Client::get_job*/
+    #[derive(Debug, Clone)]
+    pub struct GetJob<'a> {
+        client: &'a super::Client,
+        job_id: Result<types::JobId, String>,
+    }
+    impl<'a> GetJob<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                job_id: Err("job_id was not initialized".to_string()),
+            }
+        }
+        pub fn job_id<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::JobId>,
+        {
+            self.job_id = value
+                .try_into()
+                .map_err(|_| "conversion to `JobId` for job_id failed".to_string());
+            self
+        }
+        ///Sends a `GET` request to `/v1/jobs/{job_id}`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<types::Job>, Error<types::Problem>> {
+            let Self { client, job_id } = self;
+            let job_id = job_id.map_err(Error::InvalidRequest)?;
+            let url = format!(
+                "{}/v1/jobs/{}", client.baseurl, encode_path(& job_id.to_string()),
+            );
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .get(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "get_job",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::delete_job`]
+
+[`Client::delete_job`]: super::Client::delete_job*/
+    #[derive(Debug, Clone)]
+    pub struct DeleteJob<'a> {
+        client: &'a super::Client,
+        job_id: Result<types::JobId, String>,
+    }
+    impl<'a> DeleteJob<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                job_id: Err("job_id was not initialized".to_string()),
+            }
+        }
+        pub fn job_id<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::JobId>,
+        {
+            self.job_id = value
+                .try_into()
+                .map_err(|_| "conversion to `JobId` for job_id failed".to_string());
+            self
+        }
+        ///Sends a `DELETE` request to `/v1/jobs/{job_id}`
+        pub async fn send(self) -> Result<ResponseValue<()>, Error<types::Problem>> {
+            let Self { client, job_id } = self;
+            let job_id = job_id.map_err(Error::InvalidRequest)?;
+            let url = format!(
+                "{}/v1/jobs/{}", client.baseurl, encode_path(& job_id.to_string()),
+            );
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .delete(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "delete_job",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                204u16 => Ok(ResponseValue::empty(response)),
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                _ => Err(Error::UnexpectedResponse(response)),
+            }
+        }
+    }
+    /**Builder for [`Client::get_job_result`]
+
+[`Client::get_job_result`]: super::Client::get_job_result*/
+    #[derive(Debug, Clone)]
+    pub struct GetJobResult<'a> {
+        client: &'a super::Client,
+        job_id: Result<types::JobId, String>,
+    }
+    impl<'a> GetJobResult<'a> {
+        pub fn new(client: &'a super::Client) -> Self {
+            Self {
+                client: client,
+                job_id: Err("job_id was not initialized".to_string()),
+            }
+        }
+        pub fn job_id<V>(mut self, value: V) -> Self
+        where
+            V: std::convert::TryInto<types::JobId>,
+        {
+            self.job_id = value
+                .try_into()
+                .map_err(|_| "conversion to `JobId` for job_id failed".to_string());
+            self
+        }
+        ///Sends a `GET` request to `/v1/jobs/{job_id}/result`
+        pub async fn send(
+            self,
+        ) -> Result<ResponseValue<::serde_json::Value>, Error<types::Problem>> {
+            let Self { client, job_id } = self;
+            let job_id = job_id.map_err(Error::InvalidRequest)?;
+            let url = format!(
+                "{}/v1/jobs/{}/result", client.baseurl, encode_path(& job_id
+                .to_string()),
+            );
+            let mut header_map = ::reqwest::header::HeaderMap::with_capacity(1usize);
+            header_map
+                .append(
+                    ::reqwest::header::HeaderName::from_static("api-version"),
+                    ::reqwest::header::HeaderValue::from_static(
+                        super::Client::api_version(),
+                    ),
+                );
+            #[allow(unused_mut)]
+            let mut request = client
+                .client
+                .get(url)
+                .header(
+                    ::reqwest::header::ACCEPT,
+                    ::reqwest::header::HeaderValue::from_static("application/json"),
+                )
+                .headers(header_map)
+                .build()?;
+            let info = OperationInfo {
+                operation_id: "get_job_result",
+            };
+            client.pre(&mut request, &info).await?;
+            let result = client.exec(request, &info).await;
+            client.post(&result, &info).await?;
+            let response = result?;
+            match response.status().as_u16() {
+                200u16 => ResponseValue::from_response(response).await,
+                400u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                401u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                404u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                406u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                413u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                415u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                500u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                503u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                504u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -11603,6 +13004,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -11775,6 +13183,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -11928,6 +13343,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -12098,6 +13520,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -12256,6 +13685,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -12421,6 +13857,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -12574,6 +14017,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -12738,6 +14188,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -12910,6 +14367,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -13076,6 +14540,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -13234,6 +14705,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,
@@ -13406,6 +14884,13 @@ pub mod builder {
                         ),
                     )
                 }
+                429u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
                 500u16 => {
                     Err(
                         Error::ErrorResponse(
@@ -13566,6 +15051,13 @@ pub mod builder {
                     )
                 }
                 422u16 => {
+                    Err(
+                        Error::ErrorResponse(
+                            ResponseValue::from_response(response).await?,
+                        ),
+                    )
+                }
+                429u16 => {
                     Err(
                         Error::ErrorResponse(
                             ResponseValue::from_response(response).await?,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, Self, SupportsFloat, TypeVar, cast
@@ -17,11 +17,12 @@ from . import rest
 from .arrays import Sizes
 from .cloud import Cloud
 from .fit import Whole
+from .jobs import Bar, Progress, Told
 from .keywords import suggest_names
 from .normalise import CLIENT, REQUEST, normalise
 from .problems import Problem
 from .registration import register, register_file
-from .rest.models import CloudList, KernelDescription, KernelList, Version
+from .rest.models import CloudList, Job, KernelDescription, KernelList, Version
 from .tensors import Array, Format, available_format
 from .transport import Connection, RetryingClient
 
@@ -57,6 +58,10 @@ class Client:
     format : str, optional
         How arrays travel, `"safetensors"` or `"json"`: the former if absent and that package is installed. The numbers
         are the same.
+    progress : bool or callable, optional
+        Whether computations are jobs of the service, which have no deadline, with a progress bar for each (extra
+        `progress`). Ctrl-C cancels them. A function instead is called with each state of a job, a
+        `gramian.rest.models.Job`.
     transport : httpx.BaseTransport, optional
         Instead of the network, as in `httpx.Client`.
 
@@ -76,6 +81,7 @@ class Client:
         retries: Whole | None = None,
         max_wait: SupportsFloat | None = None,
         format: Format | None = None,  # noqa: A002
+        progress: bool | Callable[[Job], object] | None = None,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         """Says where the service is; nothing is sent yet."""
@@ -91,7 +97,7 @@ class Client:
             max_wait=bounds.get("max_wait", 60.0),
             transport=transport,
         )
-        self._connection = Connection(http, bounds.get("format", available_format()))
+        self._connection = Connection(http, bounds.get("format", available_format()), _shown(progress))
 
     def __repr__(self) -> str:
         return f"Client({str(self._connection.http.base_url)!r})"
@@ -241,6 +247,13 @@ def _timeout(seconds: float | None) -> httpx.Timeout:
     if seconds is None:
         return DEFAULT_TIMEOUT
     return httpx.Timeout(None if seconds == math.inf else seconds)
+
+
+def _shown(progress: bool | Callable[[Job], object] | None) -> Callable[[str], Progress] | None:
+    """Who is shown how far a job is, for each of them; nobody if there are to be none."""
+    if progress is None or isinstance(progress, bool):
+        return Bar if progress else None
+    return lambda _: Told(progress)
 
 
 def _key(key: str | None) -> str | None:

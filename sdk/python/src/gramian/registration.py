@@ -9,7 +9,7 @@ from .normalise import REQUEST, Rule, normalise
 from .problems import UnknownCloud
 from .rest import models
 from .tensors import JSON, PLY, Array, Members
-from .transport import Connection
+from .transport import Connection, about
 
 T = TypeVar("T")
 
@@ -66,7 +66,7 @@ class RegisteredCloud:
     def delete(self) -> None:
         """Makes the service forget the points and all that was computed from them; no matter if it has already."""
         try:
-            self._connection.send("DELETE", f"/v1/clouds/{self.id}")
+            self._connection.send("DELETE", f"/v1/clouds/{self.id}", headers=about(self.id))
         except UnknownCloud:
             return
 
@@ -81,18 +81,24 @@ class RegisteredCloud:
         sizes = {"n": self.n_points, "d": self.dimension}
         request = {"cloud": {"id": self.id}, **normalise(fields, rules, sizes)}
         try:
-            return self._connection.compute(path, request, read)
+            return self._connection.compute(path, request, read, self.id)
         except UnknownCloud:
             if not self._post_again(self, _cloud_of(fields.get("geometry"))):
                 raise
-        return self._connection.compute(path, request, read)
+        return self._connection.compute(path, request, read, self.id)
 
     def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
         """Posts those clouds whose points or file are at hand, and says whether there was one."""
-        kept = [(cloud._points, cloud._normals, cloud._file) for cloud in clouds if cloud is not None]
-        posted = [register(self._connection, points, normals) for points, normals, _ in kept if points is not None]
-        posted += [register_file(self._connection, file) for _, _, file in kept if file is not None]
-        return bool(posted)
+        posted = [cloud._post(self.id) for cloud in clouds if cloud is not None]
+        return any(posted)
+
+    def _post(self, asked: str) -> bool:
+        """Posts the points or the file where requests about the cloud `asked` go, and says whether there was either."""
+        if self._points is not None:
+            register(self._connection, self._points, self._normals, asked)
+        elif self._file is not None:
+            register_file(self._connection, self._file, asked)
+        return self._points is not None or self._file is not None
 
 
 def _cloud_of(geometry: object) -> RegisteredCloud | None:
@@ -101,14 +107,14 @@ def _cloud_of(geometry: object) -> RegisteredCloud | None:
     return next((cloud for cloud in (geometry, inner) if isinstance(cloud, RegisteredCloud)), None)
 
 
-def register(connection: Connection, points: Array, normals: Array | None) -> models.Cloud:
-    """Posts points, and says what the service knows of them."""
+def register(connection: Connection, points: Array, normals: Array | None, cloud_id: str | None = None) -> models.Cloud:
+    """Posts points, to the replica that has the cloud `cloud_id` if given, and says what the service knows of them."""
     fields = {"points": points} if normals is None else {"points": points, "normals": normals}
-    return connection.read(models.Cloud.from_dict, connection.post("/v1/clouds", fields, accept=JSON))
+    return connection.read(models.Cloud.from_dict, connection.post("/v1/clouds", fields, JSON, cloud_id))
 
 
-def register_file(connection: Connection, file: bytes) -> models.Cloud:
-    """Posts a PLY file, and says what the service knows of its points."""
-    headers = {"Content-Type": PLY, "Accept": JSON}
+def register_file(connection: Connection, file: bytes, cloud_id: str | None = None) -> models.Cloud:
+    """Posts a PLY file, likewise."""
+    headers = {"Content-Type": PLY, "Accept": JSON, **about(cloud_id)}
     response = connection.send("POST", "/v1/clouds", content=file, headers=headers)
     return connection.read(models.Cloud.from_dict, response)

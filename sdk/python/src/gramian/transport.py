@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 
 import httpx
 
+from . import jobs
+from .jobs import Progress
 from .problems import TRY_LATER, UNREADABLE, problem_of, unreadable
 from .tensors import JSON, SAFETENSORS, Format, Members, decode, encode
 
@@ -19,6 +21,9 @@ T = TypeVar("T")
 
 BACKOFF_SECONDS = 0.1
 """The first wait where the service does not say how long; doubled from one attempt to the next."""
+
+CLOUD_HEADER = "Gramian-Cloud"
+"""Names the cloud that a request is about to proxies: the replica that it is always sent to has what was computed."""
 
 # Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes.
 # Reading past the timeout is not among these, since the service is then busy with the first request still.
@@ -106,10 +111,16 @@ def _or(value: float | None, default: float) -> float:
 class Connection:
     """A service at an address, and how arrays travel there. May be shared by threads."""
 
-    def __init__(self, http: httpx.Client, format: Format) -> None:  # noqa: A002
-        """Takes the HTTP client, whose base URL is the service, and the format of arrays."""
+    def __init__(
+        self,
+        http: httpx.Client,
+        format: Format,  # noqa: A002
+        show: Callable[[str], Progress] | None = None,
+    ) -> None:
+        """Takes the HTTP client, whose base URL is the service, the format of arrays, and who is shown jobs."""
         self.http = http
         self.format = format
+        self.show = show
 
     def send(self, method: str, path: str, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.request)
         """Sends a request.
@@ -130,11 +141,16 @@ class Connection:
             raise problem_of(response, retry_after(response))
         return response
 
-    def post(self, path: str, request: Mapping[str, object], accept: str | None = None) -> httpx.Response:
-        """Posts a JSON document with arrays in it."""
+    def post(
+        self, path: str, request: Mapping[str, object], accept: str | None = None, cloud_id: str | None = None
+    ) -> httpx.Response:
+        """Posts a JSON document with arrays in it, to the replica that has the cloud if its id is known."""
         body, media_type = encode(request, self.format)
         accepted = accept or (JSON if self.format == "json" else SAFETENSORS)
-        return self.send("POST", path, content=body, headers={"Content-Type": media_type, "Accept": accepted})
+        headers = {"Content-Type": media_type, "Accept": accepted, **about(cloud_id)}
+        if self.show is None or cloud_id is None:
+            return self.send("POST", path, content=body, headers=headers)
+        return jobs.answer(self, path, body, headers, self.show)
 
     def read(self, parse: Callable[[Any], T], response: httpx.Response) -> T:
         """Reads an answer in JSON.
@@ -146,16 +162,21 @@ class Connection:
         """
         return understood(response, lambda: parse(response.json()))
 
-    def compute(self, path: str, request: Mapping[str, object], read: Callable[[Members], T]) -> T:
-        """Posts a request and reads its answer.
+    def compute(self, path: str, request: Mapping[str, object], read: Callable[[Members], T], cloud_id: str) -> T:
+        """Posts a request about a cloud and reads its answer.
 
         Raises
         ------
         Problem
             If the request is refused, or the answer none of this service.
         """
-        response = self.post(path, request)
+        response = self.post(path, request, cloud_id=cloud_id)
         return understood(response, lambda: read(decode(response, request)))
+
+
+def about(cloud_id: str | None) -> dict[str, str]:
+    """Returns the headers of a request about a cloud, if its id is known."""
+    return {} if cloud_id is None else {CLOUD_HEADER: cloud_id}
 
 
 def understood(response: httpx.Response, read: Callable[[], T]) -> T:

@@ -11,6 +11,8 @@ from .degenerate import Degenerate
 from .degenerate_reason import DegenerateReason
 from .diagnostics import Diagnostics
 from .duplicate_policy import DuplicatePolicy
+from .estimate_request import EstimateRequest
+from .estimate_response import EstimateResponse
 from .factorization_used import FactorizationUsed
 from .family_score import FamilyScore
 from .field_error import FieldError
@@ -22,6 +24,9 @@ from .interpolation_batch_request import InterpolationBatchRequest
 from .interpolation_batch_response import InterpolationBatchResponse
 from .interpolation_request import InterpolationRequest
 from .interpolation_response import InterpolationResponse
+from .job import Job
+from .job_progress import JobProgress
+from .job_status import JobStatus
 from .kernel import Kernel
 from .kernel_description import KernelDescription
 from .kernel_family import KernelFamily
@@ -41,6 +46,7 @@ from .model_selection_request import ModelSelectionRequest
 from .model_selection_response import ModelSelectionResponse
 from .normals_request import NormalsRequest
 from .normals_response import NormalsResponse
+from .operation_name import OperationName
 from .orientation_choice import OrientationChoice
 from .path_entry import PathEntry
 from .posterior_batch_request import PosteriorBatchRequest
@@ -81,6 +87,8 @@ __all__ = (
     "DegenerateReason",
     "Diagnostics",
     "DuplicatePolicy",
+    "EstimateRequest",
+    "EstimateResponse",
     "FactorizationUsed",
     "FamilyScore",
     "FieldError",
@@ -92,6 +100,9 @@ __all__ = (
     "InterpolationBatchResponse",
     "InterpolationRequest",
     "InterpolationResponse",
+    "Job",
+    "JobProgress",
+    "JobStatus",
     "Kernel",
     "KernelDescription",
     "KernelFamily",
@@ -111,6 +122,7 @@ __all__ = (
     "ModelSelectionResponse",
     "NormalsRequest",
     "NormalsResponse",
+    "OperationName",
     "OrientationChoice",
     "PathEntry",
     "PosteriorBatchRequest",

@@ -39,6 +39,9 @@ def _parse_response(*, client: AuthenticatedClient | Client, response: httpx.Res
     if response.status_code == 404:
         return
 
+    if response.status_code == 429:
+        return
+
     if response.status_code == 500:
         return
 

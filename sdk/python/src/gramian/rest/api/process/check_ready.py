@@ -62,7 +62,9 @@ def sync_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, and if its compute threads do not move.
+     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
+    store is required, while that
+    does not take what it is given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -87,7 +89,9 @@ def sync(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, and if its compute threads do not move.
+     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
+    store is required, while that
+    does not take what it is given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -108,7 +112,9 @@ async def asyncio_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, and if its compute threads do not move.
+     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
+    store is required, while that
+    does not take what it is given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -131,7 +137,9 @@ async def asyncio(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, and if its compute threads do not move.
+     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
+    store is required, while that
+    does not take what it is given.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
