@@ -1,0 +1,188 @@
+"""The panels of the dashboard, in rows, and what they ask Prometheus for; dashboard.py writes them for Grafana.
+
+deploy/test sends each query to a Prometheus that scrapes replicas under load.
+"""
+
+# $instance is what is chosen at the top of the dashboard.
+OF = 'job="gramian", instance=~"$instance"'
+
+
+def rate(family, labels="", by=""):
+    """What a counter does per second, summed but for the labels in `by`."""
+    labels = f"{OF}, {labels}" if labels else OF
+    return f"sum {f'by ({by}) ' if by else ''}(rate({family}{{{labels}}}[$__rate_interval]))"
+
+
+def share(family, labels):
+    """The share of those with these labels in all that a counter counts; 0 if there is none yet."""
+    return f"({rate(family, labels)} or vector(0)) / {rate(family)}"
+
+
+def quantile(share, by=""):
+    """A quantile of the time of requests under /v1."""
+    buckets = rate("gramian_http_request_duration_seconds_bucket", 'route=~"/v1/.*"', f"le{by and ', ' + by}")
+    return f"histogram_quantile({share}, {buckets})"
+
+
+def used(part):
+    """The share of a part of the memory that is used."""
+    bytes_of = f'_bytes{{{OF}, part="{part}"}}'
+    return f"gramian_memory_used{bytes_of} / gramian_memory_limit{bytes_of}"
+
+
+def gauge(family, labels=""):
+    """What holds now, of each replica."""
+    return f"{family}{{{OF}{labels and ', ' + labels}}}"
+
+
+# Row: panels; a panel: title, unit, its queries with their legends, and what it is for.
+ROWS = {
+    "At a glance": [
+        ("Replicas that answer", "none", {"replicas": 'sum(up{job="gramian"})'}, "Of those that Prometheus knows."),
+        ("Requests", "reqps", {"all": rate("gramian_http_requests_total")}, "Per second, probes included."),
+        (
+            "Answers that found their factor",
+            "percentunit",
+            {"hits": share("gramian_cache_requests_total", 'outcome="hit"')},
+            "Low where clients do not send Gramian-Cloud, or the cache is too small.",
+        ),
+        (
+            "Refused or failed",
+            "percentunit",
+            {"5xx": share("gramian_http_requests_total", 'status=~"5.."')},
+            "503 is repeated by the router and by clients.",
+        ),
+    ],
+    "Requests": [
+        (
+            "By status",
+            "reqps",
+            {"{{status}}": rate("gramian_http_requests_total", by="status")},
+            "499: the client left before there was an answer.",
+        ),
+        ("By route", "reqps", {"{{route}}": rate("gramian_http_requests_total", 'route=~"/v1/.*"', "route")}, ""),
+        (
+            "Time of requests",
+            "s",
+            {"median": quantile(0.5), "95 of 100": quantile(0.95), "99 of 100": quantile(0.99)},
+            "From the head of a request to the head of its answer, under /v1.",
+        ),
+        ("Time by route, 95 of 100", "s", {"{{route}}": quantile(0.95, "route")}, ""),
+        ("Refusals by type", "reqps", {"{{type}}": rate("gramian_problems_total", by="type")}, ""),
+        (
+            "Beyond the limits of keys",
+            "reqps",
+            {"{{instance}}": rate("gramian_rate_limited_total", by="instance")},
+            "Answered 429.",
+        ),
+    ],
+    "Load": [
+        (
+            "Waiting",
+            "none",
+            {"{{instance}}": gauge("gramian_queue_depth")},
+            "What the autoscaler looks at. One replica far above the others: one cloud has all the load.",
+        ),
+        ("Waiting by lane", "none", {"{{lane}}": f"sum by (lane) ({gauge('gramian_compute_waiting')})"}, ""),
+        ("Running by lane", "none", {"{{lane}}": f"sum by (lane) ({gauge('gramian_compute_running')})"}, ""),
+        (
+            "Places taken",
+            "percentunit",
+            {"{{instance}}": f"{gauge('gramian_compute_admitted')} / {gauge('gramian_compute_places')}"},
+            "At 100 % the next request is answered 503.",
+        ),
+        ("Requests in flight", "none", {"{{instance}}": gauge("gramian_http_requests_in_flight")}, ""),
+        (
+            "Cores in use",
+            "none",
+            {"{{instance}}": rate("process_cpu_seconds_total", by="instance")},
+            "Beside the threads of each lane, gramian_compute_threads.",
+        ),
+    ],
+    "Factors and memory": [
+        (
+            "Answers by where their factor came from",
+            "reqps",
+            {"{{outcome}}": rate("gramian_cache_requests_total", by="outcome")},
+            "collapsed: another request was computing it.",
+        ),
+        ("Solvers made", "ops", {"{{kind}}": rate("gramian_solvers_prepared_total", by="kind")}, ""),
+        ("Kept", "none", {"{{instance}} {{part}}": gauge("gramian_cache_entries")}, "Clouds, and solvers (cache)."),
+        (
+            "Evicted",
+            "ops",
+            {"{{instance}} {{part}}": rate("gramian_cache_evictions_total", by="instance, part")},
+            "What made room for others. As many as are made: the cache is too small.",
+        ),
+        (
+            "Memory by part",
+            "percentunit",
+            {f"{{{{instance}}}} {part}": used(part) for part in ("clouds", "cache", "work", "intake")},
+            "Of its limit. clouds and cache fill and stay full; intake and work come and go.",
+        ),
+        ("Resident memory", "bytes", {"{{instance}}": gauge("process_resident_memory_bytes")}, ""),
+    ],
+    "Store and router": [
+        (
+            "Store: operations",
+            "ops",
+            {"{{operation}} {{outcome}}": rate("gramian_store_operations_total", by="operation, outcome")},
+            "",
+        ),
+        (
+            "Store: up to date",
+            "none",
+            {"{{instance}}": gauge("gramian_store_up_to_date")},
+            "0: clouds that were acknowledged are in memory alone. Do not end this replica.",
+        ),
+        (
+            "Store: clouds",
+            "none",
+            {"{{instance}}": gauge("gramian_store_clouds")},
+            "As of the last look of each replica, ten minutes ago at most.",
+        ),
+        ("Store: bytes", "bytes", {"{{instance}}": gauge("gramian_store_bytes")}, ""),
+        (
+            "Store: damaged objects",
+            "none",
+            {"{{instance}}": f"sum by (instance) (increase(gramian_store_damaged_total{{{OF}}}[$__range]))"},
+            "",
+        ),
+        (
+            "Router: requests by replica",
+            "reqps",
+            {"{{server}}": "sum by (server) (rate(haproxy_server_http_responses_total[$__rate_interval]))"},
+            "Even, if there are many clouds and none has all the load.",
+        ),
+        (
+            "Router: sent again",
+            "ops",
+            {
+                "to the same": "sum(rate(haproxy_server_retry_warnings_total[$__rate_interval]))",
+                "to another": "sum(rate(haproxy_server_redispatch_warnings_total[$__rate_interval]))",
+            },
+            "More than none while a replica is replaced or full.",
+        ),
+        (
+            "Router: replicas that are up",
+            "none",
+            {"{{instance}}": 'sum by (instance) (haproxy_server_status{proxy="by_cloud", state="UP"})'},
+            "",
+        ),
+    ],
+    "Processes": [
+        (
+            "Hours since the start",
+            "h",
+            {"{{instance}}": f"(time() - {gauge('process_start_time_seconds')}) / 3600"},
+            "",
+        ),
+        ("Open files", "none", {"{{instance}}": gauge("process_open_fds")}, ""),
+        ("Versions", "none", {"{{version}}": f"count by (version) ({gauge('gramian_build_info')})"}, ""),
+    ],
+}
+
+
+def queries():
+    """All that is asked, by the title of the panel."""
+    return [(title, query) for row in ROWS.values() for title, _, queries, _ in row for query in queries.values()]

@@ -1,0 +1,110 @@
+"""The Helm chart, by Helm's own engine and the schemas of Kubernetes; compose.yaml, without its program."""
+
+import re
+
+import helm_python as helm
+import kubernetes_validate
+import yaml
+from fleet import DEPLOY, REPLICAS
+
+CHART = DEPLOY / "helm/gramian"
+OPEN = {"keys": {"allowAnonymous": True}}
+KEYS = {"keys": {"file": '[[key]]\nname = "a"\nhash = "blake3:00"\n'}}
+STORE = {"store": {"url": "s3://bucket/prefix", "variables": {"AWS_REGION": "x"}, "existingSecret": "bucket"}}
+# What users would set, and the kinds that come of it.
+BASE = {"ServiceAccount": 1, "Service": 2, "StatefulSet": 1, "ConfigMap": 1, "Deployment": 1, "PodDisruptionBudget": 2}
+VARIANTS = {
+    "open, one router": ({**OPEN, "router": {"replicas": 1}}, BASE),
+    "keys and store": ({**KEYS, **STORE, "settings": {"GRAMIAN_THREADS": 4}}, {**BASE, "Secret": 1}),
+    "a Secret of one's own": ({"keys": {"existingSecret": "mine"}, **STORE}, BASE),
+    "all of it": (
+        {**OPEN, **STORE, "autoscaling": {"enabled": True}, "networkPolicy": {"enabled": True}}
+        | {"podMonitor": {"enabled": True}, "nodeSelector": {"disk": "ssd"}, "tolerations": [{"operator": "Exists"}]},
+        {**BASE, "HorizontalPodAutoscaler": 1, "NetworkPolicy": 1, "PodMonitor": 2},
+    ),
+}
+# What has to be refused, with what is then said.
+REFUSED = {"who may use": {}, "schema": {**OPEN, "settings": {"GRAMIAN_THREAD-S": "1"}}}
+
+
+def check(report):
+    """Lints and renders it, validates what comes out, and compares the router's file with the shipped one."""
+    chart = helm.Chart.load(str(CHART))
+    lint = helm.lint(str(CHART), OPEN, strict=True)
+    errors = [message for message in lint["messages"] if message["severity"] > 1]
+    report.line("helm lint", f"{len(errors)} errors and warnings", not errors and not lint["errors"])
+    print("".join(f"            {error}\n" for error in errors), end="")
+    for what, (values, kinds) in VARIANTS.items():
+        documents = rendered(chart, values)
+        found = {kind: sum(document["kind"] == kind for document in documents) for kind in kinds}
+        report.line(f"chart, {what}: objects", len(documents), found == kinds and len(documents) == sum(kinds.values()))
+        invalid = [fault for document in documents for fault in faults(document)]
+        report.line(f"chart, {what}: invalid ones", len(invalid), not invalid)
+        print("".join(f"            {fault}\n" for fault in invalid), end="")
+    for what, values in REFUSED.items():
+        report.line(f"chart refuses: {what}", refusal(chart, values) or "nothing", what in refusal(chart, values))
+    compare_routers(report, rendered(chart, {**OPEN, "router": {"replicas": 1}}))
+    compose(report)
+
+
+def rendered(chart, values):
+    """The objects that the chart makes."""
+    files = chart.render(values, name="gramian", namespace="test")
+    documents = [
+        document for name, text in files.items() if name.endswith(".yaml") for document in yaml.safe_load_all(text)
+    ]
+    return [document for document in documents if document]
+
+
+def faults(document):
+    """What the schema of Kubernetes says against an object; those of operators have none."""
+    if document["kind"] == "PodMonitor":
+        return []
+    try:
+        kubernetes_validate.validate(document, "1.30", strict=True)
+    except kubernetes_validate.ValidationError as error:
+        return [f"{document['kind']} {document['metadata']['name']}: {error.message} at {list(error.path)}"]
+    return []
+
+
+def refusal(chart, values):
+    """How values are refused; empty if they are not."""
+    try:
+        chart.validate_schema(values)
+    except helm.HelmError as error:
+        return f"schema: {str(error).splitlines()[-1]}"[:60]
+    try:
+        chart.render(values, name="gramian", namespace="test")
+    except helm.HelmError as error:
+        return re.sub(r"^.*say ", "say ", str(error), flags=re.DOTALL)[:60]
+    return ""
+
+
+def compare_routers(report, documents):
+    """The configuration in the chart is the tested one but for the names of replicas, and comments."""
+    texts = [document["data"]["haproxy.cfg"] for document in documents if document["kind"] == "ConfigMap"]
+    for number, name in enumerate(REPLICAS):
+        texts = [text.replace(f"gramian-{number}.gramian-replicas.test.svc.cluster.local", name) for text in texts]
+        texts = [text.replace(f"gramian-{number}", name) for text in texts]
+    shipped = (DEPLOY / "haproxy/haproxy.cfg").read_text()
+    is_same = [statements(text) for text in texts] == [statements(shipped)]
+    report.line("the chart's haproxy.cfg is the tested one", is_same, is_same)
+
+
+def statements(text):
+    """The lines that say something."""
+    return [line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith("#")]
+
+
+def compose(report):
+    """Every file that compose.yaml mounts is here, and every service that one waits for."""
+    services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
+    mounts = [
+        volume for service in services.values() for volume in service.get("volumes", []) if volume.startswith("./")
+    ]
+    absent = [
+        mount for mount in mounts if not (DEPLOY / mount.split(":")[0]).exists() and not mount.startswith("./keys")
+    ]
+    absent += [name for service in services.values() for name in service.get("depends_on", {}) if name not in services]
+    absent += [name for name in REPLICAS if name not in services]
+    report.line("compose.yaml: files and services that are missing", absent or "none", not absent)

@@ -1,0 +1,161 @@
+"""Clients at once, and what became of their requests."""
+
+import itertools
+import math
+import random
+import threading
+import time
+from collections import Counter
+
+import gramian
+import httpx
+import numpy as np
+
+N_CLIENTS = 8
+N_POINTS, N_MANY_POINTS = 120, 1500
+FIT = {"kernel": gramian.Kernel("matern", length_scale=0.4), "alpha": 1e-6}
+GOLDEN = math.pi * (1 + math.sqrt(5))
+
+
+def new_seeds():
+    """Seeds of clouds that no other part of the run has."""
+    return next(_MILLIONS) * 999_999
+
+
+_MILLIONS = itertools.count(1)
+
+
+def points(seed, n=None):
+    """A sphere that no other seed has. Every third one takes a moment to factorize: so something is under way."""
+    n = n or (N_POINTS if seed % 3 else N_MANY_POINTS)
+    z = 1 - (2 * np.arange(n) + 1) / n
+    angles = GOLDEN * np.arange(n)
+    r = np.sqrt(1 - z * z)
+    return np.column_stack([r * np.cos(angles), r * np.sin(angles), z]) * (1 + 1e-9 * seed)
+
+
+def values(cloud_points):
+    """Something to interpolate."""
+    return np.sin(3 * cloud_points[:, 0]) + cloud_points[:, 2]
+
+
+class Load:
+    """Counts what clients see: answers, those that found a factor, answers that they did not want, and failures."""
+
+    def __init__(self, url, retries):
+        self.url, self.retries = url, retries
+        self.lock = threading.Lock()
+        self.statuses, self.cached = Counter(), Counter()
+        self.failures, self.acknowledged = [], {}
+        self.n_answers = self.n_attempts = 0
+        self._first = new_seeds()
+        self._end = threading.Event()
+        self._threads = []
+
+    def client(self):
+        """A client of the package; every attempt is counted, also those that it repeats itself."""
+        client = gramian.Client(self.url, retries=self.retries, max_wait=60, timeout=60)
+        hooks = client.rest.get_httpx_client().event_hooks
+        hooks["request"].append(self._count_attempt)
+        hooks["response"].append(self._count)
+        return client
+
+    def _count_attempt(self, request):
+        del request
+        with self.lock:
+            self.n_attempts += 1
+
+    def _count(self, response):
+        with self.lock:
+            self.statuses[response.status_code] += 1
+            if "cache-status" in response.headers:
+                self.cached[response.headers["cache-status"]] += 1
+
+    def n_repeated(self):
+        """The attempts that did not end well, by status and without one: each was repeated, or is a failure."""
+        refused = sum(count for status, count in self.statuses.items() if status >= 400)
+        return refused, self.n_attempts - self.statuses.total()
+
+    def register(self, client, seed):
+        """Registers a cloud and notes that the service has said that it has it."""
+        cloud = client.cloud(points(seed))
+        with self.lock:
+            self.acknowledged[seed] = cloud.id
+        return cloud
+
+    def ask(self, cloud):
+        """One computation; whether its answer is right is seen by its residual: values at the points themselves."""
+        known = values(cloud.points)
+        answer = cloud.interpolate(known, cloud.points[:20], **FIT)
+        if not np.allclose(answer.values, known[:20], atol=1e-3):
+            raise ValueError("wrong numbers")
+        with self.lock:
+            self.n_answers += 1
+
+    def attempt(self, action, *arguments):
+        """Does something as a client; what it raises is a failure."""
+        try:
+            return action(*arguments)
+        except (gramian.Problem, httpx.TransportError, ValueError) as error:
+            with self.lock:
+                self.failures.append(f"{type(error).__name__}: {error}"[:200])
+            time.sleep(0.05)
+            return None
+
+    def work(self, work):
+        """Runs `work(client, source)` in as many threads as there are clients."""
+
+        def run(number):
+            with self.client() as client:
+                work(client, random.Random(number))
+
+        self._threads = [threading.Thread(target=run, args=(k,), daemon=True) for k in range(N_CLIENTS)]
+        for thread in self._threads:
+            thread.start()
+
+    def wait(self):
+        """Waits for all clients."""
+        for thread in self._threads:
+            thread.join()
+
+    def __enter__(self):
+        """Clients ask for clouds that are there, and register new ones now and then, until the block ends."""
+        self.work(self._keep_asking)
+        return self
+
+    def __exit__(self, *_):
+        self._end.set()
+        self.wait()
+
+    def _keep_asking(self, client, source):
+        clouds = []
+        while not self._end.is_set():
+            if len(clouds) < 5 or source.random() < 0.05:
+                cloud = self.attempt(self.register, client, self._first + source.randrange(10**6))
+                clouds += [cloud] if cloud else []
+            else:
+                self.attempt(self.ask, source.choice(clouds))
+            time.sleep(0.01)
+
+
+def repeat(url, n_clouds, n_requests):
+    """Asks for each of some clouds as often, in random order, by all clients at once."""
+    load = Load(url, retries=4)
+    with load.client() as client:
+        clouds = [load.register(client, new_seeds() + 1) for _ in range(n_clouds)]
+    requests = [k for k in range(n_clouds) for _ in range(n_requests)]
+    random.Random(1).shuffle(requests)
+
+    def work(client, source):
+        del source
+        own = [gramian.Cloud(client._connection, cloud.description, cloud.points) for cloud in clouds]
+        while True:
+            with load.lock:
+                if not requests:
+                    return
+                k = requests.pop()
+            load.attempt(load.ask, own[k])
+
+    load.work(work)
+    load.wait()
+    return load

@@ -1,0 +1,55 @@
+"""Runs everything that deploy/test tests; see there."""
+
+import shutil
+import signal
+import sys
+
+import chart
+import observed
+from fleet import Envoy, Fleet, Haproxy, Nginx
+from phases import Report, hit_rate, kill, rolling_restart, running, smoke
+from processes import Failed, Processes
+
+
+def main(binary):
+    # Whoever ends this program ends all that it started; shells have programs in their background ignore SIGINT.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: sys.exit("ended"))
+    report, processes = Report(), Processes()
+    try:
+        run(report, processes, binary)
+    except Failed as failure:
+        report.line("cannot go on", failure, False)
+    finally:
+        processes.end_all()
+        if report.n_missed:
+            print("\n".join(processes.last_words()))
+        shutil.rmtree(processes.directory, ignore_errors=True)
+    print("all bounds hold" if not report.n_missed else f"{report.n_missed} bounds are missed")
+    sys.exit(bool(report.n_missed))
+
+
+def run(report, processes, binary):
+    """All of it."""
+    chart.check(report)
+    fleet = Fleet(processes, binary)
+    prometheus = observed.Prometheus(fleet)
+    fleet.start()
+    prometheus.start()
+    with running(fleet, Haproxy(fleet)) as router:
+        smoke(report, router)
+        hit_rate(report, fleet, router)
+        kill(report, fleet, router)
+        rolling_restart(report, fleet, router)
+        observed.dashboard(report, prometheus)
+        observed.alerts(report, prometheus)
+    for router in (Nginx(fleet), Envoy(fleet)):
+        with running(fleet, router):
+            smoke(report, router)
+            hit_rate(report, fleet, router)
+            kill(report, fleet, router)
+            rolling_restart(report, fleet, router)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,126 @@
+"""What is done to the fleet, and what has to hold."""
+
+import contextlib
+import time
+
+import httpx
+from fleet import REPLICAS, metric
+from load import FIT, Load, new_seeds, points, repeat, values
+from processes import get
+
+# Under load before and after something happens.
+SECONDS_BEFORE, SECONDS_AFTER = 4, 6
+PREPARED = "gramian_solvers_prepared_total"
+N_LARGE_POINTS = 20_000
+
+
+class Report:
+    """The figures of a run, and whether all are within their bounds."""
+
+    def __init__(self):
+        self.began = time.monotonic()
+        self.n_missed = 0
+
+    def line(self, what, figure, holds):
+        """One figure."""
+        self.n_missed += not holds
+        print(f"{time.monotonic() - self.began:6.0f} s  {'ok  ' if holds else 'FAIL'}  {what}: {figure}", flush=True)
+
+    def failures(self, load):
+        """What clients were told, if it should not have been."""
+        for failure in load.failures[:5]:
+            print(f"            {failure}")
+
+
+def smoke(report, router):
+    """A large body, one request with points, what is not for everybody, and the router's way by a path."""
+    with httpx.Client(base_url=router.url, timeout=60) as http:
+        rows = points(new_seeds(), N_LARGE_POINTS).tolist()
+        large = http.post("/v1/clouds", json={"points": rows})
+        cloud = large.headers.get("gramian-cloud", "")
+        known = http.get(f"/v1/clouds/{cloud}").status_code
+        inline = http.post("/v1/normals", json={"cloud": {"points": rows[:50]}}).status_code
+        metrics = http.get("/metrics").status_code
+        statuses = (large.status_code, known, inline, metrics)
+    size = len(large.request.content) / 2**20
+    report.line(
+        f"{router.name}: {size:.1f} MiB of points, by path, inline, /metrics",
+        statuses,
+        statuses == (201, 200, 200, 404),
+    )
+
+
+def hit_rate(report, fleet, router, n_clouds=40, n_requests=30):
+    """Repeated requests find their factor, which is made once in the whole fleet."""
+    before = fleet.total(PREPARED)
+    load = repeat(router.url, n_clouds, n_requests)
+    n_made = fleet.total(PREPARED) - before
+    n, n_hits = load.cached.total(), load.cached["gramian; hit"]
+    share, possible = n_hits / n, 1 - n_clouds / n
+    what = f"{router.name}: hits of {n} requests for {n_clouds} clouds"
+    report.line(what, f"{share:.1%} ({possible:.1%} possible)", share >= 0.95)
+    report.line(f"{router.name}: factors made for {n_clouds} clouds", f"{n_made:.0f}", n_made == n_clouds)
+    report.line(f"{router.name}: failed", f"{len(load.failures)} of {n}", not load.failures)
+    report.failures(load)
+
+
+def kill(report, fleet, router):
+    """A replica is killed under load and comes back: no request fails after retries, no acknowledged cloud is lost."""
+    victim = REPLICAS[1]
+    with Load(router.url, retries=4) as load:
+        time.sleep(SECONDS_BEFORE)
+        fleet.kill(victim)
+        time.sleep(SECONDS_AFTER)
+        fleet.start_replica(victim)
+        router.wait_for(victim)
+        time.sleep(SECONDS_AFTER)
+    n = load.n_answers + len(load.acknowledged) + len(load.failures)
+    n_refused, n_cut = load.n_repeated()
+    report.line(f"{router.name}: failed, one replica killed", f"{len(load.failures)} of {n}", not load.failures)
+    print(f"                      the router repeated: {router.n_repeated()}", end="; ")
+    print(f"clients repeated: {n_refused} refusals, {n_cut} lost connections")
+    report.failures(load)
+    n_back = metric(get(f"{fleet.address(victim)}/metrics"), PREPARED)
+    report.line(f"{router.name}: factors made by the replica since it is back", f"{n_back:.0f}", n_back > 0)
+    n_lost = lost(load)
+    report.line(
+        f"{router.name}: acknowledged clouds that are lost", f"{n_lost} of {len(load.acknowledged)}", n_lost == 0
+    )
+
+
+def lost(load):
+    """How many clouds that were acknowledged cannot be asked for by their id alone."""
+    n_lost = 0
+    with httpx.Client(base_url=load.url, timeout=60) as http:
+        for seed, cloud in load.acknowledged.items():
+            kernel = {"family": "matern", "length_scale": 0.4}
+            known = values(points(seed)).tolist()
+            request = {"cloud": {"id": cloud}, "values": known, "kernel": kernel, "alpha": FIT["alpha"]}
+            request["queries"] = [[0.0, 0.0, 1.0]]
+            response = http.post("/v1/interpolation", json=request, headers={"Gramian-Cloud": cloud})
+            n_lost += response.status_code != 200
+    return n_lost
+
+
+def rolling_restart(report, fleet, router):
+    """All replicas are replaced one after the other under load: no request fails, without retries of the clients."""
+    with Load(router.url, retries=0) as load:
+        time.sleep(SECONDS_BEFORE)
+        for name in REPLICAS:
+            fleet.drain(name)
+            fleet.start_replica(name)
+            router.wait_for(name)
+        time.sleep(SECONDS_BEFORE)
+    n = load.n_answers + len(load.acknowledged) + len(load.failures)
+    what = f"{router.name}: failed, all replicas replaced in turn, no retries of clients"
+    report.line(what, f"{len(load.failures)} of {n}", not load.failures)
+    print(f"                      the router has repeated in all: {router.n_repeated()}")
+    report.failures(load)
+
+
+@contextlib.contextmanager
+def running(fleet, router):
+    """A router, for as long as the block takes."""
+    router.start()
+    yield router
+    fleet.processes.end(router.name)

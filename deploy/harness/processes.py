@@ -1,0 +1,121 @@
+"""Processes on ports of their own, in a directory of their own, all of which end with this one."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+SECONDS_TO_START = 30
+SECONDS_TO_END = 40
+# The kernel ends them if this process is killed: then it cannot do so itself.
+WITH_PARENT = ["setpriv", "--pdeathsig", "KILL"]
+
+
+class Failed(Exception):
+    """Something does not work at all, so that the rest means nothing."""
+
+
+def free_port():
+    """A port that nobody listens on; ports of a run differ."""
+    while True:
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            port = listener.getsockname()[1]
+        if port not in _given:
+            _given.add(port)
+            return port
+
+
+_given = set()
+
+
+class Processes:
+    """Those of a run, by name, with their logs."""
+
+    def __init__(self):
+        self.directory = Path(tempfile.mkdtemp(prefix="gramian-deploy-"))
+        # The workers of nginx are somebody else.
+        self.directory.chmod(0o711)
+        self._running = {}
+
+    def start(self, name, command, variables=(), ready=None):
+        """Starts a command and waits for 200 at the address `ready`."""
+        environment = {key: value for key, value in os.environ.items() if not key.startswith(("GRAMIAN_", "AWS_"))}
+        with self.log(name).open("ab") as log:
+            process = subprocess.Popen(
+                [*WITH_PARENT, *map(str, command)],
+                env={**environment, **dict(variables)},
+                cwd=self.directory,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                process_group=0,  # Ctrl-C is for this program, which ends them in order
+            )
+        self._running[name] = process
+        if ready:
+            self._wait(name, process, ready)
+
+    def _wait(self, name, process, address):
+        until = time.monotonic() + SECONDS_TO_START
+        while not answers(address):
+            if process.poll() is not None:
+                raise Failed(f"{name} ended with status {process.returncode}")
+            if time.monotonic() > until:
+                raise Failed(f"{name} does not answer at {address}")
+            time.sleep(0.05)
+
+    def end(self, name, how=signal.SIGTERM):
+        """Ends a process and waits until it has; returns its status."""
+        process = self._running.pop(name)
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(how)
+        try:
+            return process.wait(SECONDS_TO_END)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return process.wait()
+
+    def end_all(self):
+        """Ends what still runs, at once, with the workers of each."""
+        for process in self._running.values():
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        for process in self._running.values():
+            process.wait()
+        self._running.clear()
+
+    def log(self, name):
+        """The file with what a process says."""
+        return self.directory / f"{name}.log"
+
+    def last_words(self):
+        """The ends of all logs."""
+        for path in sorted(self.directory.glob("*.log")):
+            lines = path.read_text(errors="replace").splitlines()[-4:]
+            yield f"--- {path.name}"
+            yield from (line[:200] for line in lines)
+
+
+def get(address, timeout=5.0):
+    """The body at an address."""
+    with urllib.request.urlopen(address, timeout=timeout) as response:
+        return response.read()
+
+
+def answers(address):
+    """Whether it answers with success."""
+    try:
+        get(address, timeout=1.0)
+    except (OSError, urllib.error.URLError):
+        return False
+    return True
+
+
+def put(address):
+    """Makes a bucket."""
+    urllib.request.urlopen(urllib.request.Request(address, method="PUT"), timeout=10).close()
