@@ -1,0 +1,11 @@
+//! A cloud as a file of NPY.
+
+#![no_main]
+
+use gramian::http::reading::read_as;
+use gramian::http::wire::negotiation::{Coding, Format};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let _ = read_as("create_cloud", Format::Npy, Coding::Identity, data);
+});

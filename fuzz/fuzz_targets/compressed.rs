@@ -1,0 +1,13 @@
+//! A compressed body: gzip or zstd, as the first byte says. What it unpacks to is bounded, whatever it is.
+
+#![no_main]
+
+use gramian::http::reading::read_as;
+use gramian::http::wire::negotiation::{Coding, Format};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((&first, body)) = data.split_first() else { return };
+    let coding = if first % 2 == 0 { Coding::Gzip } else { Coding::Zstd };
+    let _ = read_as("create_cloud", Format::Json, coding, body);
+});

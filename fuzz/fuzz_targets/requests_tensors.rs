@@ -1,0 +1,13 @@
+//! A body in safetensors, as the request of every operation.
+
+#![no_main]
+
+use gramian::http::reading::{OPERATIONS, read_as};
+use gramian::http::wire::negotiation::{Coding, Format};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((&first, body)) = data.split_first() else { return };
+    let operation = OPERATIONS[usize::from(first) % OPERATIONS.len()];
+    let _ = read_as(operation, Format::Safetensors, Coding::Identity, body);
+});

@@ -1,0 +1,22 @@
+//! Short texts from outside: ids, names of places, origins, and files of keys.
+
+#![no_main]
+
+use gramian::config::Origins;
+use gramian::http::access::check_file;
+use gramian::store::key::CloudId;
+use gramian::store::objects::Place;
+use gramian::store::objects::jobs::JobId;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|text: &str| {
+    if let Some(id) = CloudId::parse(text) {
+        assert_eq!(id.to_string(), text);
+    }
+    if let Some(id) = JobId::parse(text) {
+        assert_eq!(id.to_string(), text);
+    }
+    let _ = text.parse::<Place>();
+    let _ = text.parse::<Origins>();
+    let _ = check_file(text);
+});
