@@ -9,8 +9,8 @@
 #   to the build where it is present.
 #
 # What it checks: the service becomes ready, the image's own health check passes, a request is answered, the process is
-# not root and needs neither capabilities nor a writable file system, SIGTERM ends it at once with status 0, a cloud is there again when
-# another container has the same volume, and without keys or permission it does not start.
+# not root and needs neither capabilities nor a writable file system, SIGTERM ends it at once with status 0 but for the request that it
+# still answers, a cloud is there again when another container has the same volume, and without keys or permission it does not start.
 set -euo pipefail
 
 readonly image=localhost/gramian:test
@@ -18,6 +18,7 @@ readonly container=gramian
 readonly needed_gib=4
 readonly ready_seconds=30
 readonly stop_seconds=5
+readonly drain_seconds=30
 
 say() { printf '[%4ds] %s\n' "$SECONDS" "$*"; }
 fail() { printf 'FAILED: %s\n' "$*" >&2; exit 1; }
@@ -161,12 +162,12 @@ jq --exit-status --argjson n "$n_points" '.mean_curvatures | length == $n and al
 say "$n_points mean curvatures of the torus"
 
 id=$(jq --raw-output .diagnostics.cloud_id "$work/answer.json")
-stop() {
-  local started=$SECONDS exit_code
-  engine stop --time $((2 * stop_seconds)) "$container" >/dev/null
+stop() { # stop [SECONDS]: within these
+  local started=$SECONDS seconds=${1:-$stop_seconds} exit_code
+  engine stop --time $((2 * seconds)) "$container" >/dev/null
   exit_code=$(engine inspect --format '{{.State.ExitCode}}' "$container")
   [[ $exit_code -eq 0 ]] || fail "SIGTERM ends the service with status $exit_code"
-  ((SECONDS - started <= stop_seconds)) || fail "it took $((SECONDS - started)) s to end after SIGTERM"
+  ((SECONDS - started <= seconds)) || fail "it took $((SECONDS - started)) s to end after SIGTERM"
 }
 stop
 say "SIGTERM ends it with status 0"
@@ -175,8 +176,21 @@ engine rm "$container" >/dev/null
 start
 status=$(inside curl --silent --output "$work/cloud.json" --write-out '%{http_code}' "http://127.0.0.1:8080/v1/clouds/$id")
 [[ $status == 200 ]] || fail "the cloud is not there any more: $status $(head -c 2000 "$work/cloud.json")"
-stop
 say "another container on the volume has the cloud"
+
+jq --null-input --compact-output '{cloud: {points: [range(6000) | [(. * 2.4 | cos), (. * 2.4 | sin), . / 3000]]},
+  kernel: {family: "matern", length_scale: 0.3}, alpha: 1e-6}' >"$work/slow.json"
+inside curl --silent --show-error --max-time 60 --output /dev/null --write-out '%{http_code}' \
+  --header 'content-type: application/json' --data-binary "@$work/slow.json" \
+  http://127.0.0.1:8080/v1/normals >"$work/slow.status" &
+slow=$!
+until inside curl --silent http://127.0.0.1:8080/metrics | grep -q '^gramian_compute_admitted 1$'; do
+  kill -0 "$slow" 2>/dev/null || fail "the slow request was over too soon: $(cat "$work/slow.status")"
+done
+stop "$drain_seconds"
+wait "$slow" || fail "the request that was under way when SIGTERM came was cut off"
+[[ $(cat "$work/slow.status") == 200 ]] || fail "the request that was under way is answered $(cat "$work/slow.status")"
+say "SIGTERM waits for the request that is under way"
 mib() { awk -v bytes="$1" 'BEGIN { printf "%.1f MiB", bytes / 1048576 }'; }
 total=$(engine image inspect --format '{{.Size}}' "$image")
 base=$(engine image inspect --format '{{.Size}}' docker.io/library/debian:bookworm-slim)
