@@ -41,7 +41,7 @@ enum Command {
 fn main() -> ExitCode {
     let Arguments { config, command } = Arguments::parse();
     let outcome = match command {
-        Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.as_deref()) {
+        Some(Command::Health) => match server::is_ready(config.bind, config.tls_certificate.is_some()) {
             Ok(true) => Ok(()),
             Ok(false) => Err("not ready".into()),
             Err(error) => Err(error.into()),

@@ -11,11 +11,14 @@ CHART = DEPLOY / "helm/gramian"
 OPEN = {"keys": {"allowAnonymous": True}}
 KEYS = {"keys": {"file": '[[key]]\nname = "a"\nhash = "blake3:00"\n'}}
 STORE = {"store": {"url": "s3://bucket/prefix", "variables": {"AWS_REGION": "x"}, "existingSecret": "bucket"}}
+# As Helm reads them from a file of values: numbers are floating-point.
+SETTINGS = {"GRAMIAN_CACHE_BYTES": 8589934592.0, "GRAMIAN_DEADLINE_SECONDS": 2.5, "OTEL_TRACES_SAMPLER": "traceidratio"}
+WRITTEN = ['"8589934592"', '"2.5"', '"traceidratio"']
 # What users would set, and the kinds that come of it.
 BASE = {"ServiceAccount": 1, "Service": 2, "StatefulSet": 1, "ConfigMap": 1, "Deployment": 1, "PodDisruptionBudget": 2}
 VARIANTS = {
     "open, one router": ({**OPEN, "router": {"replicas": 1}}, BASE),
-    "keys and store": ({**KEYS, **STORE, "settings": {"GRAMIAN_THREADS": 4}}, {**BASE, "Secret": 1}),
+    "keys and store": ({**KEYS, **STORE, "settings": SETTINGS}, {**BASE, "Secret": 1}),
     "a Secret of one's own": ({"keys": {"existingSecret": "mine"}, **STORE}, BASE),
     "all of it": (
         {**OPEN, **STORE, "autoscaling": {"enabled": True}, "networkPolicy": {"enabled": True}}
@@ -43,6 +46,9 @@ def check(report):
         print("".join(f"            {fault}\n" for fault in invalid), end="")
     for what, values in REFUSED.items():
         report.line(f"chart refuses: {what}", refusal(chart, values) or "nothing", what in refusal(chart, values))
+    text = "".join(chart.render(VARIANTS["keys and store"][0], name="gramian", namespace="test").values())
+    missing = [value for value in WRITTEN if f"value: {value}" not in text]
+    report.line("the chart's settings as the server reads them, missing", missing or "none", not missing)
     compare_routers(report, rendered(chart, {**OPEN, "router": {"replicas": 1}}))
     compose(report)
 

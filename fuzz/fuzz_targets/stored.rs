@@ -1,13 +1,19 @@
-//! Bytes of the store: what is read as a cloud has the name that its points give it, and is written as it was read.
+//! Bytes of the store: what is read as a cloud has the name that its points give it, and is written as it was read; what is read as a job or its
+//! result ends.
 
 #![no_main]
 
 use std::sync::Arc;
 
+use futures_util::StreamExt;
 use gramian::store::key::CloudId;
+use gramian::store::objects::{Objects, OwnerName};
 use gramian::store::objects::cloud_object::{decode, encode};
-use gramian::store::objects::jobs::read_request;
+use gramian::store::objects::jobs::JobId;
 use libfuzzer_sys::fuzz_target;
+use object_store::memory::InMemory;
+use object_store::path::Path;
+use object_store::{ObjectStore, ObjectStoreExt};
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, bytes)) = data.split_first_chunk::<32>() else { return };
@@ -18,5 +24,21 @@ fuzz_target!(|data: &[u8]| {
         assert_eq!(CloudId::of(&cloud.cloud, cloud.normals.as_ref()), id);
         assert_eq!(encode(&cloud).concat(), bytes);
     }
-    let _ = read_request(&bytes.to_vec().into());
+    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime without drivers");
+    runtime.block_on(read_job(bytes));
 });
+
+async fn read_job(bytes: &[u8]) {
+    let (store, id, owner) = (Arc::new(InMemory::new()), JobId::new(), OwnerName("a".to_owned()));
+    for part in ["request", "result", "answer-0"] {
+        let name = Path::from(format!("a/jobs/{id}/{part}"));
+        store.put(&name, bytes.to_vec().into()).await.expect("there is memory");
+    }
+    let objects = Arc::new(Objects::over(store as Arc<dyn ObjectStore>, Path::default()));
+    if let Ok(Some(Ok(found))) = objects.open_job(&owner, id).await {
+        found.body.for_each(|_| std::future::ready(())).await;
+    }
+    if let Ok(Some(found)) = objects.get_result(&owner, id).await {
+        found.body.for_each(|_| std::future::ready(())).await;
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use arc_swap::ArcSwap;
 use tokio::net::TcpStream;
@@ -23,8 +23,13 @@ const PROTOCOLS: [&[u8]; 2] = [b"h2", b"http/1.1"];
 pub struct Tls {
     certificate: PathBuf,
     key: PathBuf,
+    /// Of both files as they were at the start.
+    first: Digest,
     current: ArcSwap<ServerConfig>,
 }
+
+/// BLAKE3 of both files.
+type Digest = [u8; 32];
 
 impl Tls {
     /// Reads both files.
@@ -32,8 +37,9 @@ impl Tls {
     /// # Errors
     /// Says which of them is wrong, and how.
     pub fn new(certificate: &Path, key: &Path) -> Result<Self, String> {
-        let current = ArcSwap::from_pointee(read(certificate, key)?);
-        Ok(Self { certificate: certificate.to_owned(), key: key.to_owned(), current })
+        let (config, first) = read(certificate, key)?;
+        let current = ArcSwap::from_pointee(config);
+        Ok(Self { certificate: certificate.to_owned(), key: key.to_owned(), first, current })
     }
 
     /// Shakes hands with a newcomer.
@@ -44,32 +50,27 @@ impl Tls {
         TlsAcceptor::from(self.current.load_full()).accept(socket).await
     }
 
-    /// Reads the files again whenever they change, for as long as the process lives. Files that do not go together, as while one of them
-    /// is replaced, change nothing.
+    /// Takes the files again whenever they are others, for as long as the process lives. Files that do not go together, as while one of
+    /// them is replaced, change nothing. They are read each time: their times and lengths do not tell whether they can be.
     pub async fn follow_files(self: Arc<Self>) {
-        let mut last = self.state();
+        let mut last = Ok(self.first);
         let mut ticks = tokio::time::interval(LOOKING);
         loop {
             ticks.tick().await;
-            let now = self.state();
+            let found = read(&self.certificate, &self.key);
+            let now = found.as_ref().map(|(_, digest)| *digest).map_err(String::clone);
             if now == last {
                 continue;
             }
             last = now;
-            match read(&self.certificate, &self.key) {
-                Ok(config) => {
+            match found {
+                Ok((config, _)) => {
                     self.current.store(Arc::new(config));
                     tracing::info!("the certificate was read again");
                 }
                 Err(error) => tracing::error!(error, "the certificate stays as it was"),
             }
         }
-    }
-
-    fn state(&self) -> [Option<(SystemTime, u64)>; 2] {
-        let state =
-            |path| std::fs::metadata(path).and_then(|found| Ok((found.modified()?, found.len()))).ok();
-        [state(&self.certificate), state(&self.key)]
     }
 }
 
@@ -78,9 +79,17 @@ pub fn provider() -> Arc<CryptoProvider> {
     Arc::new(aws_lc_rs::default_provider())
 }
 
-fn read(certificate: &Path, key: &Path) -> Result<ServerConfig, String> {
-    let chain = certificates(certificate)?;
-    let key_of = PrivateKeyDer::from_pem_file(key);
+fn read(certificate: &Path, key: &Path) -> Result<(ServerConfig, Digest), String> {
+    let mut hasher = blake3::Hasher::new();
+    let mut bytes_of = |path: &Path| {
+        let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+        hasher.update(&(bytes.len() as u64).to_le_bytes()).update(&bytes);
+        Ok::<_, String>(bytes)
+    };
+    let failed = |error: String| format!("the certificate (GRAMIAN_TLS_CERTIFICATE) cannot be read: {error}");
+    let chain = bytes_of(certificate).and_then(|bytes| certificates(&bytes)).map_err(failed)?;
+    let key_of = bytes_of(key)
+        .and_then(|bytes| PrivateKeyDer::from_pem_slice(&bytes).map_err(|error| error.to_string()));
     let key_of = key_of.map_err(|error| format!("the key (GRAMIAN_TLS_KEY) cannot be read: {error}"))?;
     let config = ServerConfig::builder_with_provider(provider()).with_safe_default_protocol_versions();
     let config = config.map_err(|error| error.to_string())?.with_no_client_auth();
@@ -88,18 +97,12 @@ fn read(certificate: &Path, key: &Path) -> Result<ServerConfig, String> {
     let mut config =
         config.map_err(|error| format!("the certificate (GRAMIAN_TLS_CERTIFICATE) and its key: {error}"))?;
     config.alpn_protocols = PROTOCOLS.map(<[u8]>::to_vec).to_vec();
-    Ok(config)
+    Ok((config, hasher.finalize().into()))
 }
 
 /// The certificates of a file, that of the server first.
-///
-/// # Errors
-/// Says what is wrong with the file.
-pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, String> {
-    let failed = |error: &dyn std::fmt::Display| {
-        format!("the certificate (GRAMIAN_TLS_CERTIFICATE) cannot be read: {error}")
-    };
-    let found = CertificateDer::pem_file_iter(path).map_err(|error| failed(&error))?;
-    let found: Vec<_> = found.collect::<Result<_, _>>().map_err(|error| failed(&error))?;
-    if found.is_empty() { Err(failed(&"it has none")) } else { Ok(found) }
+fn certificates(bytes: &[u8]) -> Result<Vec<CertificateDer<'static>>, String> {
+    let found = CertificateDer::pem_slice_iter(bytes).collect::<Result<Vec<_>, _>>();
+    let found = found.map_err(|error| error.to_string())?;
+    if found.is_empty() { Err("it has none".to_owned()) } else { Ok(found) }
 }

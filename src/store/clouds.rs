@@ -28,6 +28,10 @@ pub struct RegisteredCloud {
     created_at: AtomicU64,
     /// Whether it outlives the process.
     is_durable: AtomicBool,
+    /// Whether the store has not taken it, so that memory must keep it.
+    is_pending: AtomicBool,
+    /// Whether it was deleted.
+    is_forgotten: AtomicBool,
     /// When it was last seen in the store, nanoseconds since 1970.
     seen_at: AtomicU64,
     /// Points that coincide with an earlier one.
@@ -50,6 +54,8 @@ impl RegisteredCloud {
             normals,
             created_at: AtomicU64::new(nanoseconds(SystemTime::now())),
             is_durable: AtomicBool::new(false),
+            is_pending: AtomicBool::new(false),
+            is_forgotten: AtomicBool::new(false),
             seen_at: AtomicU64::new(0),
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
@@ -67,6 +73,8 @@ impl RegisteredCloud {
             normals,
             created_at: AtomicU64::new(nanoseconds(head.created_at)),
             is_durable: AtomicBool::new(true),
+            is_pending: AtomicBool::new(false),
+            is_forgotten: AtomicBool::new(false),
             seen_at: AtomicU64::new(nanoseconds(SystemTime::now())),
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
@@ -90,6 +98,22 @@ impl RegisteredCloud {
         }
         self.trust();
         self.is_durable.store(true, Ordering::Release);
+        self.is_pending.store(false, Ordering::Release);
+    }
+
+    /// Says that the store has not taken it: memory keeps it until then, if it does.
+    fn set_pending(&self) {
+        self.is_pending.store(true, Ordering::Release);
+    }
+
+    /// Whether it was deleted: then it must not be written any more.
+    pub fn is_forgotten(&self) -> bool {
+        self.is_forgotten.load(Ordering::Acquire)
+    }
+
+    /// Says that it is deleted, or that it could not be.
+    pub fn set_forgotten(&self, is_forgotten: bool) {
+        self.is_forgotten.store(is_forgotten, Ordering::Release);
     }
 
     /// It was seen in the store.
@@ -140,13 +164,13 @@ pub struct CloudStore<E> {
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
     reads: SingleFlight<(Owner, CloudId), Option<Arc<RegisteredCloud>>, E>,
-    writes: SingleFlight<(Owner, CloudId), bool, Infallible>,
+    writes: SingleFlight<(Owner, CloudId), Option<bool>, Infallible>,
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub fn new(max_bytes: usize) -> Self {
         Self {
-            clouds: FairCache::new(max_bytes),
+            clouds: FairCache::sparing(max_bytes, |cloud| cloud.is_pending.load(Ordering::Acquire)),
             samplings: SingleFlight::new(),
             noise: SingleFlight::new(),
             reads: SingleFlight::new(),
@@ -189,15 +213,27 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 
     /// Writes a cloud at most once however many have it; answers what `write` does.
-    pub async fn write<F>(&self, owner: Owner, id: CloudId, write: impl FnOnce() -> F) -> bool
+    pub async fn write<F>(&self, owner: Owner, id: CloudId, write: impl FnOnce() -> F) -> Option<bool>
     where
-        F: Future<Output = bool> + Send + 'static,
+        F: Future<Output = Option<bool>> + Send + 'static,
     {
         let begin = || {
             let writing = write();
             async move { Ok(writing.await) }
         };
         self.writes.join((owner, id), begin).await.1.unwrap_or_else(|never: Infallible| match never {})
+    }
+
+    /// Keeps a cloud until the store takes it; says whether it is kept.
+    pub fn hold(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
+        // First: what is found below is not let go any more.
+        cloud.set_pending();
+        self.has(owner, cloud)
+    }
+
+    /// Whether it is this one that is kept.
+    pub fn has(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
+        self.clouds.get(owner, &cloud.id).is_some_and(|kept| Arc::ptr_eq(&kept, cloud))
     }
 
     /// Keeps a cloud that was read again, unless it is there.

@@ -21,6 +21,8 @@ const ENTRY_BYTES: usize = 64;
 /// A bounded cache; values are handles that are cheap to clone.
 pub(super) struct FairCache<K, V> {
     max_bytes: usize,
+    /// What makes no room for others.
+    must_stay: fn(&V) -> bool,
     entries: Mutex<Entries<K, V>>,
 }
 
@@ -51,7 +53,13 @@ struct Entry<V> {
 impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
     /// An empty cache of at most so many bytes.
     pub(super) fn new(max_bytes: usize) -> Self {
-        Self { max_bytes, entries: Mutex::new(Entries { of: HashMap::new(), n_bytes: 0, n_evicted: 0 }) }
+        Self::sparing(max_bytes, |_| false)
+    }
+
+    /// The same, where some values make no room for others: if there is no other, new ones are not kept.
+    pub(super) fn sparing(max_bytes: usize, must_stay: fn(&V) -> bool) -> Self {
+        let entries = Entries { of: HashMap::new(), n_bytes: 0, n_evicted: 0 };
+        Self { max_bytes, must_stay, entries: Mutex::new(entries) }
     }
 
     /// Finds a value, which is the most recently used one then.
@@ -166,7 +174,7 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         gone.extend(entries.remove(owner, &key));
         entries.add(owner, key, Entry { value, n_bytes });
         while entries.n_bytes > self.max_bytes
-            && let Some(evicted) = entries.evict(None, |_| true)
+            && let Some(evicted) = entries.evict(None, |value| !(self.must_stay)(value))
         {
             gone.push(evicted);
         }

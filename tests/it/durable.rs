@@ -276,6 +276,83 @@ async fn a_store_that_takes_nothing_leaves_memory_and_catches_up() {
     assert_eq!(get(&process, &path).await.0, 200);
 }
 
+/// Memory has room for some of the clouds that the store does not take: those are acknowledged, and the others refused.
+#[tokio::test]
+async fn what_was_acknowledged_while_the_store_takes_nothing_makes_no_room_for_others() {
+    let folder = Folder::new("acknowledged");
+    let flags = ["--store-required", "true", "--cloud-bytes", "20000"];
+    let process = Process::start(&[&folder.flags()[..], &flags].concat());
+    let owner = folder.0.join("everyone");
+    fs::write(&owner, b"").unwrap();
+    let mut acknowledged = Vec::new();
+    let mut n_refused = 0;
+    for k in 0..20 {
+        let body = json!({"points": points(f64::from(k), 100)});
+        match post(&process, "/v1/clouds", &body).await {
+            (201, cloud) => acknowledged.push(format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap())),
+            (status, problem) => {
+                assert_eq!((status, &problem["type"]), (503, &json!("/problems/overloaded")));
+                n_refused += 1;
+            }
+        }
+    }
+    assert!(acknowledged.len() >= 2 && n_refused > 10, "{} and {n_refused}", acknowledged.len());
+    fs::remove_file(&owner).unwrap();
+    while get(&process, "/health/ready").await.0 != 200 {
+        tokio::task::yield_now().await;
+    }
+    kill(process);
+    let process = Process::start(&folder.flags());
+    for path in &acknowledged {
+        assert_eq!(get(&process, path).await.0, 200);
+    }
+}
+
+#[tokio::test]
+async fn catching_up_brings_nothing_back_that_was_deleted() {
+    let folder = Folder::new("deleted");
+    let flags = [&folder.flags()[..], &["--store-required", "true"]].concat();
+    let [one, two] = [Process::start(&flags), Process::start(&flags)];
+    let path_of = |cloud: Value| format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
+    let deleted = path_of(post(&one, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.1);
+    assert_eq!(receive(reqwest::Client::new().delete(two.url(&deleted))).await.status, 204);
+    // The first one has it in memory, and a cloud that the store does not take.
+    fs::remove_dir_all(folder.0.join("everyone")).ok();
+    fs::write(folder.0.join("everyone"), b"").unwrap();
+    let late = path_of(post(&one, "/v1/clouds", &json!({"points": points(1.0, 30)})).await.1);
+    fs::remove_file(folder.0.join("everyone")).unwrap();
+    while get(&one, "/health/ready").await.0 != 200 {
+        tokio::task::yield_now().await;
+    }
+    assert_eq!((get(&two, &late).await.0, get(&two, &deleted).await.0), (200, 404));
+}
+
+#[tokio::test]
+async fn a_damaged_cloud_is_whole_again_once_it_is_posted_again() {
+    let folder = Folder::new("again");
+    let process = Process::start(&folder.flags());
+    let body = json!({"points": points(0.0, 30)});
+    let (_, cloud) = post(&process, "/v1/clouds", &body).await;
+    let id = cloud["cloud_id"].as_str().unwrap();
+    kill(process);
+    // A byte of its points, which no list looks at.
+    let object = folder.object(id);
+    let mut bytes = fs::read(&object).unwrap();
+    let last = bytes.len() - 40;
+    bytes[last] ^= 1;
+    fs::write(&object, &bytes).unwrap();
+    let process = Process::start(&folder.flags());
+    assert_eq!(post(&process, "/v1/clouds", &body).await.0, 201);
+    kill(process);
+    let process = Process::start(&folder.flags());
+    assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
+    let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
+    assert_eq!(deleted.status, 204);
+    let left: Vec<_> =
+        folder.files().into_iter().filter(|file| file.to_string_lossy().contains(id)).collect();
+    assert!(left.is_empty(), "also what was put aside: {left:?}");
+}
+
 #[tokio::test]
 async fn what_another_process_deletes_is_gone_and_can_be_posted_again() {
     let folder = Folder::new("shared");

@@ -314,3 +314,17 @@ async fn a_job_is_cancelled_by_another_process() {
         tokio::task::yield_now().await;
     }
 }
+
+#[tokio::test]
+async fn jobs_of_one_key_leave_places_to_another() {
+    // Four may wait or run here; of each of two keys, two.
+    let flags = ["--threads", "1", "--max-queue", "3", "--api-keys", "greedy,modest"];
+    let server = Server::with_flags(&flags).await;
+    let asking = |key: &'static str| {
+        let request = server.client.post(server.url("/v1/normals")).bearer_auth(key);
+        server.send(request.header("prefer", "respond-async").json(&slow_request()))
+    };
+    for (key, status) in [("greedy", 202), ("greedy", 202), ("greedy", 503), ("modest", 202)] {
+        assert_eq!(asking(key).await.status, status, "{key}");
+    }
+}

@@ -7,6 +7,7 @@ use std::process::Command;
 use serde_json::json;
 
 use crate::contract::Received;
+use crate::limits::slow_request;
 use crate::process::{Process, gramian, logged};
 use crate::support::receive;
 
@@ -90,6 +91,44 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
         assert!(!text.contains(secret.as_str()));
     }
     assert!(!text.contains("oops"));
+}
+
+/// What a secret mounted in a container looks like: always of the same time.
+#[tokio::test]
+async fn a_file_of_the_same_length_and_time_is_another_if_its_keys_are() {
+    let ((old, lines_of_old), (new, lines_of_new)) = (key("lab", ""), key("lab", ""));
+    assert_eq!(lines_of_old.len(), lines_of_new.len());
+    let file = KeysFile::new("same-time", &[&lines_of_old]);
+    let since = fs::metadata(&file.0).unwrap().modified().unwrap();
+    let process = file.start();
+    assert_eq!((list(&process, &old).await.status, list(&process, &new).await.status), (200, 401));
+    let next = file.0.with_extension("next");
+    fs::write(&next, &lines_of_new).unwrap();
+    fs::File::options().append(true).open(&next).unwrap().set_modified(since).unwrap();
+    fs::rename(&next, &file.0).unwrap();
+    while list(&process, &new).await.status == 401 {
+        tokio::task::yield_now().await;
+    }
+    assert_eq!(list(&process, &old).await.status, 401);
+}
+
+#[tokio::test]
+async fn events_count_among_the_requests_at_once_until_they_end() {
+    let (one, lines_of_one) = key("one", "concurrent_requests = 1");
+    let file = KeysFile::new("events", &[&lines_of_one]);
+    let process = file.start();
+    let client = reqwest::Client::new();
+    let asking = client.post(process.url("/v1/normals")).bearer_auth(&one).header("prefer", "respond-async");
+    let job: serde_json::Value = asking.json(&slow_request()).send().await.unwrap().json().await.unwrap();
+    let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
+    let following =
+        client.get(process.url(&format!("{path}/events"))).bearer_auth(&one).send().await.unwrap();
+    assert_eq!((following.status(), list(&process, &one).await.status), (200.try_into().unwrap(), 429));
+    drop(following);
+    while list(&process, &one).await.status == 429 {
+        tokio::task::yield_now().await;
+    }
+    assert_eq!(receive(client.delete(process.url(&path)).bearer_auth(&one)).await.status, 204);
 }
 
 #[tokio::test]

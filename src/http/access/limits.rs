@@ -27,7 +27,7 @@ pub(super) struct Limits {
     under_way: Option<Arc<Semaphore>>,
 }
 
-/// A request that is under way.
+/// A request that is under way, until its answer is sent.
 pub struct Entered(Option<OwnedSemaphorePermit>);
 
 /// Beyond a limit.

@@ -13,9 +13,9 @@ mod file;
 mod limits;
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use arc_swap::ArcSwap;
 use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
@@ -39,13 +39,15 @@ pub fn check_file(text: &str) -> Result<usize, String> {
 /// How often it is looked whether the file has changed.
 const LOOKING: Duration = Duration::from_secs(1);
 
-/// BLAKE3 of a key.
+/// BLAKE3 of a key, or of the file of keys.
 type Digest = [u8; 32];
 
 /// All keys, as they are now.
 pub struct Keys {
     configured: Vec<Digest>,
     file: Option<PathBuf>,
+    /// Of the text of the file that was read at the start.
+    first: Digest,
     callers: ArcSwap<Vec<Arc<Caller>>>,
     /// Views by the number of their owner: numbers are never given again.
     views: Mutex<Vec<OwnerName>>,
@@ -77,9 +79,14 @@ impl Keys {
         let digest = |key: &String| blake3::hash(key.trim().as_bytes()).into();
         // A blank key, which the configuration refuses, is nobody's.
         let configured = config.api_keys.iter().filter(|key| !key.trim().is_empty()).map(digest).collect();
+        let (file, first) = match &config.keys_file {
+            Some(path) if !config.is_open() => read_file(path)?,
+            _ => Default::default(),
+        };
         let keys = Self {
             configured,
             file: config.keys_file.clone(),
+            first,
             callers: ArcSwap::default(),
             views: Mutex::default(),
         };
@@ -87,7 +94,6 @@ impl Keys {
             keys.owner(OwnerName("everyone".to_owned()));
             return Ok(keys);
         }
-        let file = keys.read_file()?;
         keys.put(&file);
         Ok(keys)
     }
@@ -125,38 +131,28 @@ impl Keys {
         bool::from(found).then(|| callers.get(position as usize).cloned()).flatten()
     }
 
-    /// Reads the file again whenever it changes, for as long as the process lives.
+    /// Takes the keys of the file again whenever it has others, for as long as the process lives. It is read each time: neither its
+    /// time nor its length tells that it is as it was, nor that it cannot be read now.
     pub async fn follow_file(self: Arc<Self>) {
         let Some(path) = &self.file else { return };
-        let changed = || std::fs::metadata(path).and_then(|found| Ok((found.modified()?, found.len()))).ok();
-        let mut last: Option<(SystemTime, u64)> = changed();
+        let mut last = Ok(self.first);
         let mut ticks = tokio::time::interval(LOOKING);
         loop {
             ticks.tick().await;
-            let now = changed();
+            let found = read_file(path);
+            let now = found.as_ref().map(|(_, digest)| *digest).map_err(String::clone);
             if now == last {
                 continue;
             }
             last = now;
-            match self.read_file() {
-                Ok(file) => {
+            match found {
+                Ok((file, _)) => {
                     self.put(&file);
                     tracing::info!(n_keys = self.callers.load().len(), "keys were read again");
                 }
                 Err(error) => {
                     tracing::error!(error, "keys stay as they were: their file (GRAMIAN_KEYS_FILE)")
                 }
-            }
-        }
-    }
-
-    fn read_file(&self) -> Result<KeysFile, String> {
-        match &self.file {
-            None => Ok(KeysFile::default()),
-            Some(path) => {
-                let text =
-                    std::fs::read_to_string(path).map_err(|error| format!("cannot be read: {error}"))?;
-                KeysFile::parse(&text)
             }
         }
     }
@@ -208,6 +204,12 @@ impl Caller {
     fn is_as(&self, other: &Self) -> bool {
         self.name == other.name && self.owner == other.owner && self.limits.rule == other.limits.rule
     }
+}
+
+/// The keys of a file, and the digest of its text.
+fn read_file(path: &Path) -> Result<(KeysFile, Digest), String> {
+    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot be read: {error}"))?;
+    Ok((KeysFile::parse(&text)?, blake3::hash(text.as_bytes()).into()))
 }
 
 /// Each key of the configuration has a view of its own.

@@ -9,6 +9,7 @@ use opentelemetry::{Context, KeyValue};
 use uuid::Uuid;
 
 use super::trace::TraceParent;
+use crate::http::metrics::method_label;
 
 /// The span of a request, in the trace of its client if that has one.
 pub struct RequestSpan {
@@ -17,20 +18,18 @@ pub struct RequestSpan {
 }
 
 impl RequestSpan {
-    /// Begins it. The route is a template, so that there are few names.
+    /// Begins it. The route is a template and the method one of those that the service has, so that there are few names.
     pub fn begin(method: &Method, route: Option<&str>, headers: &HeaderMap) -> Self {
         let parent = TraceParent::of(headers);
         let context = match &parent {
             Some(parent) => Context::new().with_remote_span_context(context_of(parent)),
             None => Context::new(),
         };
-        let route = route.unwrap_or("other");
+        let (method, route) = (method_label(method), route.unwrap_or("other"));
         let tracer = global::tracer("gramian");
         let builder = tracer.span_builder(format!("{method} {route}")).with_kind(SpanKind::Server);
-        let attributes = [
-            KeyValue::new("http.request.method", method.to_string()),
-            KeyValue::new("http.route", route.to_owned()),
-        ];
+        let attributes =
+            [KeyValue::new("http.request.method", method), KeyValue::new("http.route", route.to_owned())];
         let span = tracer.build_with_context(builder.with_attributes(attributes), &context);
         let own = Some(span.span_context()).filter(|context| context.is_valid());
         let own = own.map(|context| u128::from_be_bytes(context.trace_id().to_bytes()));

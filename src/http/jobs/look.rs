@@ -106,9 +106,10 @@ pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem
     let found = objects.find_job(&name, id).await.map_err(refused)?;
     let found = found.filter(|job| job.has_request || job.ended_at.is_some());
     let Some(job) = found else { return Err(unknown_job(&id.to_string())) };
-    if job.ended_at.is_some() {
-        let result = objects.get_result(&name, id).await.map_err(refused)?;
-        let Some(result) = result else { return Err(unknown_job(&id.to_string())) };
+    // One that was damaged is let go: the job has not ended then.
+    if job.ended_at.is_some()
+        && let Some(result) = objects.get_result(&name, id).await.map_err(refused)?
+    {
         return view_of_result(app, id, result).await;
     }
     let lease = match job.lease {

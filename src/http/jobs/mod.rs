@@ -44,8 +44,11 @@ pub struct Jobs {
     held: Mutex<HashMap<JobId, Reservation>>,
     turns: Arc<Turns>,
     n_turns: usize,
-    /// Jobs that may wait or run here.
+    /// Jobs that may wait or run here, of all owners and of one.
     most: usize,
+    most_of_owner: usize,
+    /// Who is told about jobs while they go on, one unit each.
+    followers: Budget,
 }
 
 /// A job that this process works on, or will.
@@ -81,7 +84,9 @@ impl Jobs {
         n_owners: usize,
         n_turns: usize,
         max_queue: usize,
+        max_followers: usize,
     ) -> Self {
+        let most = n_turns.saturating_add(max_queue);
         Self {
             memory: store.is_none().then(|| Budget::new(n_bytes, n_owners)),
             objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
@@ -89,7 +94,9 @@ impl Jobs {
             held: Mutex::default(),
             turns: Turns::new(n_turns),
             n_turns,
-            most: n_turns.saturating_add(max_queue),
+            most,
+            most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
+            followers: Budget::new(max_followers, n_owners),
         }
     }
 
@@ -105,6 +112,12 @@ impl Jobs {
         self.memory.as_ref().map_or(0, Budget::n_held)
     }
 
+    /// Counts one more who is told about a job while it goes on, until what is returned is dropped; nothing if there are too many, of all
+    /// owners or of this one.
+    pub fn follow(&self, owner: Owner) -> Option<Reservation> {
+        self.followers.try_reserve(owner, 1)
+    }
+
     /// Resolves once no job is here any more.
     pub async fn all_left(&self) {
         loop {
@@ -117,10 +130,11 @@ impl Jobs {
         self.here().get(&id).cloned()
     }
 
-    /// Makes a job one of this process, unless it is, or there are too many.
+    /// Makes a job one of this process, unless it is, or there are too many, of all owners or of this one.
     fn add(&self, id: JobId, owner: Owner) -> Option<Arc<Here>> {
         let mut here = self.here();
-        if here.len() >= self.most || here.contains_key(&id) {
+        let n_of_owner = here.values().filter(|job| job.owner == owner).count();
+        if here.len() >= self.most || n_of_owner >= self.most_of_owner || here.contains_key(&id) {
             return None;
         }
         let job = Arc::new(Here {
@@ -135,6 +149,7 @@ impl Jobs {
         Some(job)
     }
 
+    /// A job is not here any more.
     fn remove(&self, job: &Here) {
         self.here().remove(&job.id);
         job.over.cancel();

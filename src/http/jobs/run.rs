@@ -1,23 +1,23 @@
 //! Working on a job.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use bytes::Bytes;
-use futures_util::StreamExt;
+use futures_util::{StreamExt, TryStreamExt};
 use tower::ServiceExt;
 
 use super::look::name_of;
-use super::{Here, Runner};
+use super::{Here, Jobs, Runner};
 use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::store::objects::jobs::{JobRequest, JobResult, Lease, Outcome};
+use crate::store::objects::jobs::{FoundRequest, JobResult, Lease, Outcome};
+use crate::store::objects::pieces::BrokenOff;
 use crate::store::objects::{OwnerName, Unavailable};
 
 /// How often a lease is written again, and how long it holds after that.
@@ -41,68 +41,99 @@ static KEPT_HEADERS: [HeaderName; 5] = [
 
 /// How work on a job ended.
 enum Ended {
-    /// Its result is there, whoever wrote it.
+    /// Its result is there, whoever wrote it, or nobody wants it any more.
     Done,
-    /// The process is to end: another one may go on.
-    Released(u32, Lease),
+    /// The process is to end, or the store does not take the result: anybody may go on.
+    Released,
+}
+
+/// An attempt at a job, which nobody else makes.
+struct Attempt {
+    number: u32,
+    lease: Lease,
+}
+
+/// A job that is one of this process until this is dropped, also if its work panics.
+struct Present<'a> {
+    jobs: &'a Jobs,
+    here: Arc<Here>,
+}
+
+impl Drop for Present<'_> {
+    fn drop(&mut self) {
+        self.jobs.remove(&self.here);
+    }
 }
 
 impl Runner {
     /// Works on a job of this process when its turn has come.
     pub(super) async fn run(self, here: Arc<Here>) {
-        let name = self.app.keys.name_of(here.owner);
         let jobs = &self.app.jobs;
-        match self.attempt(&here, &name).await {
-            Ok(Ended::Done) => {}
-            Ok(Ended::Released(attempt, lease)) => {
-                let lease = Lease { is_released: true, ..lease };
-                if let Err(error) = jobs.objects.renew_lease(&name, here.id, attempt, &lease).await {
-                    tracing::warn!(job = %here.id, %error, "a job is left until its lease has expired");
-                }
-            }
-            // Its lease expires, and it is begun again: here or elsewhere.
-            Err(error) => tracing::error!(job = %here.id, %error, "a job is put off"),
-        }
-        jobs.remove(&here);
-    }
-
-    async fn attempt(&self, here: &Here, name: &OwnerName) -> Result<Ended, Unavailable> {
-        let (app, jobs) = (&self.app, &self.app.jobs);
+        let present = Present { jobs, here };
+        let here = &*present.here;
+        let name = self.app.keys.name_of(here.owner);
         let _turn = tokio::select! {
             turn = jobs.turns.take(here.owner) => turn,
-            () = here.cancelled.cancelled() => return Ok(Ended::Done),
-            () = app.draining.cancelled() => return Ok(Ended::Done),
+            () = here.cancelled.cancelled() => return,
+            () = self.app.draining.cancelled() => return,
         };
-        let found = jobs.objects.find_job(name, here.id).await?;
-        let Some(job) = found.filter(|job| job.has_request && job.ended_at.is_none()) else {
-            return Ok(Ended::Done);
+        let attempt = match self.claim(here, &name).await {
+            Ok(Some(attempt)) => attempt,
+            Ok(None) => return,
+            Err(error) => return tracing::error!(job = %here.id, %error, "a job is put off"),
         };
-        let (attempt, lease) = match job.lease {
-            None => (0, Lease::default()),
-            Some((last, _)) => {
-                let before = jobs.objects.get_lease(name, here.id, last).await?.unwrap_or_default();
-                let n_crashes = before.n_crashes + u32::from(!before.is_released);
-                (last + 1, Lease { n_crashes, ..Lease::default() })
-            }
-        };
-        if !jobs.objects.claim_job(name, here.id, attempt, &lease).await? {
-            return Ok(Ended::Done);
-        }
         here.is_running.store(true, Ordering::Relaxed);
-        if lease.n_crashes >= MAX_CRASHES {
-            tracing::error!(job = %here.id, "a job ended its process several times, and is given up");
-            return self.write(here, name, Problem::internal().into_response()).await.map(|()| Ended::Done);
-        }
-        tokio::select! {
+        let ended = tokio::select! {
             () = here.cancelled.cancelled() => Ok(Ended::Done),
-            () = app.draining.cancelled() => Ok(Ended::Released(attempt, lease)),
-            () = self.hold_lease(here, name, attempt, &lease) => Ok(Ended::Done),
-            answered = self.answer(here, name) => answered.map(|()| Ended::Done),
+            () = self.app.draining.cancelled() => Ok(Ended::Released),
+            () = self.hold_lease(here, &name, &attempt) => Ok(Ended::Done),
+            answered = self.answer(here, &name, &attempt) => answered.map(|()| Ended::Done),
+        };
+        match ended {
+            Ok(Ended::Done) => {}
+            Ok(Ended::Released) => self.release(here, &name, attempt).await,
+            Err(error) => {
+                tracing::error!(job = %here.id, %error, "a job is put off");
+                self.release(here, &name, attempt).await;
+            }
         }
     }
 
-    /// Says again and again that the job is worked on, until it has a result, which is another's.
-    async fn hold_lease(&self, here: &Here, name: &OwnerName, attempt: u32, lease: &Lease) {
+    /// Makes the next attempt that of this process, unless there is nothing to do, or another has it.
+    async fn claim(&self, here: &Here, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
+        let objects = &self.app.jobs.objects;
+        let found = objects.find_job(name, here.id).await?;
+        let Some(job) = found.filter(|job| job.has_request && job.ended_at.is_none()) else {
+            return Ok(None);
+        };
+        let attempt = match job.lease {
+            None => Attempt { number: 0, lease: Lease::default() },
+            Some((last, _)) => {
+                let before = objects.get_lease(name, here.id, last).await?.unwrap_or_default();
+                let n_crashes = before.n_crashes + u32::from(!before.is_released);
+                Attempt { number: last + 1, lease: Lease { n_crashes, ..Lease::default() } }
+            }
+        };
+        let is_claimed = objects.claim_job(name, here.id, attempt.number, &attempt.lease).await?;
+        Ok(is_claimed.then_some(attempt))
+    }
+
+    /// Says that anybody may go on at once, as soon as the store takes that, unless the process is to end before.
+    async fn release(&self, here: &Here, name: &OwnerName, attempt: Attempt) {
+        let lease = Lease { is_released: true, ..attempt.lease };
+        while let Err(error) = self.app.jobs.objects.renew_lease(name, here.id, attempt.number, &lease).await
+        {
+            tracing::warn!(job = %here.id, %error, "a job is left until its lease has expired");
+            tokio::select! {
+                () = tokio::time::sleep(RENEWING) => {}
+                () = here.cancelled.cancelled() => return,
+                () = self.app.draining.cancelled() => return,
+            }
+        }
+    }
+
+    /// Says again and again that the job is worked on, until that is for nothing: it has a result, another has begun it, or it is forgotten.
+    async fn hold_lease(&self, here: &Here, name: &OwnerName, attempt: &Attempt) {
         let objects = &self.app.jobs.objects;
         let mut ticks = tokio::time::interval(RENEWING);
         loop {
@@ -113,24 +144,30 @@ impl Runner {
                 fraction: now.fraction,
                 residual: now.residual,
                 seconds_left: now.seconds_left,
-                ..lease.clone()
+                ..attempt.lease.clone()
             };
-            let written = objects.renew_lease(name, here.id, attempt, &lease).await;
-            match (written, objects.has_result(name, here.id).await) {
-                (Ok(()), Ok(false)) => {}
-                (_, Ok(true)) => return,
-                // Another process may take the job up meanwhile, and write the same.
-                (Err(error), _) | (_, Err(error)) => {
-                    tracing::warn!(job = %here.id, %error, "the lease of a job is not written");
+            let renewed = match objects.find_job(name, here.id).await {
+                Ok(Some(job)) if job.is_that_of(attempt.number) => {
+                    objects.renew_lease(name, here.id, attempt.number, &lease).await
                 }
+                Ok(_) => return,
+                Err(error) => Err(error),
+            };
+            if let Err(error) = renewed {
+                // Another process may take the job up meanwhile, and one of them ends it.
+                tracing::warn!(job = %here.id, %error, "the lease of a job is not written");
             }
         }
     }
 
     /// Answers the request, and writes what comes of it.
-    async fn answer(&self, here: &Here, name: &OwnerName) -> Result<(), Unavailable> {
+    async fn answer(&self, here: &Here, name: &OwnerName, attempt: &Attempt) -> Result<(), Unavailable> {
         let began = Instant::now();
         let app = &self.app;
+        if attempt.lease.n_crashes >= MAX_CRASHES {
+            tracing::error!(job = %here.id, "a job ended its process several times, and is given up");
+            return self.write(here, name, attempt, Problem::internal().into_response()).await;
+        }
         let within = app.config.job_seconds;
         let answering = self.response(here, name);
         let response = match tokio::time::timeout(Duration::from_secs_f64(within), answering).await {
@@ -144,49 +181,58 @@ impl Runner {
         if let Some(problem) = response.extensions().get::<Problem>() {
             app.metrics.refused(problem.slug());
         }
-        self.write(here, name, response).await?;
+        self.write(here, name, attempt, response).await?;
         let duration_ms = began.elapsed().as_secs_f64() * 1e3;
         tracing::info!(job = %here.id, status, duration_ms, "job {} {status}", here.id);
         Ok(())
     }
 
+    /// The answer of the route. Nothing is held between two attempts at it: the route takes the memory that it needs, and the body is read
+    /// from the store as the route reads it.
     async fn response(&self, here: &Here, name: &OwnerName) -> Result<Response, Unavailable> {
-        let app = &self.app;
-        let objects = &app.jobs.objects;
-        let n_bytes = objects.job_bytes(name, here.id).await?.unwrap_or_default();
-        let mut memory = app.intake.try_reserve(here.owner, 0);
-        while let Some(reservation) = &mut memory {
-            if app.intake.grow(reservation, usize::try_from(n_bytes).unwrap_or(usize::MAX), AWAY).await {
-                break;
-            }
-        }
-        let (request, body) = match objects.get_job(name, here.id).await? {
-            Some(Ok(found)) => found,
-            Some(Err(damaged)) => {
-                tracing::error!(job = %here.id, reason = damaged.0, "a job is damaged");
-                return Ok(Problem::internal().into_response());
-            }
-            // It was deleted.
-            None => return Ok(Problem::internal().into_response()),
-        };
         loop {
             here.progress.restart();
-            let request = rebuilt(&request, body.clone(), here);
-            let answering = here.progress.watch(self.routes.clone().oneshot(request));
-            let response = answering.await.unwrap_or_else(|never| match never {});
-            if response.status() != StatusCode::SERVICE_UNAVAILABLE {
-                return Ok(response);
+            let Some(found) = self.app.jobs.objects.open_job(name, here.id).await? else {
+                // It was deleted.
+                return Ok(Problem::internal().into_response());
+            };
+            let fault = Arc::new(OnceLock::new());
+            let answered = match found {
+                Ok(found) => {
+                    let request = rebuilt(found, here, &fault);
+                    let answering = here.progress.watch(self.routes.clone().oneshot(request));
+                    answering.await.unwrap_or_else(|never| match never {})
+                }
+                Err(damaged) => {
+                    _ = fault.set(BrokenOff::Damaged);
+                    tracing::error!(job = %here.id, reason = damaged.0, "a job is damaged");
+                    Problem::internal().into_response()
+                }
+            };
+            match fault.get() {
+                None if answered.status() != StatusCode::SERVICE_UNAVAILABLE => return Ok(answered),
+                None => {}
+                Some(BrokenOff::Damaged) => {
+                    self.app.jobs.objects.report_job(name, here.id);
+                    return Ok(Problem::internal().into_response());
+                }
+                Some(BrokenOff::Store(reason)) => {
+                    tracing::warn!(job = %here.id, reason, "what was asked is read again");
+                }
             }
             tokio::time::sleep(AWAY).await;
         }
     }
 
     /// Writes what the request was answered with.
-    async fn write(&self, here: &Here, name: &OwnerName, response: Response) -> Result<(), Unavailable> {
+    async fn write(
+        &self,
+        here: &Here,
+        name: &OwnerName,
+        attempt: &Attempt,
+        response: Response,
+    ) -> Result<(), Unavailable> {
         let jobs = &self.app.jobs;
-        if jobs.objects.has_result(name, here.id).await? {
-            return Ok(());
-        }
         let response = with_problem_document(response, &here.id.to_string());
         let (head, body) = (head_of(&response), response.into_body().into_data_stream());
         let mut n_bytes = 0;
@@ -198,10 +244,12 @@ impl Runner {
             has_room = jobs.hold(here.id, here.owner, 2 * piece.len());
             if has_room { Ok(piece) } else { Err("there is no memory for the result".to_owned()) }
         });
-        let written = jobs.objects.put_result(name, here.id, &head, body).await;
-        self.app.metrics.job_ended(if has_room { head.outcome } else { Outcome::Failed });
+        let (job, outcome) = ((name, here.id), head.outcome);
+        let written = jobs.objects.put_result(job, attempt.number, head, body).await;
         if has_room {
-            written?;
+            if written? {
+                self.app.metrics.job_ended(outcome);
+            }
             jobs.shrink(here.id, n_bytes);
             return Ok(());
         }
@@ -214,7 +262,10 @@ impl Runner {
         );
         let response = with_problem_document(problem.into_response(), &here.id.to_string());
         let (head, body) = (head_of(&response), response.into_body().into_data_stream());
-        jobs.objects.put_result(name, here.id, &head, body).await
+        if jobs.objects.put_result(job, attempt.number, head, body).await? {
+            self.app.metrics.job_ended(Outcome::Failed);
+        }
+        Ok(())
     }
 }
 
@@ -227,9 +278,13 @@ fn head_of(response: &Response) -> JobResult {
     JobResult { outcome, status: response.status().as_u16(), headers: kept.collect() }
 }
 
-/// The request as its client sent it, with its owner.
-fn rebuilt(request: &JobRequest, body: Bytes, here: &Here) -> Request {
-    let mut rebuilt = Request::new(Body::from(body));
+/// The request as its client sent it, with its owner. Why its body broke off, if it did, is left in `fault`.
+fn rebuilt(found: FoundRequest, here: &Here, fault: &Arc<OnceLock<BrokenOff>>) -> Request {
+    let FoundRequest { request, n_body_bytes, body } = found;
+    let fault = fault.clone();
+    let body = body.inspect_err(move |error| _ = fault.set(error.clone()));
+    let mut rebuilt = Request::new(Body::from_stream(body));
+    rebuilt.headers_mut().insert(header::CONTENT_LENGTH, n_body_bytes.into());
     *rebuilt.method_mut() = Method::POST;
     if let Ok(uri) = request.path.parse() {
         *rebuilt.uri_mut() = uri;

@@ -163,7 +163,8 @@ impl Metrics {
     }
 }
 
-fn method_label(method: &Method) -> &'static str {
+/// A method that some route has, or `other`.
+pub fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",
         Method::HEAD => "HEAD",

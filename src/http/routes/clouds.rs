@@ -183,7 +183,7 @@ pub async fn create_cloud(
     };
     let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;
     // Memory may have let go of what the store has.
-    let is_new = keep(&app, owner, &stored).await && is_new;
+    let is_new = keep(&app, owner, &stored).await? && is_new;
     let cloud = describe(&app, &admission, &stored).await?;
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };

@@ -19,7 +19,7 @@ use crate::http::openapi::responses::{AnyJobProblems, JobProblems, JobResultProb
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
-use crate::http::serve::durable::unavailable;
+use crate::http::serve::durable::{SECONDS_UNTIL_BACK, unavailable};
 use crate::store::Owner;
 use crate::store::objects::jobs::{JobId, Outcome};
 
@@ -99,7 +99,10 @@ pub async fn follow_job(
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Problem> {
     let id = parse(&job_id)?;
     let first = look(&app, owner, id).await?;
+    let Some(followed) = app.jobs.follow(owner) else { return Err(app.compute.out_of_memory()) };
     let events = futures_util::stream::unfold(Following::First(Box::new(first)), move |following| {
+        // For as long as there are events.
+        let _ = &followed;
         let app = app.clone();
         async move {
             let view = match following {
@@ -174,7 +177,8 @@ pub async fn get_job_result(
         }
     };
     let found = app.jobs.objects.get_result(&app.keys.name_of(owner), id).await;
-    let found = found.map_err(|error| unavailable(&error))?.ok_or_else(|| unknown_job(&job_id))?;
+    let again = || Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK);
+    let found = found.map_err(|error| unavailable(&error))?.ok_or_else(again)?;
     if found.head.outcome == Outcome::Cancelled {
         return Err(Problem::new(Slug::UnknownJob, "the job was cancelled: there is no result"));
     }

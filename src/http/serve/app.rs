@@ -70,7 +70,14 @@ impl App {
         let in_store = durable.as_ref().map(|durable| durable.objects.clone());
         let (n_threads, max_queue) = (config.n_threads(), config.max_queue);
         Ok(Arc::new(Self {
-            jobs: Jobs::new(in_store, memory.jobs, n_owners, n_threads, max_queue),
+            jobs: Jobs::new(
+                in_store,
+                memory.jobs,
+                n_owners,
+                n_threads,
+                max_queue,
+                config.max_connections / 2,
+            ),
             intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
             durable,

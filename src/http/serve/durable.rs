@@ -17,7 +17,7 @@ use crate::store::objects::cloud_object::{decode, encode};
 use crate::store::objects::{Listed, Objects, Place, Retention, Swept, Unavailable, Written};
 
 /// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
-const SECONDS_UNTIL_BACK: u64 = 5;
+pub const SECONDS_UNTIL_BACK: u64 = 5;
 
 /// How often it is looked what of the store is to go, unless more comes than may be there.
 const SWEEPING: Duration = Duration::from_secs(600);
@@ -89,11 +89,11 @@ impl Durable {
         }
     }
 
-    fn fell_behind(&self, error: &Unavailable) {
+    fn fell_behind(&self, reason: &dyn std::fmt::Display) {
         let was_up_to_date = self.is_up_to_date();
         self.n_refused.fetch_add(1, Ordering::AcqRel);
         if was_up_to_date {
-            tracing::error!(%error, "clouds are kept in memory alone until the store takes them");
+            tracing::error!(%reason, "clouds are kept in memory alone until the store takes them");
         }
     }
 }
@@ -162,47 +162,81 @@ async fn read_cloud(
 }
 
 /// Writes clouds that are in memory alone. A store that does not take them is reported, and offered them again: they are served from memory
-/// meanwhile.
+/// meanwhile. One that memory has no room for either is not there any more when its request has been answered.
 pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredCloud>]) {
     for cloud in clouds {
-        keep(app, owner, cloud).await;
+        if keep(app, owner, cloud).await.is_err() {
+            tracing::warn!(cloud = %cloud.id, "a cloud is kept nowhere");
+        }
     }
 }
 
 /// The same of one; says whether it is new to the store, or there is none.
-pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
-    let Some(Durable { objects, .. }) = &app.durable else { return true };
+///
+/// # Errors
+/// 503 if neither the store nor memory keeps it.
+pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<bool, Problem> {
+    let Some(Durable { objects, .. }) = &app.durable else { return Ok(true) };
     // An answer says that it is there: also if another process has deleted it meanwhile.
     if cloud.is_durable()
         && !matches!(objects.cloud_bytes(&app.keys.name_of(owner), cloud.id).await, Ok(None))
     {
         cloud.trust();
-        return true;
+        return Ok(true);
     }
-    let (shared, kept) = (app.clone(), cloud.clone());
-    app.clouds.write(owner, cloud.id, || write_cloud(shared, owner, kept)).await
+    // Another may be writing these points, which were deleted since: that writes nothing, or takes it away again.
+    for _ in 0..2 {
+        let (shared, kept) = (app.clone(), cloud.clone());
+        let written = app.clouds.write(owner, cloud.id, || write_cloud(shared, owner, kept)).await;
+        let Some(is_new) = written else { break };
+        if cloud.is_durable() || cloud.is_forgotten() {
+            return Ok(is_new);
+        }
+    }
+    match app.clouds.hold(owner, cloud) {
+        true => Ok(true),
+        false => Err(Problem::unavailable(
+            "the store of clouds does not answer, and memory is full of clouds that it has not taken",
+            SECONDS_UNTIL_BACK,
+        )),
+    }
 }
 
-async fn write_cloud(app: Arc<App>, owner: Owner, cloud: Arc<RegisteredCloud>) -> bool {
-    let Some(durable) = &app.durable else { return true };
+/// Whether it is new to the store; nothing if that does not take it.
+async fn write_cloud(app: Arc<App>, owner: Owner, cloud: Arc<RegisteredCloud>) -> Option<bool> {
+    let durable = app.durable.as_ref()?;
+    if cloud.is_forgotten() {
+        return Some(false);
+    }
     let (encoded, named) = (cloud.clone(), (cloud.id, cloud.created_at()));
-    let Ok(pieces) = app.compute.run_small(owner, move || encode(&encoded)).await else { return true };
+    let Ok(pieces) = app.compute.run_small(owner, move || encode(&encoded)).await else {
+        durable.fell_behind(&"a cloud is not encoded");
+        return None;
+    };
     let n_bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
-    match durable.objects.put_cloud(&app.keys.name_of(owner), named, pieces).await {
-        Ok(Written::Now) => {
-            cloud.set_durable(None);
-            durable.grew_by(n_bytes, app.config.retention());
-            true
-        }
-        Ok(Written::Before(since)) => {
-            cloud.set_durable(Some(since));
-            false
-        }
+    let name = app.keys.name_of(owner);
+    let written = match durable.objects.put_cloud(&name, named, pieces).await {
+        Ok(written) => written,
         Err(error) => {
             durable.fell_behind(&error);
-            true
+            return None;
         }
+    };
+    // Deleted while it was written: it must not come back.
+    if cloud.is_forgotten() {
+        if let Err(error) = durable.objects.delete_cloud(&name, cloud.id).await {
+            tracing::error!(%error, cloud = %cloud.id, "a deleted cloud is in the store again");
+        }
+        return Some(false);
     }
+    match written {
+        Written::Now => {
+            cloud.set_durable(None);
+            durable.grew_by(n_bytes, app.config.retention());
+        }
+        Written::Before(since) => cloud.set_durable(Some(since)),
+    }
+    Some(written == Written::Now)
 }
 
 /// The clouds of the owner who was admitted behind a place of the list, in its order and no more than `limit` of them, those in memory with what
@@ -248,15 +282,19 @@ pub async fn list_clouds(
 /// # Errors
 /// 503 if the store does not answer: nothing is forgotten then.
 pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
+    let kept = app.clouds.get(owner, id);
+    // First: whoever writes it leaves it, or takes it away again.
+    kept.iter().for_each(|cloud| cloud.set_forgotten(true));
     let was_stored = match &app.durable {
-        None => false,
-        Some(Durable { objects, .. }) => {
-            objects.delete_cloud(&app.keys.name_of(owner), id).await.map_err(|error| unavailable(&error))?
-        }
+        None => Ok(false),
+        Some(Durable { objects, .. }) => objects.delete_cloud(&app.keys.name_of(owner), id).await,
     };
-    let was_kept = app.clouds.get(owner, id).is_some();
+    let was_stored = was_stored.map_err(|error| {
+        kept.iter().for_each(|cloud| cloud.set_forgotten(false));
+        unavailable(&error)
+    })?;
     forget_in_memory(app, owner, id);
-    Ok(was_stored || was_kept)
+    Ok(was_stored || kept.is_some())
 }
 
 fn forget_in_memory(app: &App, owner: Owner, id: CloudId) {
@@ -304,7 +342,12 @@ pub async fn catch_up(app: Arc<App>) {
         }
         let n_refused = durable.n_refused.load(Ordering::Acquire);
         for owner in app.keys.owners() {
-            keep_all(&app, owner, &app.clouds.list(owner)).await;
+            for cloud in app.clouds.list(owner) {
+                // What the store has had is not missing: if it is not there any more, it was deleted.
+                if !cloud.is_durable() && app.clouds.has(owner, &cloud) {
+                    keep_all(&app, owner, &[cloud]).await;
+                }
+            }
         }
         // What was refused meanwhile has its turn next time.
         durable.n_made_up.store(n_refused, Ordering::Release);

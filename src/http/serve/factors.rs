@@ -9,7 +9,8 @@ use super::app::App;
 use super::plan::FitPlan;
 use crate::http::compute::Admission;
 use crate::numerics::solver::{FactorBuilder, Solver, System};
-use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor, HASH_BYTES};
+use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
+use crate::store::objects::pieces::HASH_BYTES;
 use crate::store::objects::{Damaged, Unavailable};
 use crate::store::prepared::PreparedFit;
 
@@ -80,11 +81,11 @@ async fn read(
         Some(Reading { builder, hasher, weights: Vec::with_capacity(n_points), at: line.len() as u64 })
     };
     let mut reading = app.compute.run_small(owner, begin).await.ok().flatten().ok_or(Lost::Gone)?;
-    let expected = reading.at + 8 * (n_points + reading.builder.n_missing()) as u64 + HASH_BYTES;
+    let expected = reading.at + 8 * (n_points + reading.builder.n_missing()) as u64 + HASH_BYTES as u64;
     if head.n_points != n_points || n_bytes != expected {
         return Err(Lost::Damaged(Damaged("it has another length than it should have")));
     }
-    let end = n_bytes - HASH_BYTES;
+    let end = n_bytes - HASH_BYTES as u64;
     while reading.at < end {
         let range = reading.at..end.min(reading.at + PIECE);
         let piece = durable.objects.factor_range(name, range).await?.ok_or(Lost::Gone)?;

@@ -13,6 +13,7 @@
 //! Numbers are little-endian. The head has a hash of its own so that a list of clouds needs no points. What is read is what was
 //! written, or refused: hashes, lengths, and the cloud's own name, which is the hash of its points.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
@@ -125,8 +126,10 @@ impl CloudHead {
     }
 }
 
-const CUT: Damaged = Damaged("it ends too early");
+pub(super) const CUT: Damaged = Damaged("it ends too early");
 const OTHER: Damaged = Damaged("its bytes are not those that were written");
+const NO_CLOUD: Damaged = Damaged("its numbers are no cloud");
+const ANOTHER: Damaged = Damaged("it is another cloud than its name says");
 
 /// The object of a cloud, in pieces. Its numbers are those of the cloud, not copies.
 pub fn encode(cloud: &Arc<RegisteredCloud>) -> Vec<Bytes> {
@@ -173,6 +176,52 @@ impl AsRef<[u8]> for Numbers {
     }
 }
 
+/// Whether the bytes of an object are those that were written, as they come and without keeping them.
+pub(super) struct Check {
+    numbers: Range<usize>,
+    is_as_long: bool,
+    at: usize,
+    hasher: blake3::Hasher,
+    hash: Vec<u8>,
+}
+
+impl Check {
+    /// Of an object of so many bytes, whose head is whole.
+    pub(super) fn new(head: &CloudHead, n_bytes: u64) -> Self {
+        let first = head_bytes(head.dimension);
+        let expected = object_bytes(head).filter(|&expected| expected as u64 == n_bytes);
+        let numbers = first..expected.map_or(first, |expected| expected - HASH_BYTES);
+        let is_as_long = expected.is_some();
+        Self { numbers, is_as_long, at: 0, hasher: blake3::Hasher::new(), hash: Vec::new() }
+    }
+
+    /// Takes the next bytes.
+    pub(super) fn read(&mut self, bytes: &[u8]) {
+        let end = self.at + bytes.len();
+        let [first, last] =
+            [self.numbers.start, self.numbers.end].map(|place| place.clamp(self.at, end) - self.at);
+        self.hasher.update(&bytes[first..last]);
+        let n_missing = HASH_BYTES.saturating_sub(self.hash.len());
+        self.hash.extend(bytes[last..].iter().take(n_missing));
+        self.at = end;
+    }
+
+    /// # Errors
+    /// [`Damaged`] unless they are.
+    pub(super) fn end(self) -> Result<(), Damaged> {
+        match () {
+            () if !self.is_as_long || self.at != self.numbers.end + HASH_BYTES => Err(CUT),
+            () if self.hasher.finalize().as_bytes()[..] != self.hash => Err(OTHER),
+            () => Ok(()),
+        }
+    }
+}
+
+/// Whether it is the bytes that are wrong, and not what they say.
+pub(super) fn is_of_bytes(damaged: Damaged) -> bool {
+    damaged != NO_CLOUD && damaged != ANOTHER
+}
+
 /// Reads the cloud `id` from its object.
 ///
 /// # Errors
@@ -188,13 +237,11 @@ pub fn decode(id: CloudId, bytes: &[u8]) -> Result<RegisteredCloud, Damaged> {
         return Err(OTHER);
     }
     let (points, normals) = numbers.split_at(8 * head.n_points * head.dimension);
-    let cloud_of = |bytes: &[u8]| {
-        Cloud::new(floats(bytes), head.dimension).map_err(|_| Damaged("its numbers are no cloud"))
-    };
+    let cloud_of = |bytes: &[u8]| Cloud::new(floats(bytes), head.dimension).map_err(|_| NO_CLOUD);
     let cloud = cloud_of(points)?;
     let normals = head.has_normals.then(|| cloud_of(normals)).transpose()?;
     if CloudId::of(&cloud, normals.as_ref()) != id {
-        return Err(Damaged("it is another cloud than its name says"));
+        return Err(ANOTHER);
     }
     Ok(RegisteredCloud::restored(id, cloud, normals, head))
 }

@@ -3,24 +3,22 @@
 //! NAMES. `<owner>/factors/<cloud id>/<fit>`: the fit is the hash of everything else that a factorization depends on. They go with their cloud,
 //! and the oldest when there are too many bytes of them. All of them can be made again.
 
+use std::collections::HashSet;
 use std::ops::Range;
+use std::time::SystemTime;
 
 use bytes::Bytes;
-use object_store::buffered::BufWriter;
 use object_store::path::Path;
 use object_store::{ObjectMeta, ObjectStoreExt};
 use serde::{Deserialize, Serialize};
-use tokio::io::AsyncWriteExt;
 
+use super::retention::AT_WORK;
 use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "factors";
 
 /// Bytes that a first line may have.
 const MAX_LINE: u64 = 4096;
-
-/// Bytes of the hash behind everything.
-pub const HASH_BYTES: u64 = 32;
 
 /// How a factor is written down; another version of the service may compute another one, or lay it out otherwise.
 const FORMAT: &str = concat!("gramian factor 1 ", env!("CARGO_PKG_VERSION"));
@@ -78,20 +76,9 @@ impl Objects {
         head: &FactorHead,
         pieces: impl Iterator<Item = Bytes>,
     ) -> Result<u64, Unavailable> {
-        let path = self.factor(name);
-        let mut writer = BufWriter::new(self.store.clone(), path.clone());
-        match write(&mut writer, head, pieces).await {
-            Ok(n_bytes) => {
-                self.tally.add(Verb::Write, true);
-                Ok(n_bytes)
-            }
-            Err(reason) => {
-                // What was begun takes room in the store.
-                let _ = writer.abort().await;
-                self.tally.add(Verb::Write, false);
-                Err(Unavailable { verb: Verb::Write, name: path.to_string(), reason })
-            }
-        }
+        let mut line = serde_json::to_vec(head).unwrap_or_default();
+        line.push(b'\n');
+        self.put_pieces(&self.factor(name), line.into(), futures_util::stream::iter(pieces.map(Ok))).await
     }
 
     /// A factor, if it is there and of this version.
@@ -143,14 +130,30 @@ impl Objects {
         Ok(())
     }
 
-    /// Lets go of the oldest factors until there are no more bytes of them than may be; says how many there are.
+    /// Lets go of the factors of clouds that are not `there`, unless their writers may still be at them, and of the oldest until there are no
+    /// more bytes of them than may be; says how many there are.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub(super) async fn sweep_factors(&self, owners: &[OwnerName], most: u64) -> Result<u64, Unavailable> {
+    pub(super) async fn sweep_factors(
+        &self,
+        there: &[(OwnerName, HashSet<CloudId>)],
+        most: u64,
+        now: SystemTime,
+    ) -> Result<u64, Unavailable> {
         let mut found = Vec::new();
-        for owner in owners {
-            found.extend(self.objects_in(owner, &[FOLDER]).await?);
+        for (owner, clouds) in there {
+            for object in self.objects_in(owner, &[FOLDER]).await? {
+                let folder = object.location.parts().nth_back(1);
+                let cloud = folder.and_then(|folder| CloudId::parse(folder.as_ref()));
+                let is_wanted = cloud.is_some_and(|cloud| clouds.contains(&cloud));
+                let age = now.duration_since(object.last_modified.into()).unwrap_or_default();
+                if is_wanted || age <= AT_WORK {
+                    found.push(object);
+                } else {
+                    self.delete(&object.location).await?;
+                }
+            }
         }
         found.sort_by_key(|object| object.last_modified);
         let mut n_bytes: u64 = found.iter().map(|object| object.size).sum();
@@ -167,26 +170,4 @@ impl Objects {
     fn factor(&self, name: &FactorName) -> Path {
         self.path(&[&name.owner.0, FOLDER, &name.cloud.to_string(), &name.fit])
     }
-}
-
-async fn write(
-    writer: &mut BufWriter,
-    head: &FactorHead,
-    pieces: impl Iterator<Item = Bytes>,
-) -> Result<u64, String> {
-    let mut line = serde_json::to_vec(head).map_err(|error| error.to_string())?;
-    line.push(b'\n');
-    let mut hasher = blake3::Hasher::new();
-    let mut n_bytes = 0;
-    for piece in std::iter::once(Bytes::from(line)).chain(pieces) {
-        hasher.update(&piece);
-        n_bytes += piece.len() as u64;
-        writer.put(piece).await.map_err(|error| error.to_string())?;
-        // However fast the store is, others have their turn.
-        tokio::task::yield_now().await;
-    }
-    let hash = Bytes::copy_from_slice(hasher.finalize().as_bytes());
-    writer.put(hash).await.map_err(|error| error.to_string())?;
-    writer.shutdown().await.map_err(|error| error.to_string())?;
-    Ok(n_bytes + HASH_BYTES)
 }

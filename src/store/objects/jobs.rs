@@ -1,32 +1,31 @@
 //! Jobs as objects: what was asked, who is at it, and what came of it.
 //!
-//! NAMES. `<owner>/jobs/<id>/request` is what was asked; `lease-<attempt>` says who is at it, and is written again while they are; `result` is what
-//! came of it. A job without a result whose last lease is not written any more is anybody's: who makes the next lease has it. Making one is
-//! exclusive, so one attempt has one process; a process that was only asleep may still end what another has begun again, and writes the same.
+//! NAMES. `<owner>/jobs/<id>/request` is what was asked; `lease-<attempt>` says who is at it, and is written again while they are;
+//! `answer-<attempt>` is what an attempt came to, and `result` which of them is that of the job. A job without a result whose last lease is not
+//! written any more is anybody's: who makes the next lease has it. Making a lease is exclusive, so one attempt has one process; so is making the
+//! result, so that a job ends once, whoever was only asleep.
 //!
-//! OBJECTS are a line of JSON, a body, and the BLAKE3 of both: 32 bytes. What is read is what was written, or an error.
+//! OBJECTS are a line of JSON, a body if they have one, and the BLAKE3 of both (pieces.rs), but for leases, which are a line.
 
+use std::sync::Arc;
 use std::time::SystemTime;
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 use futures_util::stream::BoxStream;
-use futures_util::{Stream, StreamExt, TryStreamExt};
-use object_store::buffered::BufWriter;
+use futures_util::{Stream, StreamExt};
 use object_store::path::Path;
 use object_store::{Error, ObjectMeta, ObjectStoreExt, PutMode, PutOptions, PutPayload};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
+use super::pieces::{self, BrokenOff, sealed, unsealed};
 use super::{Damaged, Objects, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "jobs";
 const REQUEST: &str = "request";
 const RESULT: &str = "result";
 const LEASE: &str = "lease-";
-const HASH_BYTES: usize = 32;
-
-/// Bytes that the first line of an object may have.
-const MAX_LINE: usize = 64 << 10;
+const ANSWER: &str = "answer-";
 
 /// The name of a job: a UUID of version 7, which tells when it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -112,7 +111,21 @@ pub struct JobObjects {
     pub lease: Option<(u32, SystemTime)>,
 }
 
-/// The result of a job: its first line, and its body as it is read.
+/// A result as it is written: where its body is, if it has one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Published {
+    head: JobResult,
+    attempt: Option<u32>,
+}
+
+impl JobObjects {
+    /// Whether this attempt is the last one, of a job that is still to be done.
+    pub fn is_that_of(&self, attempt: u32) -> bool {
+        self.has_request && self.ended_at.is_none() && self.lease.is_none_or(|(last, _)| last <= attempt)
+    }
+}
+
+/// The result of a job, and its body as it is read.
 pub struct FoundResult {
     pub head: JobResult,
     pub ended_at: SystemTime,
@@ -120,10 +133,12 @@ pub struct FoundResult {
     pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
 }
 
-/// Why a body ends before its end.
-#[derive(Debug, thiserror::Error)]
-#[error("a result cannot be read to its end: {0}")]
-pub struct BrokenOff(String);
+/// What was asked, and its body as it is read.
+pub struct FoundRequest {
+    pub request: JobRequest,
+    pub n_body_bytes: u64,
+    pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
+}
 
 impl Objects {
     /// Writes what is asked.
@@ -146,29 +161,28 @@ impl Objects {
         self.put(&self.job(owner, id, REQUEST), payload).await
     }
 
-    /// Bytes of what was asked, if it is there.
+    /// What was asked, if it is there, and as it was written as far as its first line.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn job_bytes(&self, owner: &OwnerName, id: JobId) -> Result<Option<u64>, Unavailable> {
-        let name = self.job(owner, id, REQUEST);
-        let found = self.counted(Verb::Find, &name, self.store.head(&name).await)?;
-        Ok(found.map(|found| found.size))
-    }
-
-    /// What was asked, if it is there, and as it was written.
-    ///
-    /// # Errors
-    /// [`Unavailable`].
-    pub async fn get_job(
+    pub async fn open_job(
         &self,
         owner: &OwnerName,
         id: JobId,
-    ) -> Result<Option<Result<(JobRequest, Bytes), Damaged>>, Unavailable> {
+    ) -> Result<Option<Result<FoundRequest, Damaged>>, Unavailable> {
+        let found = self.open_pieces(&self.job(owner, id, REQUEST)).await?;
+        let read = |found: pieces::Found| {
+            let request = serde_json::from_slice(&found.line);
+            let request = request.map_err(|_| Damaged("its first line is no request"))?;
+            Ok(FoundRequest { request, n_body_bytes: found.n_body_bytes, body: found.body })
+        };
+        Ok(found.map(|found| found.and_then(read)))
+    }
+
+    /// Counts a request that is not what was written: its job fails.
+    pub fn report_job(&self, owner: &OwnerName, id: JobId) {
         let name = self.job(owner, id, REQUEST);
-        let found = async { self.store.get(&name).await?.bytes().await };
-        let found = self.counted(Verb::Read, &name, found.await)?;
-        Ok(found.map(|bytes| read_request(&bytes)))
+        self.report(&name, Damaged("its bytes are not those that were written"));
     }
 
     /// Makes the lease of an attempt; says whether this process has it.
@@ -182,16 +196,7 @@ impl Objects {
         attempt: u32,
         lease: &Lease,
     ) -> Result<bool, Unavailable> {
-        let name = self.lease(owner, id, attempt);
-        let created = PutOptions::from(PutMode::Create);
-        match self.store.put_opts(&name, line_of(lease).into(), created).await {
-            Ok(_) => {
-                self.tally.add(Verb::Write, true);
-                Ok(true)
-            }
-            Err(Error::AlreadyExists { .. }) => Ok(false),
-            Err(error) => Err(self.failed(Verb::Write, &name, error)),
-        }
+        self.create(&self.lease(owner, id, attempt), line_of(lease).into()).await
     }
 
     /// Writes a lease again: its process is alive, and this far.
@@ -224,91 +229,126 @@ impl Objects {
         Ok(found.map(|bytes| serde_json::from_slice(&bytes).unwrap_or_default()))
     }
 
-    /// Writes what came of a job, as its body comes. Nothing is there until all of it is.
+    /// Writes what an attempt came to, as its body comes, and makes it the result of the job unless it has one, or nobody wants it any more; says
+    /// whether it is. Nothing is there until all of it is.
     ///
     /// # Errors
     /// [`Unavailable`], also if the body breaks off.
     pub async fn put_result<E: std::fmt::Display>(
         &self,
-        owner: &OwnerName,
-        id: JobId,
-        head: &JobResult,
+        (owner, id): (&OwnerName, JobId),
+        attempt: u32,
+        head: JobResult,
         body: impl Stream<Item = Result<Bytes, E>>,
-    ) -> Result<(), Unavailable> {
-        let name = self.job(owner, id, RESULT);
-        let mut writer = BufWriter::new(self.store.clone(), name.clone());
-        match write(&mut writer, line_of(head), body).await {
-            Ok(()) => {
-                self.tally.add(Verb::Write, true);
-                Ok(())
-            }
-            Err(reason) => {
-                // What was begun takes room in the store.
-                let _ = writer.abort().await;
-                self.tally.add(Verb::Write, false);
-                Err(Unavailable { verb: Verb::Write, name: name.to_string(), reason })
-            }
+    ) -> Result<bool, Unavailable> {
+        let answer = self.answer(owner, id, attempt);
+        let body = body.map(|piece| piece.map_err(|error| error.to_string()));
+        self.put_pieces(&answer, line_of(&head), body).await?;
+        let is_wanted = self.find_job(owner, id).await?.is_some_and(|job| job.has_request);
+        let is_result = is_wanted && self.publish(owner, id, head, Some(attempt)).await?;
+        if !is_result {
+            self.delete(&answer).await?;
+            return Ok(false);
+        }
+        // Forgotten meanwhile: it must not come back.
+        match self.find_job(owner, id).await?.filter(|job| !job.has_request) {
+            Some(forgotten) => self.delete_job(&forgotten).await.map(|()| false),
+            None => Ok(true),
         }
     }
 
-    /// Ends a job without a result, unless it has one; says whether it had none.
+    /// Ends a job without an answer, unless it has a result; says whether it had none.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn cancel_job(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
-        let name = self.job(owner, id, RESULT);
-        let line = line_of(&JobResult { outcome: Outcome::Cancelled, status: 0, headers: Vec::new() });
-        let hash = Bytes::copy_from_slice(blake3::hash(&line).as_bytes());
-        let created = PutOptions::from(PutMode::Create);
-        let written = self.store.put_opts(&name, [line, hash].into_iter().collect(), created).await;
-        match written {
-            Ok(_) => {
-                self.tally.add(Verb::Write, true);
-                Ok(true)
-            }
-            Err(Error::AlreadyExists { .. }) => Ok(false),
-            Err(error) => Err(self.failed(Verb::Write, &name, error)),
-        }
+        let head = JobResult { outcome: Outcome::Cancelled, status: 0, headers: Vec::new() };
+        self.publish(owner, id, head, None).await
     }
 
-    /// Whether a job has ended.
+    /// Makes the result of a job, unless it has one.
+    async fn publish(
+        &self,
+        owner: &OwnerName,
+        id: JobId,
+        head: JobResult,
+        attempt: Option<u32>,
+    ) -> Result<bool, Unavailable> {
+        let result = sealed(line_of(&Published { head, attempt }));
+        self.create(&self.job(owner, id, RESULT), result).await
+    }
+
+    /// What came of a job, if it has ended. A result that is not what was written is let go, and reported: the job is anybody's then.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn has_result(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+    pub async fn get_result(
+        self: &Arc<Self>,
+        owner: &OwnerName,
+        id: JobId,
+    ) -> Result<Option<FoundResult>, Unavailable> {
         let name = self.job(owner, id, RESULT);
-        Ok(self.counted(Verb::Find, &name, self.store.head(&name).await)?.is_some())
+        let found = async {
+            let found = self.store.get(&name).await?;
+            Ok((SystemTime::from(found.meta.last_modified), found.bytes().await?))
+        };
+        let Some((ended_at, bytes)) = self.counted(Verb::Read, &name, found.await)? else { return Ok(None) };
+        let read = unsealed(&bytes).and_then(|line| {
+            serde_json::from_slice(line).map_err(|_| Damaged("its first line is no result"))
+        });
+        let damaged = match read {
+            Ok(Published { head, attempt: None }) => {
+                let body = futures_util::stream::empty().boxed();
+                return Ok(Some(FoundResult { head, ended_at, n_body_bytes: 0, body }));
+            }
+            Ok(Published { head, attempt: Some(attempt) }) => {
+                match self.open_pieces(&self.answer(owner, id, attempt)).await? {
+                    Some(Ok(found)) => {
+                        let body = self.clone().reporting(owner.clone(), id, found.body);
+                        return Ok(Some(FoundResult {
+                            head,
+                            ended_at,
+                            n_body_bytes: found.n_body_bytes,
+                            body,
+                        }));
+                    }
+                    Some(Err(damaged)) => damaged,
+                    None => Damaged("its body is not there"),
+                }
+            }
+            Err(damaged) => damaged,
+        };
+        self.drop_result(owner, id, damaged).await;
+        Ok(None)
     }
 
-    /// What came of a job, if it has ended.
-    ///
-    /// # Errors
-    /// [`Unavailable`], also where the first line is not what was written.
-    pub async fn get_result(&self, owner: &OwnerName, id: JobId) -> Result<Option<FoundResult>, Unavailable> {
+    /// A body that lets go of its result if it is not what was written.
+    fn reporting(
+        self: Arc<Self>,
+        owner: OwnerName,
+        id: JobId,
+        body: BoxStream<'static, Result<Bytes, BrokenOff>>,
+    ) -> BoxStream<'static, Result<Bytes, BrokenOff>> {
+        let body = body.then(move |piece| {
+            let (objects, owner) = (self.clone(), owner.clone());
+            async move {
+                if let Err(BrokenOff::Damaged) = piece {
+                    objects
+                        .drop_result(&owner, id, Damaged("its bytes are not those that were written"))
+                        .await;
+                }
+                piece
+            }
+        });
+        body.boxed()
+    }
+
+    /// Lets go of a result that is not what was written.
+    async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: Damaged) {
         let name = self.job(owner, id, RESULT);
-        let found = self.counted(Verb::Read, &name, self.store.get(&name).await)?;
-        let Some(found) = found else { return Ok(None) };
-        let (n_bytes, ended_at) = (found.meta.size, SystemTime::from(found.meta.last_modified));
-        let mut bytes = found.into_stream();
-        let failed = |reason: String| Unavailable { verb: Verb::Read, name: name.to_string(), reason };
-        let mut first = BytesMut::new();
-        let end = loop {
-            if let Some(end) = first.iter().position(|&byte| byte == b'\n') {
-                break end + 1;
-            }
-            match bytes.try_next().await.map_err(|error| failed(error.to_string()))? {
-                Some(more) if first.len() <= MAX_LINE => first.extend_from_slice(&more),
-                _ => return Err(failed("it has no first line".to_owned())),
-            }
-        };
-        let line = first.split_to(end);
-        let head = serde_json::from_slice(&line).map_err(|error| failed(error.to_string()))?;
-        let n_body_bytes = n_bytes.saturating_sub((line.len() + HASH_BYTES) as u64);
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(&line);
-        let rest = bytes.map_err(|error| error.to_string()).boxed();
-        let body = checked(hasher, first.freeze(), rest).boxed();
-        Ok(Some(FoundResult { head, ended_at, n_body_bytes, body }))
+        self.report(&name, damaged);
+        let is_gone = self.delete(&name).await.is_ok();
+        tracing::error!(job = %id, is_gone, "the result of a job is damaged, and made again");
     }
 
     /// What there is of one job, if anything.
@@ -335,11 +375,26 @@ impl Objects {
     pub async fn delete_job(&self, job: &JobObjects) -> Result<(), Unavailable> {
         let JobObjects { owner, id, .. } = job;
         self.delete(&self.job(owner, *id, REQUEST)).await?;
-        for attempt in 0..=job.lease.map_or(0, |(attempt, _)| attempt) {
-            self.delete(&self.lease(owner, *id, attempt)).await?;
+        for object in self.objects_in(owner, &[FOLDER, &id.to_string()]).await? {
+            self.delete(&object.location).await?;
         }
-        self.delete(&self.job(owner, *id, RESULT)).await?;
         Ok(())
+    }
+
+    /// Writes an object that is not there; says whether it was not.
+    async fn create(&self, name: &Path, payload: PutPayload) -> Result<bool, Unavailable> {
+        match self.store.put_opts(name, payload, PutOptions::from(PutMode::Create)).await {
+            Ok(_) => {
+                self.tally.add(Verb::Write, true);
+                Ok(true)
+            }
+            Err(Error::AlreadyExists { .. }) => Ok(false),
+            Err(error) => Err(self.failed(Verb::Write, name, error)),
+        }
+    }
+
+    fn answer(&self, owner: &OwnerName, id: JobId, attempt: u32) -> Path {
+        self.job(owner, id, &format!("{ANSWER}{attempt}"))
     }
 
     fn job(&self, owner: &OwnerName, id: JobId, part: &str) -> Path {
@@ -356,77 +411,6 @@ fn line_of(head: &impl Serialize) -> Bytes {
     let mut line = serde_json::to_vec(head).unwrap_or_default();
     line.push(b'\n');
     line.into()
-}
-
-/// What was asked, from its object.
-///
-/// # Errors
-/// [`Damaged`] unless it is as it was written.
-pub fn read_request(bytes: &Bytes) -> Result<(JobRequest, Bytes), Damaged> {
-    let end = bytes.len().checked_sub(HASH_BYTES).ok_or(Damaged("it ends too early"))?;
-    if blake3::hash(&bytes[..end]).as_bytes() != &bytes[end..] {
-        return Err(Damaged("its bytes are not those that were written"));
-    }
-    let line = bytes.iter().position(|&byte| byte == b'\n').filter(|&line| line < end);
-    let line = line.ok_or(Damaged("it has no first line"))? + 1;
-    let head = serde_json::from_slice(&bytes[..line]).map_err(|_| Damaged("its first line is no request"))?;
-    Ok((head, bytes.slice(line..end)))
-}
-
-async fn write<E: std::fmt::Display>(
-    writer: &mut BufWriter,
-    line: Bytes,
-    body: impl Stream<Item = Result<Bytes, E>>,
-) -> Result<(), String> {
-    use tokio::io::AsyncWriteExt;
-    let failed = |error: Error| error.to_string();
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&line);
-    writer.put(line).await.map_err(failed)?;
-    let mut body = std::pin::pin!(body);
-    while let Some(piece) = body.next().await {
-        let piece = piece.map_err(|error| error.to_string())?;
-        hasher.update(&piece);
-        writer.put(piece).await.map_err(failed)?;
-    }
-    writer.put(Bytes::copy_from_slice(hasher.finalize().as_bytes())).await.map_err(failed)?;
-    writer.shutdown().await.map_err(|error| error.to_string())
-}
-
-/// The body in front of the hash behind it. The last bytes come only once the hash is right: who reads a body that is not what was written finds
-/// it broken off, and never whole.
-fn checked(
-    hasher: blake3::Hasher,
-    first: Bytes,
-    rest: BoxStream<'static, Result<Bytes, String>>,
-) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
-    let first = futures_util::stream::once(std::future::ready(Ok(first)));
-    let state = Some((hasher, BytesMut::new(), first.chain(rest).boxed()));
-    futures_util::stream::unfold(state, |state| async move {
-        let (mut hasher, mut held, mut bytes) = state?;
-        loop {
-            match bytes.next().await {
-                Some(Err(error)) => return Some((Err(BrokenOff(error)), None)),
-                Some(Ok(more)) => {
-                    held.extend_from_slice(&more);
-                    // A byte of the body is held back as well, so that there is something to break off.
-                    let n_free = held.len().saturating_sub(HASH_BYTES + 1);
-                    if n_free > 0 {
-                        let free = held.split_to(n_free).freeze();
-                        hasher.update(&free);
-                        return Some((Ok(free), Some((hasher, held, bytes))));
-                    }
-                }
-                None => {
-                    let body = held.split_to(held.len().saturating_sub(HASH_BYTES)).freeze();
-                    hasher.update(&body);
-                    let is_whole = hasher.finalize().as_bytes()[..] == held[..];
-                    let wrong = || BrokenOff("its bytes are not those that were written".to_owned());
-                    return Some((if is_whole { Ok(body) } else { Err(wrong()) }, None));
-                }
-            }
-        }
-    })
 }
 
 /// Objects by their jobs.
@@ -459,6 +443,8 @@ fn collected(owner: &OwnerName, found: Vec<ObjectMeta>) -> Vec<JobObjects> {
 
 #[cfg(test)]
 mod tests {
+    use futures_util::TryStreamExt;
+
     use super::*;
 
     fn owner() -> OwnerName {
@@ -475,17 +461,31 @@ mod tests {
         JobResult { outcome: Outcome::Succeeded, status: 200, headers }
     }
 
-    async fn read(objects: &Objects, id: JobId) -> Result<Vec<u8>, BrokenOff> {
-        let found = objects.get_result(&owner(), id).await.unwrap().unwrap();
-        let (n_bytes, pieces) = (found.n_body_bytes, found.body.try_collect::<Vec<_>>().await?);
-        let whole = pieces.concat();
-        assert_eq!(whole.len() as u64, n_bytes);
-        Ok(whole)
+    async fn read(objects: &Arc<Objects>, id: JobId) -> Option<Result<Vec<u8>, BrokenOff>> {
+        let found = objects.get_result(&owner(), id).await.unwrap()?;
+        let n_bytes = found.n_body_bytes;
+        let pieces = found.body.try_collect::<Vec<_>>().await;
+        Some(pieces.map(|pieces| {
+            let whole = pieces.concat();
+            assert_eq!(whole.len() as u64, n_bytes);
+            whole
+        }))
+    }
+
+    async fn asked(objects: &Objects, body: &'static [u8]) -> JobId {
+        let id = JobId::new();
+        let request = JobRequest { path: "/v1/normals".to_owned(), headers: Vec::new() };
+        objects.put_job(&owner(), id, &request, Bytes::from_static(body)).await.unwrap();
+        id
+    }
+
+    async fn bytes_of(objects: &Objects, name: &Path) -> Bytes {
+        objects.store.get(name).await.unwrap().bytes().await.unwrap()
     }
 
     #[tokio::test]
     async fn what_is_asked_and_what_comes_of_it_is_read_as_it_was_written() {
-        let (objects, id) = (Objects::in_memory(), JobId::new());
+        let (objects, id) = (Arc::new(Objects::in_memory()), JobId::new());
         assert_eq!(JobId::parse(&id.to_string()), Some(id));
         assert_eq!(JobId::parse(&id.to_string().to_uppercase()), None);
         assert_eq!(objects.find_job(&owner(), id).await.unwrap(), None);
@@ -493,19 +493,59 @@ mod tests {
         let request = JobRequest { path: "/v1/normals".to_owned(), headers };
         let points = Bytes::from_static(b"{}\n");
         objects.put_job(&owner(), id, &request, points.clone()).await.unwrap();
-        let found = objects.get_job(&owner(), id).await.unwrap().unwrap();
-        assert_eq!(found, Ok((request, points)));
-        let bodies: [&[&'static [u8]]; 3] = [&[], &[b"x"], &[b"12345678", &[7; 100], b"", b"9"]];
+        let found = objects.open_job(&owner(), id).await.unwrap().unwrap().unwrap();
+        assert_eq!((found.request, found.n_body_bytes), (request, 3));
+        assert_eq!(found.body.try_collect::<Vec<_>>().await.unwrap().concat(), points);
+        let bodies: [&[&'static [u8]]; 4] = [
+            &[],
+            &[b"x"],
+            &[b"12345678", &[7; 100], b"", b"9"],
+            &[&[5; 12 << 20], b"more than is written at once"],
+        ];
         for pieces in bodies {
-            objects.put_result(&owner(), id, &head(), body(pieces)).await.unwrap();
-            assert_eq!(read(&objects, id).await.unwrap(), pieces.concat());
+            let id = asked(&objects, b"").await;
+            assert!(objects.put_result((&owner(), id), 0, head(), body(pieces)).await.unwrap());
+            assert_eq!(read(&objects, id).await.unwrap().unwrap(), pieces.concat());
         }
+        assert!(objects.put_result((&owner(), id), 0, head(), body(&[])).await.unwrap());
         let found = objects.find_job(&owner(), id).await.unwrap().unwrap();
         assert!(found.has_request && found.ended_at.is_some() && found.lease.is_none());
         assert!(!objects.cancel_job(&owner(), id).await.unwrap(), "it has ended");
         objects.delete_job(&found).await.unwrap();
         assert_eq!(objects.find_job(&owner(), id).await.unwrap(), None);
+    }
+
+    #[tokio::test]
+    async fn a_job_ends_once() {
+        let objects = Arc::new(Objects::in_memory());
+        let id = asked(&objects, b"").await;
+        assert!(objects.put_result((&owner(), id), 1, head(), body(&[b"first"])).await.unwrap());
+        assert!(!objects.put_result((&owner(), id), 0, head(), body(&[b"late"])).await.unwrap());
+        assert_eq!(read(&objects, id).await.unwrap().unwrap(), b"first");
+        let cancelled = asked(&objects, b"").await;
+        assert!(objects.cancel_job(&owner(), cancelled).await.unwrap());
+        assert!(!objects.put_result((&owner(), cancelled), 0, head(), body(&[b"late"])).await.unwrap());
+        let found = objects.get_result(&owner(), cancelled).await.unwrap().unwrap();
+        assert_eq!((found.head.outcome, found.n_body_bytes), (Outcome::Cancelled, 0));
+        // Nor does one come back that was forgotten.
+        for id in [id, cancelled] {
+            let job = objects.find_job(&owner(), id).await.unwrap().unwrap();
+            objects.delete_job(&job).await.unwrap();
+            assert!(!objects.put_result((&owner(), id), 2, head(), body(&[b"late"])).await.unwrap());
+        }
         assert_eq!(objects.jobs(&owner()).await.unwrap(), []);
+    }
+
+    #[tokio::test]
+    async fn a_result_that_breaks_off_is_none() {
+        let objects = Arc::new(Objects::in_memory());
+        let id = asked(&objects, b"").await;
+        for n_pieces in [1, 12] {
+            let piece = Bytes::from(vec![1; 1 << 20]);
+            let pieces = std::iter::repeat_n(Ok(piece), n_pieces).chain([Err("gone".to_owned())]);
+            let put = objects.put_result((&owner(), id), 0, head(), futures_util::stream::iter(pieces)).await;
+            assert!(put.is_err() && read(&objects, id).await.is_none());
+        }
     }
 
     #[tokio::test]
@@ -528,34 +568,46 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_result_that_is_not_what_was_written_is_never_whole() {
-        let (objects, id) = (Objects::in_memory(), JobId::new());
-        objects.put_result(&owner(), id, &head(), body(&[b"0123456789"])).await.unwrap();
-        let name = objects.job(&owner(), id, RESULT);
-        let bytes = objects.store.get(&name).await.unwrap().bytes().await.unwrap();
-        let line = bytes.iter().position(|&byte| byte == b'\n').unwrap() + 1;
-        for at in line..bytes.len() {
-            let mut other = bytes.to_vec();
-            other[at] ^= 1;
-            objects.put(&name, other.into()).await.unwrap();
-            assert!(read(&objects, id).await.is_err(), "byte {at}");
-            objects.put(&name, bytes.slice(..at).into()).await.unwrap();
-            assert!(read(&objects, id).await.is_err(), "the first {at}");
+    async fn a_result_that_is_not_what_was_written_is_never_whole_and_made_again() {
+        let objects = Arc::new(Objects::in_memory());
+        let id = asked(&objects, b"").await;
+        objects.put_result((&owner(), id), 0, head(), body(&[b"0123456789"])).await.unwrap();
+        let (answer, result) = (objects.answer(&owner(), id, 0), objects.job(&owner(), id, RESULT));
+        let (of_answer, of_result) = (bytes_of(&objects, &answer).await, bytes_of(&objects, &result).await);
+        for (name, bytes, first) in [(&answer, &of_answer, 0), (&result, &of_result, 0)] {
+            for at in first..bytes.len() {
+                let mut other = bytes.to_vec();
+                other[at] ^= 1;
+                for wrong in [other.into(), bytes.slice(..at)] {
+                    objects.put(name, wrong.into()).await.unwrap();
+                    let n_before = objects.n_damaged();
+                    assert!(read(&objects, id).await.is_none_or(|body| body.is_err()), "{name}, {at}");
+                    assert_eq!(objects.n_damaged(), n_before + 1);
+                    let job = objects.find_job(&owner(), id).await.unwrap().unwrap();
+                    assert!(job.has_request && job.ended_at.is_none(), "it is anybody's");
+                    objects.put(&answer, of_answer.clone().into()).await.unwrap();
+                    objects.put(&result, of_result.clone().into()).await.unwrap();
+                }
+            }
         }
+        assert_eq!(read(&objects, id).await.unwrap().unwrap(), b"0123456789");
     }
 
     #[tokio::test]
     async fn a_request_that_is_not_what_was_written_is_refused() {
-        let (objects, id) = (Objects::in_memory(), JobId::new());
-        let request = JobRequest { path: "/v1/normals".to_owned(), headers: Vec::new() };
-        objects.put_job(&owner(), id, &request, Bytes::from_static(b"abc")).await.unwrap();
+        let objects = Objects::in_memory();
+        let id = asked(&objects, b"abc").await;
         let name = objects.job(&owner(), id, REQUEST);
-        let bytes = objects.store.get(&name).await.unwrap().bytes().await.unwrap();
+        let bytes = bytes_of(&objects, &name).await;
         for at in 0..bytes.len() {
             let mut other = bytes.to_vec();
             other[at] ^= 1;
             objects.put(&name, other.into()).await.unwrap();
-            assert!(objects.get_job(&owner(), id).await.unwrap().unwrap().is_err(), "byte {at}");
+            let is_refused = match objects.open_job(&owner(), id).await.unwrap().unwrap() {
+                Ok(found) => found.body.try_collect::<Vec<_>>().await.is_err(),
+                Err(_) => true,
+            };
+            assert!(is_refused, "byte {at}");
         }
     }
 }

@@ -6,6 +6,8 @@
 //! WRITES are whole or not at all: a file is written beside its name, flushed and then renamed; a bucket has an object when all of it has come. A
 //! cloud is written once: whoever comes second finds it. It is listed after it is there, and gone from the list before it goes.
 //!
+//! LEFT-OVERS of processes that were killed while they wrote a file, of deleted clouds and of jobs go by themselves: see retention.rs.
+//!
 //! FACTORS are under `<owner>/factors/`, see factors.rs, and go with their clouds.
 //!
 //! JOBS are under `<owner>/jobs/`: see jobs.rs.
@@ -18,12 +20,14 @@
 pub mod cloud_object;
 pub mod factors;
 pub mod jobs;
+pub mod pieces;
 mod place;
 mod retention;
 mod tally;
 #[cfg(test)]
 mod tests;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
@@ -70,6 +74,8 @@ const MAX_HEAD_BYTES: u64 = 1 << 20;
 pub struct Objects {
     store: Arc<dyn ObjectStore>,
     root: Path,
+    /// Where files are, if it is a directory.
+    directory: Option<PathBuf>,
     tally: Tally,
     n_damaged: AtomicU64,
 }
@@ -103,7 +109,11 @@ impl Objects {
         variables: impl IntoIterator<Item = (String, String)>,
     ) -> Result<Self, String> {
         let (store, root) = place.open(variables)?;
-        let objects = Self { store, root, tally: Tally::default(), n_damaged: AtomicU64::new(0) };
+        let directory = match place {
+            Place::Directory(directory) => Some(directory.clone()),
+            Place::Bucket(_) => None,
+        };
+        let objects = Self { directory, ..Self::over(store, root) };
         let name = objects.path(&["probe", &Uuid::now_v7().to_string()]);
         let probe = async {
             objects.store.put(&name, PutPayload::from_static(b"probe")).await?;
@@ -119,8 +129,12 @@ impl Objects {
 
     /// A store in memory, as large as memory.
     pub fn in_memory() -> Self {
-        let store = Arc::new(object_store::memory::InMemory::new());
-        Self { store, root: Path::default(), tally: Tally::default(), n_damaged: AtomicU64::new(0) }
+        Self::over(Arc::new(object_store::memory::InMemory::new()), Path::default())
+    }
+
+    /// A store of any kind, with what stands before all names.
+    pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
+        Self { store, root, directory: None, tally: Tally::default(), n_damaged: AtomicU64::new(0) }
     }
 
     /// What was asked of the store since the start.
@@ -148,9 +162,9 @@ impl Objects {
         let created = PutOptions::from(PutMode::Create);
         let written = match self.store.put_opts(&name, payload.clone(), created).await {
             Ok(_) => Written::Now,
-            Err(Error::AlreadyExists { .. }) => match self.head(owner, id).await? {
+            Err(Error::AlreadyExists { .. }) => match self.whole_head(owner, id).await? {
                 Some(head) => Written::Before(head.created_at),
-                // It is damaged, or has gone meanwhile.
+                // It was damaged, or has gone meanwhile.
                 None => {
                     self.put(&name, payload).await?;
                     Written::Now
@@ -202,6 +216,42 @@ impl Objects {
         }
     }
 
+    /// The head of a cloud that is there and whole, whose points are read for that. One that is not is put aside.
+    async fn whole_head(&self, owner: &OwnerName, id: CloudId) -> Result<Option<CloudHead>, Unavailable> {
+        match self.check(owner, id).await? {
+            None => Ok(None),
+            Some(Ok(head)) => Ok(Some(head)),
+            Some(Err(damaged)) => {
+                self.put_aside(owner, id, damaged).await;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Whether a cloud is there, and whole.
+    async fn check(
+        &self,
+        owner: &OwnerName,
+        id: CloudId,
+    ) -> Result<Option<Result<CloudHead, Damaged>>, Unavailable> {
+        let name = self.cloud(owner, id);
+        let Some(first) = self.first_bytes(&name).await? else { return Ok(None) };
+        let head = match CloudHead::decode(&first) {
+            Ok(head) => head,
+            Err(damaged) => return Ok(Some(Err(damaged))),
+        };
+        let found = self.counted(Verb::Read, &name, self.store.get(&name).await)?;
+        let Some(found) = found else { return Ok(None) };
+        let mut check = cloud_object::Check::new(&head, found.meta.size);
+        let mut bytes = found.into_stream();
+        while let Some(more) =
+            bytes.try_next().await.map_err(|error| self.failed(Verb::Read, &name, error))?
+        {
+            check.read(&more);
+        }
+        Ok(Some(check.end().map(|()| head)))
+    }
+
     /// The heads of some clouds, without those that are gone or damaged.
     ///
     /// # Errors
@@ -232,7 +282,7 @@ impl Objects {
         Ok(names.iter().filter_map(|found| Listed::parse(found.location.filename()?)).collect())
     }
 
-    /// Forgets a cloud; says whether it was there.
+    /// Forgets a cloud, and what was put aside of it; says whether there was any of it.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -244,15 +294,38 @@ impl Objects {
         }
         self.delete(&name).await?;
         self.delete_factors(owner, id).await?;
-        Ok(head.is_some())
+        let aside = self.aside(owner, id);
+        let was_aside = self.counted(Verb::Find, &aside, self.store.head(&aside).await)?.is_some();
+        if was_aside {
+            self.delete(&aside).await?;
+        }
+        Ok(head.is_some() || was_aside)
     }
 
-    /// Puts aside what is not what was written.
+    /// Puts aside what is not what was written, unless somebody has written it again meanwhile.
     pub async fn put_aside(&self, owner: &OwnerName, id: CloudId, damaged: Damaged) {
-        let (name, aside) = (self.cloud(owner, id), self.path(&[&owner.0, "damaged", &id.to_string()]));
-        self.n_damaged.fetch_add(1, Ordering::Relaxed);
+        if cloud_object::is_of_bytes(damaged) && matches!(self.check(owner, id).await, Ok(Some(Ok(_)))) {
+            return;
+        }
+        let (name, aside) = (self.cloud(owner, id), self.aside(owner, id));
+        self.report(&name, damaged);
         let is_aside = self.store.rename(&name, &aside).await.is_ok();
-        tracing::error!(object = %name, reason = damaged.0, %aside, is_aside, "an object is damaged");
+        let is_unlisted = self.unlist(owner, id).await.is_ok();
+        tracing::error!(object = %name, %aside, is_aside, is_unlisted, "a cloud is put aside");
+    }
+
+    /// Takes a cloud off the list, since whenever it is on it.
+    async fn unlist(&self, owner: &OwnerName, id: CloudId) -> Result<(), Unavailable> {
+        for listed in self.list(owner, None).await?.into_iter().filter(|listed| listed.id == id) {
+            self.delete(&self.listed(owner, listed)).await?;
+        }
+        Ok(())
+    }
+
+    /// Counts an object that is not what was written.
+    fn report(&self, name: &Path, damaged: Damaged) {
+        self.n_damaged.fetch_add(1, Ordering::Relaxed);
+        tracing::error!(object = %name, reason = damaged.0, "an object is damaged");
     }
 
     /// As many as a head has.
@@ -310,6 +383,11 @@ impl Objects {
 
     fn cloud(&self, owner: &OwnerName, id: CloudId) -> Path {
         self.path(&[&owner.0, "clouds", &id.to_string()])
+    }
+
+    /// Where a damaged one goes.
+    fn aside(&self, owner: &OwnerName, id: CloudId) -> Path {
+        self.path(&[&owner.0, "damaged", &id.to_string()])
     }
 
     fn listed(&self, owner: &OwnerName, listed: Listed) -> Path {

@@ -54,8 +54,9 @@ impl Place {
             Self::Directory(directory) => {
                 std::fs::create_dir_all(directory).map_err(|error| format!("cannot be made: {error}"))?;
                 let store = LocalFileSystem::new_with_prefix(directory).map_err(|error| error.to_string())?;
-                // An answer says that the cloud is there: also after the machine has lost its power.
-                Ok((Arc::new(store.with_fsync(true)), Path::default()))
+                // An answer says that the cloud is there: also after the machine has lost its power. Folders go with what was last in them.
+                let store = store.with_fsync(true).with_automatic_cleanup(true);
+                Ok((Arc::new(store), Path::default()))
             }
             Self::Bucket(url) => {
                 let named = ["aws_", "google_", "azure_"];

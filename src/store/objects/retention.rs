@@ -1,6 +1,7 @@
 //! What goes by itself: clouds beyond an age or a number of bytes, oldest first, and what was damaged.
 
 use std::collections::{HashMap, HashSet};
+use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use futures_util::TryStreamExt;
@@ -11,6 +12,9 @@ use super::{CloudId, Listed, Objects, OwnerName, Unavailable};
 
 /// How long what is damaged is kept, for whoever wants to know why.
 const DAMAGED: Duration = Duration::from_secs(7 * 24 * 3600);
+
+/// How long whoever writes something may be at it.
+pub(super) const AT_WORK: Duration = Duration::from_secs(3600);
 
 /// How long clouds are kept, and how much of them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -48,6 +52,9 @@ impl Objects {
             kept.extend(self.kept(owner).await?);
             self.forget_damaged(owner, now).await?;
         }
+        self.remove_half_written(now).await;
+        let mut there: Vec<(OwnerName, HashSet<CloudId>)> =
+            owners.into_iter().map(|owner| (owner, HashSet::new())).collect();
         kept.sort_by_key(|cloud| cloud.listed);
         let mut swept = Swept::default();
         let mut n_bytes: u64 = kept.iter().map(|cloud| cloud.n_bytes).sum();
@@ -60,11 +67,24 @@ impl Objects {
                 swept.gone.push((cloud.owner, cloud.listed.id));
             } else {
                 swept.n_clouds += 1;
+                let of_owner = there.iter_mut().find(|(owner, _)| *owner == cloud.owner);
+                of_owner.into_iter().for_each(|(_, clouds)| _ = clouds.insert(cloud.listed.id));
             }
         }
         swept.n_bytes = n_bytes;
-        swept.n_factor_bytes = self.sweep_factors(&owners, limits.n_factor_bytes).await?;
+        swept.n_factor_bytes = self.sweep_factors(&there, limits.n_factor_bytes, now).await?;
         Ok(swept)
+    }
+
+    /// Removes files that were begun, by processes that ended before they were whole: they have names that no list shows.
+    async fn remove_half_written(&self, now: SystemTime) {
+        let Some(directory) = self.directory.clone() else { return };
+        let removed = tokio::task::spawn_blocking(move || remove_half_written(&directory, now)).await;
+        match removed {
+            Ok(0) => {}
+            Ok(n_files) => tracing::info!(n_files, "files that were never whole were removed"),
+            Err(error) => tracing::error!(%error, "files that were never whole are not removed"),
+        }
     }
 
     /// All whose clouds there are.
@@ -123,4 +143,28 @@ impl Objects {
         self.delete_factors(owner, listed.id).await?;
         Ok(())
     }
+}
+
+/// Looks into all folders below this one; says how many files it removed. What cannot be read or removed has its turn next time.
+fn remove_half_written(directory: &Path, now: SystemTime) -> usize {
+    let mut n_removed = 0;
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        let Ok(about) = entry.metadata() else { continue };
+        if about.is_dir() {
+            n_removed += remove_half_written(&path, now);
+            continue;
+        }
+        let age = about.modified().ok().and_then(|since| now.duration_since(since).ok());
+        if is_half_written(&name.to_string_lossy()) && age.is_some_and(|age| age > AT_WORK) {
+            n_removed += usize::from(std::fs::remove_file(path).is_ok());
+        }
+    }
+    n_removed
+}
+
+/// As the library of the store names files until they are whole: with a number behind.
+fn is_half_written(name: &str) -> bool {
+    name.rsplit_once('#')
+        .is_some_and(|(_, number)| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
 }

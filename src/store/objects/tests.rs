@@ -1,17 +1,14 @@
 use object_store::memory::InMemory;
 
+use super::cloud_object::CUT;
+use super::factors::{FactorHead, FactorName};
 use super::*;
 use crate::numerics::points::cloud::Cloud;
 use crate::store::Owner;
 use crate::store::clouds::{CloudStore, RegisteredCloud};
 
 fn objects() -> Objects {
-    Objects {
-        store: Arc::new(InMemory::new()),
-        root: Path::from("some/prefix"),
-        tally: Tally::default(),
-        n_damaged: AtomicU64::new(0),
-    }
+    Objects::over(Arc::new(InMemory::new()), Path::from("some/prefix"))
 }
 
 fn owner(name: &str) -> OwnerName {
@@ -98,6 +95,60 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
     assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
+    // Also where it is in the points alone, or behind them.
+    for at in [bytes.len() - 1, bytes.len() - 40] {
+        let mut other = bytes.to_vec();
+        other[at] ^= 1;
+        objects.store.put(&name, other.into()).await.unwrap();
+        assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
+    }
+    assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
+    assert_eq!((objects.n_damaged(), objects.list(&owner, None).await.unwrap().len()), (4, 1));
+    // One that is whole again is left where it is, and what was put aside goes with it.
+    objects.put_aside(&owner, cloud.id, CUT).await;
+    assert_eq!(objects.n_damaged(), 4);
+    assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
+    let left = objects.objects_in(&owner, &[]).await.unwrap();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[tokio::test]
+async fn factors_go_with_their_clouds_whoever_wrote_them_last() {
+    let (objects, owner) = (objects(), owner("one"));
+    let (kept, gone) = (registered(0.0, 2), registered(1.0, 2));
+    put(&objects, &owner, &kept).await;
+    let name_of =
+        |cloud: &RegisteredCloud| FactorName { owner: owner.clone(), cloud: cloud.id, fit: "ab".to_owned() };
+    for cloud in [&kept, &gone] {
+        let pieces = [Bytes::from_static(b"numbers")].into_iter();
+        objects.put_factor(&name_of(cloud), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
+    }
+    let limits = Retention { n_factor_bytes: 1 << 20, ..Retention::default() };
+    // Its writer may be at it: the cloud, too.
+    for (seconds, is_there) in [(0, true), (7200, false)] {
+        let now = SystemTime::now() + Duration::from_secs(seconds);
+        objects.sweep(limits, now).await.unwrap();
+        assert_eq!(objects.find_factor(&name_of(&gone)).await.unwrap().is_some(), is_there);
+        assert!(objects.find_factor(&name_of(&kept)).await.unwrap().is_some());
+    }
+}
+
+#[tokio::test]
+async fn files_that_were_never_whole_go_after_an_hour() {
+    let directory = std::env::temp_dir().join(format!("gramian-half-written-{}", std::process::id()));
+    let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
+    let folder = directory.join("one/clouds");
+    std::fs::create_dir_all(&folder).unwrap();
+    for name in ["ab#1", "ab#x", "ab"] {
+        std::fs::write(folder.join(name), b"").unwrap();
+    }
+    for (seconds, is_there) in [(0, true), (7200, false)] {
+        let now = SystemTime::now() + Duration::from_secs(seconds);
+        objects.sweep(Retention::default(), now).await.unwrap();
+        assert_eq!(folder.join("ab#1").exists(), is_there);
+    }
+    assert!(folder.join("ab").exists() && folder.join("ab#x").exists());
+    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[tokio::test]
@@ -151,8 +202,8 @@ async fn what_is_half_written_or_half_deleted_is_put_in_order() {
     let later = now + Duration::from_secs(7200);
     assert_eq!(objects.sweep(hour, later).await.unwrap().gone, [(owner.clone(), unlisted.id)]);
     // What was damaged goes after a week.
-    put(&objects, &owner, &gone).await;
-    objects.put_aside(&owner, gone.id, Damaged("for the test")).await;
+    objects.put(&objects.cloud(&owner, gone.id), PutPayload::from_static(b"else")).await.unwrap();
+    objects.put_aside(&owner, gone.id, CUT).await;
     let aside = objects.path(&["one", "damaged", &gone.id.to_string()]);
     for (days, is_there) in [(6, true), (8, false)] {
         objects.sweep(Retention::default(), now + Duration::from_secs(86400 * days)).await.unwrap();
