@@ -103,7 +103,12 @@ impl AsyncWrite for Socket {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        of_either!(self, stream => Pin::new(stream).poll_flush(cx))
+        let outcome = of_either!(self, stream => Pin::new(stream).poll_flush(cx));
+        // What TLS has taken it may still hold: the end of an answer, to a client that does not read.
+        match self.inner {
+            Wire::Tls(_) => self.note(outcome.map_ok(|()| 0)).map_ok(|_| ()),
+            Wire::Plain(_) => outcome,
+        }
     }
 
     /// Ends the answers. If the last one came before its request was read, what the client still sends is read and thrown
