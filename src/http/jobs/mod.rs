@@ -1,15 +1,16 @@
 //! Long work as jobs: `Prefer: respond-async` (RFC 7240) is answered 202 at once, and the answer is kept until it is fetched.
 //!
-//! WHERE. A job is objects in the store (store/objects/jobs.rs), of which all processes see the same; without a store it is objects in memory,
+//! WHERE. A job is objects in the store (store/objects/jobs/), of which all processes see the same; without a store it is objects in memory,
 //! within a part of the budget. What follows needs no second way of doing things.
 //!
 //! WHO. The process that took a request works on it when its turn has come; as many run at once as there are threads, owner after owner.
 //! A job that nobody works on, or whose process has ended, is anybody's (rounds.rs).
 //!
-//! HOW. The request goes through the routes as any other (run.rs), without a deadline. An answer that asks to come back later is not
+//! HOW. The request goes through the routes as any other (answer.rs), without a deadline. An answer that asks to come back later is not
 //! one: the job comes back.
 
 mod accept;
+mod answer;
 mod look;
 mod rounds;
 mod run;

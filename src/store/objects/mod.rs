@@ -10,7 +10,7 @@
 //!
 //! FACTORS are under `<owner>/factors/`, see factors.rs, and go with their clouds.
 //!
-//! JOBS are under `<owner>/jobs/`: see jobs.rs.
+//! JOBS are under `<owner>/jobs/`: see jobs/.
 //!
 //! READS are of what was written, or of nothing: see cloud_object.rs. What is damaged is put aside, under `damaged/`, and reported; it is not there
 //! any more then, and can be posted again.

@@ -1,0 +1,180 @@
+//! The answer of a job: that of the route, kept.
+
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use futures_util::{StreamExt, TryStreamExt};
+use tower::ServiceExt;
+
+use super::run::Attempt;
+use super::{Here, Runner};
+use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
+use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
+use crate::store::objects::jobs::{FoundRequest, JobResult, Outcome};
+use crate::store::objects::pieces::BrokenOff;
+use crate::store::objects::{OwnerName, Unavailable};
+
+/// Attempts that may end with their process: a request that ends a process is not given to all of them, one after the other.
+const MAX_CRASHES: u32 = 3;
+
+/// How long a job that was told to come back stays away, unless it was told.
+const AWAY: Duration = Duration::from_secs(1);
+
+/// What the result of a job takes over of the head of its answer.
+static KEPT_HEADERS: [HeaderName; 5] = [
+    header::CONTENT_TYPE,
+    header::CONTENT_ENCODING,
+    HeaderName::from_static("cache-status"),
+    HeaderName::from_static("server-timing"),
+    CLOUD_HEADER,
+];
+
+impl Runner {
+    /// Answers the request, and writes what comes of it.
+    pub(super) async fn answer(
+        &self,
+        here: &Here,
+        name: &OwnerName,
+        attempt: &Attempt,
+    ) -> Result<(), Unavailable> {
+        let began = Instant::now();
+        let app = &self.app;
+        if attempt.lease.n_crashes >= MAX_CRASHES {
+            tracing::error!(job = %here.id, "a job ended its process several times, and is given up");
+            return self.write(here, name, attempt, Problem::internal().into_response()).await;
+        }
+        let within = app.config.job_seconds;
+        let answering = self.response(here, name);
+        let response = match tokio::time::timeout(Duration::from_secs_f64(within), answering).await {
+            Ok(response) => response?,
+            Err(_) => {
+                let detail = format!("no answer within {within} s; the work was cancelled");
+                Problem::new(Slug::DeadlineExceeded, detail).into_response()
+            }
+        };
+        let status = response.status().as_u16();
+        if let Some(problem) = response.extensions().get::<Problem>() {
+            app.metrics.refused(problem.slug());
+        }
+        self.write(here, name, attempt, response).await?;
+        let duration_ms = began.elapsed().as_secs_f64() * 1e3;
+        tracing::info!(job = %here.id, status, duration_ms, "job {} {status}", here.id);
+        Ok(())
+    }
+
+    /// The answer of the route. Nothing is held between two attempts at it: the route takes the memory that it needs, and the body is read
+    /// from the store as the route reads it.
+    async fn response(&self, here: &Here, name: &OwnerName) -> Result<Response, Unavailable> {
+        loop {
+            here.progress.restart();
+            let Some(found) = self.app.jobs.objects.open_job(name, here.id).await? else {
+                // It was deleted.
+                return Ok(Problem::internal().into_response());
+            };
+            let fault = Arc::new(OnceLock::new());
+            let answered = match found {
+                Ok(found) => {
+                    let request = rebuilt(found, here, &fault);
+                    let answering = here.progress.watch(self.routes.clone().oneshot(request));
+                    answering.await.unwrap_or_else(|never| match never {})
+                }
+                Err(damaged) => {
+                    _ = fault.set(BrokenOff::Damaged);
+                    tracing::error!(job = %here.id, reason = damaged.0, "a job is damaged");
+                    Problem::internal().into_response()
+                }
+            };
+            match fault.get() {
+                None if answered.status() != StatusCode::SERVICE_UNAVAILABLE => return Ok(answered),
+                None => {}
+                Some(BrokenOff::Damaged) => {
+                    self.app.jobs.objects.report_job(name, here.id);
+                    return Ok(Problem::internal().into_response());
+                }
+                Some(BrokenOff::Store(reason)) => {
+                    tracing::warn!(job = %here.id, reason, "what was asked is read again");
+                }
+            }
+            tokio::time::sleep(AWAY).await;
+        }
+    }
+
+    /// Writes what the request was answered with.
+    async fn write(
+        &self,
+        here: &Here,
+        name: &OwnerName,
+        attempt: &Attempt,
+        response: Response,
+    ) -> Result<(), Unavailable> {
+        let jobs = &self.app.jobs;
+        let response = with_problem_document(response, &here.id.to_string());
+        let (head, body) = (head_of(&response), response.into_body().into_data_stream());
+        let mut n_bytes = 0;
+        let mut has_room = true;
+        let body = body.map(|piece| {
+            let piece = piece.map_err(|error| error.to_string())?;
+            n_bytes += piece.len();
+            // Where it is in memory, it is copied once all of it is there.
+            has_room = jobs.hold(here.id, here.owner, 2 * piece.len());
+            if has_room { Ok(piece) } else { Err("there is no memory for the result".to_owned()) }
+        });
+        let (job, outcome) = ((name, here.id), head.outcome);
+        let written = jobs.objects.put_result(job, attempt.number, head, body).await;
+        if has_room {
+            if written? {
+                self.app.metrics.job_ended(outcome);
+            }
+            jobs.shrink(here.id, n_bytes);
+            return Ok(());
+        }
+        jobs.shrink(here.id, 0);
+        let problem = Problem::too_large(
+            Slug::ProblemTooLarge,
+            "bytes of results are kept in memory: fetch and delete those that are there, or ask for less; the result has more, beyond",
+            jobs.memory.as_ref().map_or(0, |memory| memory.largest()),
+            None,
+        );
+        let response = with_problem_document(problem.into_response(), &here.id.to_string());
+        let (head, body) = (head_of(&response), response.into_body().into_data_stream());
+        if jobs.objects.put_result(job, attempt.number, head, body).await? {
+            self.app.metrics.job_ended(Outcome::Failed);
+        }
+        Ok(())
+    }
+}
+
+fn head_of(response: &Response) -> JobResult {
+    let kept = KEPT_HEADERS.iter().filter_map(|name| {
+        let text = response.headers().get(name)?.to_str().ok()?;
+        Some((name.as_str().to_owned(), text.to_owned()))
+    });
+    let outcome = if response.status().is_success() { Outcome::Succeeded } else { Outcome::Failed };
+    JobResult { outcome, status: response.status().as_u16(), headers: kept.collect() }
+}
+
+/// The request as its client sent it, with its owner. Why its body broke off, if it did, is left in `fault`.
+fn rebuilt(found: FoundRequest, here: &Here, fault: &Arc<OnceLock<BrokenOff>>) -> Request {
+    let FoundRequest { request, n_body_bytes, body } = found;
+    let fault = fault.clone();
+    let body = body.inspect_err(move |error| _ = fault.set(error.clone()));
+    let mut rebuilt = Request::new(Body::from_stream(body));
+    rebuilt.headers_mut().insert(header::CONTENT_LENGTH, n_body_bytes.into());
+    *rebuilt.method_mut() = Method::POST;
+    if let Ok(uri) = request.path.parse() {
+        *rebuilt.uri_mut() = uri;
+    }
+    for (name, value) in &request.headers {
+        if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
+        {
+            rebuilt.headers_mut().insert(name, value);
+        }
+    }
+    rebuilt.extensions_mut().insert(here.owner);
+    rebuilt
+}

@@ -1,0 +1,70 @@
+//! What was asked.
+
+use bytes::Bytes;
+use futures_util::stream::BoxStream;
+use object_store::PutPayload;
+use serde::{Deserialize, Serialize};
+
+use super::super::pieces::{BrokenOff, Found};
+use super::super::{Damaged, Objects, OwnerName, Unavailable};
+use super::{JobId, REQUEST, line_of};
+
+/// What was asked: a request without what is secret in it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JobRequest {
+    pub path: String,
+    pub headers: Vec<(String, String)>,
+}
+
+/// What was asked, and its body as it is read.
+pub struct FoundRequest {
+    pub request: JobRequest,
+    pub n_body_bytes: u64,
+    pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
+}
+
+impl Objects {
+    /// Writes what is asked.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn put_job(
+        &self,
+        owner: &OwnerName,
+        id: JobId,
+        request: &JobRequest,
+        body: Bytes,
+    ) -> Result<(), Unavailable> {
+        let line = line_of(request);
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&line);
+        hasher.update(&body);
+        let hash = Bytes::copy_from_slice(hasher.finalize().as_bytes());
+        let payload: PutPayload = [line, body, hash].into_iter().collect();
+        self.put(&self.job(owner, id, REQUEST), payload).await
+    }
+
+    /// What was asked, if it is there, and as it was written as far as its first line.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn open_job(
+        &self,
+        owner: &OwnerName,
+        id: JobId,
+    ) -> Result<Option<Result<FoundRequest, Damaged>>, Unavailable> {
+        let found = self.open_pieces(&self.job(owner, id, REQUEST)).await?;
+        let read = |found: Found| {
+            let request = serde_json::from_slice(&found.line);
+            let request = request.map_err(|_| Damaged("its first line is no request"))?;
+            Ok(FoundRequest { request, n_body_bytes: found.n_body_bytes, body: found.body })
+        };
+        Ok(found.map(|found| found.and_then(read)))
+    }
+
+    /// Counts a request that is not what was written: its job fails.
+    pub fn report_job(&self, owner: &OwnerName, id: JobId) {
+        let name = self.job(owner, id, REQUEST);
+        self.report(&name, Damaged("its bytes are not those that were written"));
+    }
+}

@@ -1,0 +1,170 @@
+//! What came of a job.
+
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use bytes::Bytes;
+use futures_util::stream::BoxStream;
+use futures_util::{Stream, StreamExt};
+use object_store::ObjectStoreExt;
+use serde::{Deserialize, Serialize};
+
+use super::super::pieces::{BrokenOff, sealed, unsealed};
+use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
+use super::{JobId, RESULT, line_of};
+
+/// What came of it. The headers are those of the answer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JobResult {
+    pub outcome: Outcome,
+    pub status: u16,
+    pub headers: Vec<(String, String)>,
+}
+
+/// How a job ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    Succeeded,
+    Failed,
+    Cancelled,
+}
+
+/// A result as it is written: where its body is, if it has one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Published {
+    head: JobResult,
+    attempt: Option<u32>,
+}
+
+/// The result of a job, and its body as it is read.
+pub struct FoundResult {
+    pub head: JobResult,
+    pub ended_at: SystemTime,
+    pub n_body_bytes: u64,
+    pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
+}
+
+impl Objects {
+    /// Writes what an attempt came to, as its body comes, and makes it the result of the job unless it has one, or nobody wants it any more; says
+    /// whether it is. Nothing is there until all of it is.
+    ///
+    /// # Errors
+    /// [`Unavailable`], also if the body breaks off.
+    pub async fn put_result<E: std::fmt::Display>(
+        &self,
+        (owner, id): (&OwnerName, JobId),
+        attempt: u32,
+        head: JobResult,
+        body: impl Stream<Item = Result<Bytes, E>>,
+    ) -> Result<bool, Unavailable> {
+        let answer = self.answer(owner, id, attempt);
+        let body = body.map(|piece| piece.map_err(|error| error.to_string()));
+        self.put_pieces(&answer, line_of(&head), body).await?;
+        let is_wanted = self.find_job(owner, id).await?.is_some_and(|job| job.has_request);
+        let is_result = is_wanted && self.publish(owner, id, head, Some(attempt)).await?;
+        if !is_result {
+            self.delete(&answer).await?;
+            return Ok(false);
+        }
+        // Forgotten meanwhile: it must not come back.
+        match self.find_job(owner, id).await?.filter(|job| !job.has_request) {
+            Some(forgotten) => self.delete_job(&forgotten).await.map(|()| false),
+            None => Ok(true),
+        }
+    }
+
+    /// Ends a job without an answer, unless it has a result; says whether it had none.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn cancel_job(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        let head = JobResult { outcome: Outcome::Cancelled, status: 0, headers: Vec::new() };
+        self.publish(owner, id, head, None).await
+    }
+
+    /// Makes the result of a job, unless it has one.
+    async fn publish(
+        &self,
+        owner: &OwnerName,
+        id: JobId,
+        head: JobResult,
+        attempt: Option<u32>,
+    ) -> Result<bool, Unavailable> {
+        let result = sealed(line_of(&Published { head, attempt }));
+        self.create(&self.job(owner, id, RESULT), result).await
+    }
+
+    /// What came of a job, if it has ended. A result that is not what was written is let go, and reported: the job is anybody's then.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn get_result(
+        self: &Arc<Self>,
+        owner: &OwnerName,
+        id: JobId,
+    ) -> Result<Option<FoundResult>, Unavailable> {
+        let name = self.job(owner, id, RESULT);
+        let found = async {
+            let found = self.store.get(&name).await?;
+            Ok((SystemTime::from(found.meta.last_modified), found.bytes().await?))
+        };
+        let Some((ended_at, bytes)) = self.counted(Verb::Read, &name, found.await)? else { return Ok(None) };
+        let read = unsealed(&bytes).and_then(|line| {
+            serde_json::from_slice(line).map_err(|_| Damaged("its first line is no result"))
+        });
+        let damaged = match read {
+            Ok(Published { head, attempt: None }) => {
+                let body = futures_util::stream::empty().boxed();
+                return Ok(Some(FoundResult { head, ended_at, n_body_bytes: 0, body }));
+            }
+            Ok(Published { head, attempt: Some(attempt) }) => {
+                match self.open_pieces(&self.answer(owner, id, attempt)).await? {
+                    Some(Ok(found)) => {
+                        let body = self.clone().reporting(owner.clone(), id, found.body);
+                        return Ok(Some(FoundResult {
+                            head,
+                            ended_at,
+                            n_body_bytes: found.n_body_bytes,
+                            body,
+                        }));
+                    }
+                    Some(Err(damaged)) => damaged,
+                    None => Damaged("its body is not there"),
+                }
+            }
+            Err(damaged) => damaged,
+        };
+        self.drop_result(owner, id, damaged).await;
+        Ok(None)
+    }
+
+    /// A body that lets go of its result if it is not what was written.
+    fn reporting(
+        self: Arc<Self>,
+        owner: OwnerName,
+        id: JobId,
+        body: BoxStream<'static, Result<Bytes, BrokenOff>>,
+    ) -> BoxStream<'static, Result<Bytes, BrokenOff>> {
+        let body = body.then(move |piece| {
+            let (objects, owner) = (self.clone(), owner.clone());
+            async move {
+                if let Err(BrokenOff::Damaged) = piece {
+                    objects
+                        .drop_result(&owner, id, Damaged("its bytes are not those that were written"))
+                        .await;
+                }
+                piece
+            }
+        });
+        body.boxed()
+    }
+
+    /// Lets go of a result that is not what was written.
+    async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: Damaged) {
+        let name = self.job(owner, id, RESULT);
+        self.report(&name, damaged);
+        let is_gone = self.delete(&name).await.is_ok();
+        tracing::error!(job = %id, is_gone, "the result of a job is damaged, and made again");
+    }
+}
