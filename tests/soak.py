@@ -8,7 +8,7 @@ ask for estimates, post eight at a time the same one, list clouds, scrape metric
 that never end, leave midway, and ask for more than there is memory. Meanwhile a probe sends small requests, whose clouds
 are new or known; before that it has done so beside factorizations of 16,400 points, on a server of its own. At the end:
 
-- every request that was read to its end was answered within its deadline and two seconds;
+- every request that was read to its end was answered within its deadline and two seconds, but for events;
 - there was no status of 500 and above but refusals, 503, and deadlines, 504;
 - the resident memory never exceeded the budget by more than a tenth, and was flat within 5 % over the second half;
 - beside the factorizations small requests took at most ten times as long, at the 99th percentile, as on the idle server.
@@ -86,6 +86,8 @@ class Soak:
     def note(self, path, status, seconds):
         with self.lock:
             self.statuses[status] += 1
+            # Events go on for as long as their job does.
+            seconds = 0.0 if path.endswith("/events") else seconds
             self.slowest = max(self.slowest, seconds)
             if seconds > DEADLINE + GRACE:
                 self.failures.append(f"{path} took {seconds:.1f} s")
