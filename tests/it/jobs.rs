@@ -328,3 +328,20 @@ async fn jobs_of_one_key_leave_places_to_another() {
         assert_eq!(asking(key).await.unwrap().status(), status, "{key}");
     }
 }
+
+#[tokio::test]
+async fn as_many_may_follow_jobs_as_half_of_the_connections() {
+    let server = Server::with_flags(&["--threads", "1", "--max-connections", "8"]).await;
+    let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
+    let follow = || reqwest::Client::new().get(server.url(&format!("{path}/events"))).send();
+    let mut following = Vec::new();
+    for _ in 0..4 {
+        let events = follow().await.unwrap();
+        assert_eq!(events.status(), 200);
+        following.push(events);
+    }
+    assert_eq!(follow().await.unwrap().status(), 503);
+    drop(following);
+    while follow().await.unwrap().status() == 503 {}
+    assert_eq!(delete(&server, &path).await, 204);
+}

@@ -1,15 +1,13 @@
 //! Who asks: the owner of the bearer key.
 
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use http_body::{Body as HttpBody, Frame, SizeHint};
+use http_body_util::BodyExt;
 
 use crate::http::access::Entered;
 use crate::http::problem::Problem;
@@ -35,7 +33,7 @@ pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, nex
         Err(too_many) => Problem::rate_limited(&too_many.limit, too_many.retry_after_seconds).into_response(),
         Ok(entered) => {
             request.extensions_mut().insert(caller.owner);
-            next.run(request).await.map(|body| Body::new(UnderWay { body, _entered: entered }))
+            until_sent(next.run(request).await, entered)
         }
     };
     if let Some(name) = &caller.name {
@@ -45,29 +43,14 @@ pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, nex
 }
 
 /// An answer that counts among the requests of its key until it is sent, or nobody wants it: events may go on for hours.
-struct UnderWay {
-    body: Body,
-    _entered: Entered,
-}
-
-impl HttpBody for UnderWay {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(cx)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
-    }
+fn until_sent(answer: Response, entered: Entered) -> Response {
+    answer.map(|body| {
+        Body::new(body.map_err(move |error| {
+            // It goes with the body, whose bytes and length are what they were.
+            let _ = &entered;
+            error
+        }))
+    })
 }
 
 /// The scheme is case-insensitive (RFC 9110, section 11.1).

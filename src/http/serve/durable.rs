@@ -284,13 +284,21 @@ pub async fn list_clouds(
 pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
     let kept = app.clouds.get(owner, id);
     // First: whoever writes it leaves it, or takes it away again.
-    kept.iter().for_each(|cloud| cloud.set_forgotten(true));
+    if let Some(cloud) = &kept {
+        cloud.set_forgotten(true);
+    }
     let was_stored = match &app.durable {
         None => Ok(false),
         Some(Durable { objects, .. }) => objects.delete_cloud(&app.keys.name_of(owner), id).await,
     };
     let was_stored = was_stored.map_err(|error| {
-        kept.iter().for_each(|cloud| cloud.set_forgotten(false));
+        if let Some(cloud) = &kept {
+            cloud.set_forgotten(false);
+            // Who wrote it meanwhile may have left that.
+            if let Some(durable) = app.durable.as_ref().filter(|_| !cloud.is_durable()) {
+                durable.fell_behind(&error);
+            }
+        }
         unavailable(&error)
     })?;
     forget_in_memory(app, owner, id);

@@ -1,3 +1,6 @@
+use std::time::SystemTime;
+
+use bytes::Bytes;
 use object_store::memory::InMemory;
 
 use super::cloud_object::CUT;
