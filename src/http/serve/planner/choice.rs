@@ -1,0 +1,118 @@
+//! What a request chose of kernel, regularization and solver, where it said so, and what does not go together.
+
+use std::sync::Arc;
+
+use super::inputs::length_mismatch;
+use crate::http::fields::{Fit, Geometry, Kernel};
+use crate::http::problem::slug::Slug;
+use crate::http::problem::{Pointers, Problem};
+use crate::numerics::solver::trend::Mean;
+use crate::numerics::sums::regularization::Regularization;
+use crate::store::clouds::RegisteredCloud;
+
+/// What is asked that only a dense factorization has: its word, and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct DenseOnly {
+    pub name: &'static str,
+    pub pointer: &'static str,
+}
+
+impl DenseOnly {
+    /// 422 where the local solver is asked for it.
+    pub(super) fn refused_by_local(self) -> Problem {
+        let detail = format!(
+            "the local solver knows each query by itself and has no {}; leave it out, or take \"solver\": \"dense\"",
+            self.name
+        );
+        Problem::of_field(Slug::UnsupportedBySolver, self.pointer, detail)
+    }
+
+    pub(super) fn remedy(self) -> String {
+        format!("leave out {}, which the local solver does not have, or thin the cloud", self.name)
+    }
+}
+
+pub(super) const TRY_LOCAL: &str =
+    "set \"solver\" to \"local\", which takes time in proportion to the points, or thin the cloud";
+
+/// 422 for operators on values, which are those of one function.
+pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
+    let detail = "operators take values of one function, which the local solver does not have: take \"solver\": \"dense\", and \
+                  {\"geometry\": {\"surface\": \"local\"}} for the surface under an operator";
+    Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
+}
+
+/// Where the fit of a request stands.
+pub(super) fn pointers_of(fit: &Fit) -> Pointers {
+    Pointers {
+        points: if fit.cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
+        regularization: if fit.noise_variances.is_some() { "/noise_variances" } else { "/alpha" },
+        ..Pointers::REQUEST
+    }
+}
+
+/// Where the fit of the surface stands: what `geometry` leaves out, in the request.
+pub(super) fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Pointers {
+    Pointers {
+        points: match &geometry.cloud {
+            None => request.points,
+            Some(cloud) if cloud.id.is_some() => "/geometry/cloud/id",
+            Some(_) => "/geometry/cloud/points",
+        },
+        kernel: if geometry.kernel.is_some() { "/geometry/kernel" } else { request.kernel },
+        regularization: match (&geometry.noise_variances, geometry.alpha) {
+            (Some(_), _) => "/geometry/noise_variances",
+            (None, Some(_)) => "/geometry/alpha",
+            (None, None) => request.regularization,
+        },
+        ..request
+    }
+}
+
+/// What the client chose of kernel and regularization, for values or without.
+#[derive(Default)]
+pub(super) struct Chosen {
+    pub(super) kernel: Option<Kernel>,
+    pub(super) alpha: Option<f64>,
+    pub(super) noise_variances: Option<Vec<f64>>,
+    pub(super) values: Option<Arc<Vec<f64>>>,
+    pub(super) n_lists: usize,
+    pub(super) mean: Option<Mean>,
+}
+
+impl Chosen {
+    pub(super) fn of(fit: Fit) -> Self {
+        Self {
+            kernel: fit.kernel,
+            alpha: fit.alpha,
+            noise_variances: fit.noise_variances,
+            values: fit.values,
+            n_lists: fit.n_lists,
+            mean: fit.mean.map(Mean::from),
+        }
+    }
+
+    /// What is given; `None` leaves it to the service.
+    pub(super) fn regularization(
+        self,
+        stored: &RegisteredCloud,
+        pointers: Pointers,
+    ) -> Result<Option<Regularization>, Problem> {
+        let refuse = |error| Problem::from_numerics(error, pointers);
+        match (self.alpha, self.noise_variances) {
+            (Some(_), Some(_)) => {
+                let detail = "noise_variances stands instead of alpha; give one of them";
+                Err(Problem::invalid_request(pointers.regularization, detail))
+            }
+            (None, None) => Ok(None),
+            (Some(alpha), None) => Regularization::uniform(alpha).map(Some).map_err(refuse),
+            (None, Some(variances)) => {
+                let found = variances.len();
+                if stored.cloud.n_points() != found {
+                    return Err(length_mismatch(pointers.regularization, &stored.cloud, found));
+                }
+                Regularization::per_point(variances).map(Some).map_err(refuse)
+            }
+        }
+    }
+}
