@@ -43,6 +43,7 @@ mod protocol;
 mod refusals;
 mod routes;
 mod settings;
+mod spans;
 mod support;
 mod surfaces;
 mod tls;

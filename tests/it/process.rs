@@ -69,6 +69,13 @@ impl Process {
         kibibytes << 10
     }
 
+    /// Waits until it has logged a line with this text.
+    pub async fn has_logged(&self, text: &str) {
+        while !self.lines.lock().unwrap().iter().any(|line| line.contains(text)) {
+            tokio::task::yield_now().await;
+        }
+    }
+
     pub fn terminate(&self) {
         let pid = self.child.id().to_string();
         assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());

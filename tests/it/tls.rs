@@ -13,7 +13,7 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 use crate::durable::Folder;
-use crate::process::{Process, gramian, logged};
+use crate::process::{Process, gramian};
 
 /// A certificate for localhost with its key, as files.
 struct Files {
@@ -146,46 +146,4 @@ async fn a_certificate_that_is_none_ends_the_start() {
     }
     let half = gramian().args(["--tls-key", "x"]).output().unwrap();
     assert!(!half.status.success() && String::from_utf8(half.stderr).unwrap().contains("--tls-certificate"));
-}
-
-/// What a collector of spans is sent.
-async fn collected(listener: tokio::net::TcpListener) -> Vec<u8> {
-    let (mut socket, _) = listener.accept().await.unwrap();
-    let mut bytes = Vec::new();
-    let mut piece = [0; 4096];
-    let is_whole = |bytes: &[u8]| {
-        let end = bytes.windows(4).position(|four| four == b"\r\n\r\n")?;
-        let head = String::from_utf8_lossy(&bytes[..end]).to_lowercase();
-        let length = head.split("content-length: ").nth(1)?.split("\r\n").next()?.parse::<usize>().ok()?;
-        (bytes.len() >= end + 4 + length).then_some(())
-    };
-    while is_whole(&bytes).is_none() {
-        let n = socket.read(&mut piece).await.unwrap();
-        assert!(n > 0);
-        bytes.extend_from_slice(&piece[..n]);
-    }
-    socket.write_all(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n").await.unwrap();
-    bytes
-}
-
-#[tokio::test]
-async fn requests_are_spans_in_the_traces_of_their_clients() {
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let endpoint = format!("http://{}", listener.local_addr().unwrap());
-    let process =
-        Process::of(gramian().args(["--bind", "127.0.0.1:0"]).env("OTEL_EXPORTER_OTLP_ENDPOINT", endpoint));
-    let trace = "4bf92f3577b34da6a3ce929d0e0e4736";
-    let client = reqwest::Client::new();
-    let request = client.get(process.url("/v1/kernels"));
-    let request = request.header("traceparent", format!("00-{trace}-00f067aa0ba902b7-01"));
-    assert_eq!(request.header("x-request-id", "traced-1").send().await.unwrap().status(), 200);
-    // What has not been sent is sent when the process ends.
-    let sent = tokio::spawn(collected(listener));
-    process.terminate();
-    let sent = sent.await.unwrap();
-    let lines = process.finish().1;
-    assert_eq!(logged(&lines, "GET /v1/kernels 200")["trace_id"], trace);
-    let has = |bytes: &[u8]| sent.windows(bytes.len()).any(|window| window == bytes);
-    let id: Vec<u8> = (0..16).map(|i| u8::from_str_radix(&trace[2 * i..2 * i + 2], 16).unwrap()).collect();
-    assert!(has(b"POST /v1/traces ") && has(b"GET /v1/kernels") && has(&id) && has(b"traced-1"), "{sent:?}");
 }

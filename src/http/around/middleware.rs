@@ -47,13 +47,14 @@ fn secure(headers: &mut HeaderMap) {
 /// Names the request, has it answered, writes problem documents that need that name, and logs one line.
 ///
 /// The line has method, path and status, never a body: clouds stay out of the log.
-pub async fn name_and_log(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
     let mut under_way = UnderWay::new(app.clone(), &request);
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
     let method = cut(request.method().as_str(), LOGGED_METHOD_BYTES);
     let path = cut(request.uri().path(), LOGGED_PATH_BYTES);
     let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
     let span = RequestSpan::begin(request.method(), route, request.headers());
+    request.extensions_mut().insert(span.as_parent());
     let cloud = named_cloud(&request);
     let response = transport::answer(&app, request, next).await;
     if let Some(problem) = response.extensions().get::<Problem>() {

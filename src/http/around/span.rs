@@ -1,4 +1,6 @@
-//! Requests as spans of OpenTelemetry, where somebody collects them (telemetry.rs); nothing otherwise.
+//! Requests and jobs as spans of OpenTelemetry, where somebody collects them (telemetry.rs); nothing otherwise.
+
+use std::fmt::Display;
 
 use axum::http::{HeaderMap, Method, StatusCode};
 use opentelemetry::global::{self, BoxedSpan};
@@ -11,30 +13,53 @@ use uuid::Uuid;
 use super::trace::TraceParent;
 use crate::http::metrics::method_label;
 
-/// The span of a request, in the trace of its client if that has one.
+/// The span of a request or of work on a job, in the trace of who asked if that has one.
 pub struct RequestSpan {
     span: BoxedSpan,
     trace_id: u128,
+    parent: Option<TraceParent>,
 }
 
 impl RequestSpan {
-    /// Begins it. The route is a template and the method one of those that the service has, so that there are few names.
+    /// Begins that of a request. The route is a template and the method one of those that the service has, so that there are few names.
     pub fn begin(method: &Method, route: Option<&str>, headers: &HeaderMap) -> Self {
-        let parent = TraceParent::of(headers);
+        let (method, route) = (method_label(method), route.unwrap_or("other").to_owned());
+        let name = format!("{method} {route}");
+        let attributes =
+            vec![KeyValue::new("http.request.method", method), KeyValue::new("http.route", route)];
+        Self::new(name, SpanKind::Server, attributes, TraceParent::of(headers))
+    }
+
+    /// Begins that of work on a job for a route, in the trace of the request that became the job.
+    pub fn begin_job(id: &impl Display, route: &str, headers: &HeaderMap) -> Self {
+        let attributes =
+            vec![KeyValue::new("gramian.job", id.to_string()), KeyValue::new("http.route", route.to_owned())];
+        Self::new(format!("job {route}"), SpanKind::Consumer, attributes, TraceParent::of(headers))
+    }
+
+    fn new(name: String, kind: SpanKind, attributes: Vec<KeyValue>, parent: Option<TraceParent>) -> Self {
         let context = match &parent {
             Some(parent) => Context::new().with_remote_span_context(context_of(parent)),
             None => Context::new(),
         };
-        let (method, route) = (method_label(method), route.unwrap_or("other"));
         let tracer = global::tracer("gramian");
-        let builder = tracer.span_builder(format!("{method} {route}")).with_kind(SpanKind::Server);
-        let attributes =
-            [KeyValue::new("http.request.method", method), KeyValue::new("http.route", route.to_owned())];
-        let span = tracer.build_with_context(builder.with_attributes(attributes), &context);
+        let builder = tracer.span_builder(name).with_kind(kind).with_attributes(attributes);
+        let span = tracer.build_with_context(builder, &context);
         let own = Some(span.span_context()).filter(|context| context.is_valid());
         let own = own.map(|context| u128::from_be_bytes(context.trace_id().to_bytes()));
-        let trace_id = own.or(parent.map(|parent| parent.trace_id));
-        Self { span, trace_id: trace_id.unwrap_or_else(|| Uuid::new_v4().as_u128()) }
+        let trace_id = own.or(parent.as_ref().map(|parent| parent.trace_id));
+        Self { span, trace_id: trace_id.unwrap_or_else(|| Uuid::new_v4().as_u128()), parent }
+    }
+
+    /// What comes of it later belongs to the same trace: under this span, or where nobody collects spans, under what its client has.
+    pub fn as_parent(&self) -> TraceParent {
+        let own = self.span.span_context();
+        if own.is_valid() {
+            let span_id = u64::from_be_bytes(own.span_id().to_bytes());
+            return TraceParent { trace_id: self.trace_id, span_id, is_sampled: own.is_sampled() };
+        }
+        let invented = || TraceParent { trace_id: self.trace_id, span_id: 1, is_sampled: true };
+        self.parent.clone().unwrap_or_else(invented)
     }
 
     /// The name of its trace, 32 digits.

@@ -1,5 +1,7 @@
 //! The trace that a request belongs to (W3C Trace Context, 2021): that of its client, or a new one.
 
+use std::fmt;
+
 use axum::http::HeaderMap;
 
 /// Names of a trace and of the span in it that asked.
@@ -32,6 +34,14 @@ impl TraceParent {
     }
 }
 
+/// As the header says it.
+impl fmt::Display for TraceParent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { trace_id, span_id, is_sampled } = self;
+        write!(f, "00-{trace_id:032x}-{span_id:016x}-{:02x}", u8::from(*is_sampled))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use axum::http::HeaderValue;
@@ -52,6 +62,7 @@ mod tests {
         let found = of(&[line]).unwrap();
         assert_eq!(found.trace_id, 0x4bf9_2f35_77b3_4da6_a3ce_929d_0e0e_4736);
         assert_eq!((found.span_id, found.is_sampled), (0x00f0_67aa_0ba9_02b7, true));
+        assert_eq!(found.to_string(), line);
         assert!(of(&[&*line.replace("00-4b", "01-4b")]).is_some());
         assert!(of(&[&format!("{}-more", line.replace("00-4b", "01-4b"))]).is_some());
         for bad in [

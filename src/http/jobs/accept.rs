@@ -10,6 +10,7 @@ use axum::response::{IntoResponse, Response};
 use super::look::view_of_here;
 use super::{Here, Runner};
 use crate::http::around::middleware::CLOUD_HEADER;
+use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
@@ -22,6 +23,9 @@ const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-appli
 /// What a job takes over of the head of its request: nothing that is secret.
 static KEPT_HEADERS: [HeaderName; 5] =
     [header::ACCEPT, header::ACCEPT_ENCODING, header::CONTENT_TYPE, header::CONTENT_ENCODING, CLOUD_HEADER];
+
+/// The trace that its work belongs to.
+const TRACE: &str = "traceparent";
 
 /// What takes no longer than its body takes to come: there the preference is passed over.
 const AT_ONCE: [&str; 2] = ["/v1/clouds", "/v1/estimate"];
@@ -59,7 +63,8 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
         let text = parts.headers.get(name)?.to_str().ok()?;
         Some((name.as_str().to_owned(), text.to_owned()))
     });
-    let request = JobRequest { path, headers: kept.collect() };
+    let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
+    let request = JobRequest { path, headers: kept.chain(trace).collect() };
     let id = JobId::new();
     let Some(here) = app.jobs.add(id, owner) else { return Err(app.compute.out_of_memory()) };
     // It is not here any more, unless it is taken up below.

@@ -13,6 +13,7 @@ use tower::ServiceExt;
 use super::run::Attempt;
 use super::{Here, Runner};
 use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
+use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::store::objects::jobs::{FoundRequest, JobResult, Outcome};
@@ -33,6 +34,10 @@ static KEPT_HEADERS: [HeaderName; 5] = [
     HeaderName::from_static("server-timing"),
     CLOUD_HEADER,
 ];
+
+/// The name of the trace of an answer.
+#[derive(Clone)]
+struct Trace(String);
 
 impl Runner {
     /// Answers the request, and writes what comes of it.
@@ -61,9 +66,11 @@ impl Runner {
         if let Some(problem) = response.extensions().get::<Problem>() {
             app.metrics.refused(problem.slug());
         }
+        let trace_id =
+            response.extensions().get::<Trace>().map_or_else(|| "-".to_owned(), |trace| trace.0.clone());
         self.write(here, name, attempt, response).await?;
         let duration_ms = began.elapsed().as_secs_f64() * 1e3;
-        tracing::info!(job = %here.id, status, duration_ms, "job {} {status}", here.id);
+        tracing::info!(job = %here.id, trace_id, status, duration_ms, "job {} {status}", here.id);
         Ok(())
     }
 
@@ -80,8 +87,13 @@ impl Runner {
             let answered = match found {
                 Ok(found) => {
                     let request = rebuilt(found, here, &fault);
+                    let span = RequestSpan::begin_job(&here.id, request.uri().path(), request.headers());
+                    let trace = Trace(span.trace_id());
                     let answering = here.progress.watch(self.routes.clone().oneshot(request));
-                    answering.await.unwrap_or_else(|never| match never {})
+                    let mut answered = answering.await.unwrap_or_else(|never| match never {});
+                    span.end(answered.status(), answered.headers());
+                    answered.extensions_mut().insert(trace);
+                    answered
                 }
                 Err(damaged) => {
                     _ = fault.set(BrokenOff::Damaged);
