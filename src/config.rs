@@ -188,6 +188,11 @@ impl Config {
         Duration::from_secs_f64(self.job_result_seconds)
     }
 
+    /// How long a result is kept, and how long nobody may have been at a job until nobody will be.
+    pub fn job_retention(&self) -> (Duration, Duration) {
+        (self.job_result(), self.job_result() + Duration::from_secs_f64(self.job_seconds))
+    }
+
     /// What of the store goes by itself.
     pub fn retention(&self) -> Retention {
         let age = self.store_days.map(|days| Duration::from_secs_f64(days * 86400.0));

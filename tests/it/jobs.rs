@@ -292,8 +292,19 @@ async fn a_job_goes_on_elsewhere_when_its_process_is_told_to_end() {
     wait_for(&one, &path, "running").await;
     // The other one sees it as well, with how far it is.
     wait_for(&two, &path, "running").await;
+    // Who waits for it is sent away as well.
+    let waiting = reqwest::Client::new().get(one.url(&format!("{path}/result"))).send();
+    let waiting = tokio::spawn(waiting);
+    let is_there = async || {
+        let metrics = receive(reqwest::Client::new().get(one.url("/metrics"))).await;
+        String::from_utf8(metrics.bytes).unwrap().contains("gramian_http_requests_in_flight 2\n")
+    };
+    while !is_there().await {
+        tokio::task::yield_now().await;
+    }
     one.terminate();
     assert!(one.finish().0.success());
+    assert_eq!(waiting.await.unwrap().unwrap().status(), 503);
     assert_eq!(get(&two, &path).await["status"], "queued");
     wait_for(&two, &path, "succeeded").await;
 }
@@ -326,6 +337,10 @@ async fn jobs_of_one_key_leave_places_to_another() {
     };
     for (key, status) in [("greedy", 202), ("greedy", 202), ("greedy", 503), ("modest", 202)] {
         assert_eq!(asking(key).await.unwrap().status(), status, "{key}");
+    }
+    // One runs. What a fleet grows by counts the others, which no lane knows yet.
+    while !server.get("/metrics").await.text.contains("\ngramian_queue_depth 2\n") {
+        tokio::task::yield_now().await;
     }
 }
 

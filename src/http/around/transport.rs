@@ -14,9 +14,6 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 
-/// Seconds after which another instance has taken over from one that drains.
-const RETRY_AFTER_DRAINING_SECONDS: u64 = 1;
-
 /// What makes the head of an HTTP/1 request ambiguous: two programs may take it for two different requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -103,8 +100,7 @@ pub async fn answer(app: &App, request: Request, next: Next) -> Response {
     tokio::select! {
         biased;
         () = is_refused(app, arrival) => {
-            let problem = Problem::unavailable("the server is shutting down", RETRY_AFTER_DRAINING_SECONDS);
-            close(version, problem.into_response())
+            close(version, Problem::draining().into_response())
         }
         response = next.run(request) => response,
     }

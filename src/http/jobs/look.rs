@@ -130,7 +130,7 @@ pub fn here_of(app: &App, owner: Owner, id: JobId) -> Option<Arc<Here>> {
 /// Resolves once a job has ended.
 ///
 /// # Errors
-/// Those of [`look`].
+/// Those of [`look`], and 503 once the process is to end before: another one goes on with the job, and can be asked.
 pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
     loop {
         if let Some(here) = here_of(app, owner, id) {
@@ -140,7 +140,13 @@ pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobV
         if view.has_ended() {
             return Ok(view);
         }
-        tokio::time::sleep(LOOKING).await;
+        if app.draining.is_cancelled() {
+            return Err(Problem::draining());
+        }
+        tokio::select! {
+            () = tokio::time::sleep(LOOKING) => {}
+            () = app.draining.cancelled() => {}
+        }
     }
 }
 

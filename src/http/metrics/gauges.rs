@@ -27,6 +27,7 @@ pub(super) struct Gauges {
     store_clouds: IntGauge,
     store_bytes: IntGauge,
     store_factor_bytes: IntGauge,
+    store_job_bytes: IntGauge,
     jobs: IntGaugeVec,
     reading: Mutex<()>,
 }
@@ -46,7 +47,10 @@ impl Gauges {
         Ok(Self {
             places: gauge("gramian_compute_places", "Requests that are admitted at once at most")?,
             admitted: gauge("gramian_compute_admitted", "Requests that are admitted")?,
-            queue_depth: gauge("gramian_queue_depth", "Jobs that wait for their turn, over all lanes")?,
+            queue_depth: gauge(
+                "gramian_queue_depth",
+                "What waits for its turn: requests on all lanes, and jobs",
+            )?,
             threads: gauge("gramian_compute_threads", "Threads of each lane")?,
             running: gauges("gramian_compute_running", "Jobs that run", "lane")?,
             waiting: gauges("gramian_compute_waiting", "Jobs that wait for their turn", "lane")?,
@@ -71,6 +75,7 @@ impl Gauges {
             store_clouds: gauge("gramian_store_clouds", "Clouds in the store, about")?,
             store_bytes: gauge("gramian_store_bytes", "Bytes of clouds in the store, about")?,
             store_factor_bytes: gauge("gramian_store_factor_bytes", "Bytes of factors in the store, about")?,
+            store_job_bytes: gauge("gramian_store_job_bytes", "Bytes of jobs in the store, about")?,
             jobs: gauges("gramian_jobs", "Jobs of this process that have not ended", "status")?,
             reading: Mutex::default(),
         })
@@ -90,8 +95,10 @@ impl Gauges {
         self.places.set(load.n_places as i64);
         self.admitted.set(load.n_admitted as i64);
         self.threads.set(app.compute.n_threads() as i64);
-        self.queue_depth.set(load.lanes.iter().map(|lane| lane.n_waiting as i64).sum());
         let jobs = app.jobs.load();
+        // Jobs wait for a turn of their own before they come to a lane.
+        let n_waiting = load.lanes.iter().map(|lane| lane.n_waiting).sum::<usize>() + jobs.n_waiting;
+        self.queue_depth.set(n_waiting as i64);
         self.jobs.with_label_values(&["queued"]).set(jobs.n_waiting as i64);
         self.jobs.with_label_values(&["running"]).set(jobs.n_running as i64);
         for lane in load.lanes {
@@ -127,6 +134,8 @@ impl Gauges {
         self.store_bytes.set(n_bytes as i64);
         let n_factor_bytes = app.durable.as_ref().map_or(0, |durable| durable.factor_bytes());
         self.store_factor_bytes.set(n_factor_bytes as i64);
+        let n_job_bytes = app.durable.as_ref().map_or(0, |durable| durable.job_bytes());
+        self.store_job_bytes.set(n_job_bytes as i64);
         let tally = app.durable.as_ref().map(|durable| durable.objects.tally());
         for verb in Verb::ALL {
             let [n_answered, n_failed] = tally.map_or([0; 2], |tally| tally.of(verb));

@@ -112,6 +112,9 @@ impl Pointers {
     }
 }
 
+/// Seconds after which another instance has taken over from one that drains.
+const SECONDS_UNTIL_REPLACED: u64 = 1;
+
 impl Problem {
     pub fn new(slug: Slug, detail: impl Into<String>) -> Self {
         Self { slug, detail: detail.into(), members: Box::default() }
@@ -168,6 +171,11 @@ impl Problem {
         let mut problem = Self::new(Slug::Overloaded, detail);
         problem.members.retry_after_seconds = Some(retry_after_seconds);
         problem
+    }
+
+    /// 503 of a process that is to end.
+    pub fn draining() -> Self {
+        Self::unavailable("the server is shutting down", SECONDS_UNTIL_REPLACED)
     }
 
     /// Says nothing internal: the log has the cause under the request id.

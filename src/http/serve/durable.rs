@@ -14,7 +14,7 @@ use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode};
-use crate::store::objects::{Listed, Objects, Place, Retention, Swept, Unavailable, Written};
+use crate::store::objects::{Listed, Objects, OwnerName, Place, Retention, Swept, Unavailable, Written};
 
 /// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
 pub const SECONDS_UNTIL_BACK: u64 = 5;
@@ -41,6 +41,7 @@ pub struct Durable {
     n_clouds: AtomicU64,
     n_bytes: AtomicU64,
     pub(super) n_factor_bytes: AtomicU64,
+    n_job_bytes: AtomicU64,
     pub(super) is_full: Notify,
     /// Held while a factor is written.
     pub(super) writing_factor: tokio::sync::Mutex<()>,
@@ -61,6 +62,7 @@ impl Durable {
             n_clouds: AtomicU64::new(0),
             n_bytes: AtomicU64::new(0),
             n_factor_bytes: AtomicU64::new(0),
+            n_job_bytes: AtomicU64::new(0),
             is_full: Notify::new(),
             writing_factor: tokio::sync::Mutex::default(),
         })
@@ -74,6 +76,11 @@ impl Durable {
     /// Bytes of factors in the store, about.
     pub fn factor_bytes(&self) -> u64 {
         self.n_factor_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Bytes of jobs in the store, about.
+    pub fn job_bytes(&self) -> u64 {
+        self.n_job_bytes.load(Ordering::Relaxed)
     }
 
     /// How many clouds the store has, and bytes of them, about.
@@ -320,7 +327,13 @@ pub async fn retain(app: Arc<App>) {
             _ = ticks.tick() => {}
             () = durable.is_full.notified() => {}
         }
-        match durable.objects.sweep(app.config.retention(), SystemTime::now()).await {
+        let now = SystemTime::now();
+        let knows = |name: &OwnerName| app.keys.owner_named(name).is_some();
+        match durable.objects.sweep_jobs(knows, app.config.job_retention(), now).await {
+            Err(error) => tracing::error!(%error, "jobs of keys that are gone are not let go"),
+            Ok(n_bytes) => durable.n_job_bytes.store(n_bytes, Ordering::Relaxed),
+        }
+        match durable.objects.sweep(app.config.retention(), now).await {
             Err(error) => tracing::error!(%error, "clouds are not let go"),
             Ok(Swept { n_clouds, n_bytes, n_factor_bytes, gone }) => {
                 durable.n_factor_bytes.store(n_factor_bytes, Ordering::Relaxed);

@@ -21,6 +21,7 @@ pub mod cloud_object;
 mod clouds;
 pub mod factors;
 pub mod jobs;
+mod patience;
 pub mod pieces;
 mod place;
 mod retention;
@@ -39,6 +40,7 @@ use uuid::Uuid;
 
 use super::key::CloudId;
 pub use clouds::{Listed, Written};
+use patience::Patient;
 pub use place::Place;
 pub use retention::{Retention, Swept};
 pub use tally::{Tally, Verb};
@@ -109,6 +111,7 @@ impl Objects {
 
     /// A store of any kind, with what stands before all names.
     pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
+        let store = Arc::new(Patient::new(store));
         Self { store, root, directory: None, tally: Tally::default(), n_damaged: AtomicU64::new(0) }
     }
 

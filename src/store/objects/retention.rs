@@ -87,8 +87,8 @@ impl Objects {
         }
     }
 
-    /// All whose clouds there are.
-    async fn owners(&self) -> Result<Vec<OwnerName>, Unavailable> {
+    /// All who have something in the store.
+    pub(super) async fn owners(&self) -> Result<Vec<OwnerName>, Unavailable> {
         let found = self.store.list_with_delimiter(Some(&self.root)).await;
         let found = self.counted(Verb::List, &self.root, found)?;
         let folders = found.into_iter().flat_map(|found| found.common_prefixes);

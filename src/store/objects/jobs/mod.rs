@@ -13,7 +13,7 @@ mod results;
 #[cfg(test)]
 mod tests;
 
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
 use object_store::path::Path;
@@ -51,7 +51,7 @@ impl JobId {
     /// When it was made.
     pub fn created_at(self) -> SystemTime {
         let (seconds, nanoseconds) = self.0.get_timestamp().map_or((0, 0), |time| time.to_unix());
-        SystemTime::UNIX_EPOCH + std::time::Duration::new(seconds, nanoseconds)
+        SystemTime::UNIX_EPOCH + Duration::new(seconds, nanoseconds)
     }
 }
 
@@ -115,6 +115,35 @@ impl Objects {
             self.delete(&object.location).await?;
         }
         Ok(())
+    }
+
+    /// Bytes of all jobs. Those of owners that nobody `knows` any more, a key of theirs having been taken away, are forgotten once they ended
+    /// longer than `kept` ago, or nobody has worked on them for `longest`.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn sweep_jobs(
+        &self,
+        knows: impl Fn(&OwnerName) -> bool,
+        (kept, longest): (Duration, Duration),
+        now: SystemTime,
+    ) -> Result<u64, Unavailable> {
+        let mut n_bytes = 0;
+        for owner in self.owners().await? {
+            let found = self.objects_in(&owner, &[FOLDER]).await?;
+            n_bytes += found.iter().map(|object| object.size).sum::<u64>();
+            if knows(&owner) {
+                continue;
+            }
+            for job in collected(&owner, found) {
+                let written_at = job.lease.map_or(job.id.created_at(), |(_, written_at)| written_at);
+                let (since, most) = job.ended_at.map_or((written_at, longest), |ended_at| (ended_at, kept));
+                if now.duration_since(since).is_ok_and(|age| age > most) {
+                    self.delete_job(&job).await?;
+                }
+            }
+        }
+        Ok(n_bytes)
     }
 
     /// Writes an object that is not there; says whether it was not.

@@ -169,3 +169,26 @@ async fn a_request_that_is_not_what_was_written_is_refused() {
         assert!(is_refused, "byte {at}");
     }
 }
+
+#[tokio::test]
+async fn jobs_of_owners_that_are_gone_go_with_their_time() {
+    let objects = Arc::new(Objects::in_memory());
+    let (ended, open) = (asked(&objects, b"body").await, asked(&objects, b"body").await);
+    assert!(objects.put_result((&owner(), ended), 0, head(), body(&[b"text"])).await.unwrap());
+    let times = (Duration::from_secs(60), Duration::from_secs(600));
+    let sweep = async |knows: bool, seconds| {
+        let now = SystemTime::now() + Duration::from_secs(seconds);
+        let n_bytes = objects.sweep_jobs(|name| knows && *name == owner(), times, now).await.unwrap();
+        let there = objects.jobs(&owner()).await.unwrap();
+        (n_bytes, there.into_iter().map(|job| job.id).collect::<Vec<_>>())
+    };
+    let (n_bytes, there) = sweep(true, 86400).await;
+    assert!(n_bytes > 12 && there == [ended, open]);
+    assert_eq!(sweep(false, 30).await, (n_bytes, vec![ended, open]));
+    assert_eq!(sweep(false, 90).await, (n_bytes, vec![open]));
+    // Somebody is at it.
+    assert!(objects.claim_job(&owner(), open, 0, &super::Lease::default()).await.unwrap());
+    assert_eq!(sweep(false, 500).await.1, [open]);
+    assert_eq!(sweep(false, 700).await.1, []);
+    assert_eq!(sweep(false, 0).await.0, 0);
+}
