@@ -152,7 +152,7 @@ def test_a_refusal_that_is_no_document_is_a_problem(
         server(http(status, body, f"Content-Type: {media_type}")) as (address, _),
         pytest.raises(gramian.Problem) as caught,
     ):
-        gramian.Client(address).version()
+        gramian.Client(address, retries=0).version()
     problem = caught.value
     assert (problem.status, problem.slug, problem.detail) == (number, "about:blank", detail)
     assert (problem.pointer, problem.request_id, problem.point_indices) == (None, "", ())

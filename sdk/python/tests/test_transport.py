@@ -116,6 +116,15 @@ def test_lost_connections_are_tried_again(lost: type[httpx.TransportError]) -> N
     assert requests[0].content == requests[1].content
 
 
+def test_a_connection_that_a_proxy_lost_is_tried_again() -> None:
+    handle, requests = service(*[httpx.Response(502, text="<html>Bad Gateway")] * 4)
+    connection, waits = connect(handle, retries=3)
+    with pytest.raises(gramian.Problem) as caught:
+        connection.post("/v1/normals", {"cloud": {"id": "a"}})
+    assert (waits, len(requests)) == ([0.1, 0.2, 0.4], 4)
+    assert (caught.value.status, type(caught.value)) == (502, gramian.Problem)  # nobody said that there is no place
+
+
 def test_a_request_without_arrays_needs_no_safetensors() -> None:
     handle, requests = service(httpx.Response(200, json=OK), httpx.Response(200, json=OK))
     http = httpx.Client(base_url="http://service", transport=httpx.MockTransport(handle))
@@ -180,7 +189,7 @@ def test_address_and_key_come_from_the_environment(monkeypatch: pytest.MonkeyPat
 
 def test_what_is_no_problem_document_is_a_problem_still() -> None:
     handle, _ = service(httpx.Response(502, text="<html>Bad Gateway"), httpx.Response(500, json=["what"]))
-    client = gramian.Client("http://service", transport=httpx.MockTransport(handle))
+    client = gramian.Client("http://service", retries=0, transport=httpx.MockTransport(handle))
     for status, detail in [(502, "<html>Bad Gateway"), (500, '["what"]')]:
         with pytest.raises(gramian.Problem) as caught:
             client.version()

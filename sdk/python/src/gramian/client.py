@@ -51,7 +51,7 @@ class Client:
         Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent. `math.inf` for no
         limit.
     retries : int, optional
-        How often a request is repeated at most, after 429, 503 or a lost connection; 4 if absent.
+        How often a request is repeated at most, after 429, 502, 503 or a lost connection; 4 if absent.
     max_wait : float, optional
         Seconds that all waits of a request together may take; 60 if absent. `Retry-After` is honoured within them; if
         it asks for more, `Overloaded` is raised at once, with `retry_after`.

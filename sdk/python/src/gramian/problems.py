@@ -121,15 +121,16 @@ _KINDS: dict[str, type[Problem]] = {
 MAX_QUOTED = 200
 """How many bytes of a page are repeated."""
 
-TRY_LATER = (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE)
-"""The statuses after which the same request may succeed."""
+_OVERLOADED = (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE)
+TRY_LATER = (*_OVERLOADED, httpx.codes.BAD_GATEWAY)
+"""The statuses after which the same request may succeed; 502 is that of a proxy, which lost its connection."""
 
 
 def problem_of(response: httpx.Response, retry_after: float | None = None) -> Problem:
     """Returns the exception for an answer that is no success."""
     document = _document(response)
     # By the status, since a proxy on the way says so without a document.
-    if response.status_code in TRY_LATER:
+    if response.status_code in _OVERLOADED:
         return Overloaded(document, retry_after)
     kind = _KINDS.get(document.type_.rpartition("/")[2], Problem)
     return kind(document, retry_after)

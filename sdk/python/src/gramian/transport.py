@@ -37,7 +37,7 @@ _LOST_CONNECTION = (
 
 
 class RetryingClient(httpx.Client):
-    """An HTTP client that tries again after 429, 503 and lost connections.
+    """An HTTP client that tries again after 429, 502, 503 and lost connections.
 
     Waits as long as `Retry-After` says, and not at all if that would exceed `max_wait` seconds for all waits of a
     request together: the caller should know at once. Then, and after `retries` repetitions, the answer is returned as
