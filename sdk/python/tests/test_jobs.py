@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from typing import Any
 
 import httpx
@@ -36,61 +37,191 @@ def job(status: str, fraction: float) -> dict[str, Any]:
 
 
 def events(*jobs: dict[str, Any]) -> httpx.Response:
-    names = ["done" if job["status"] == "succeeded" else "progress" for job in jobs]
+    names = ["done" if job["status"] in ("succeeded", "failed") else "progress" for job in jobs]
     text = "".join(f"event: {name}\ndata: {json.dumps(job)}\n\n: \n\n" for name, job in zip(names, jobs, strict=True))
     return httpx.Response(200, text=text, headers={"Content-Type": "text/event-stream"})
 
 
-class Service:
-    """Answers with what it is given, in turn, and notes what it is asked."""
+Answer = httpx.Response | BaseException
 
-    def __init__(self, *answers: httpx.Response) -> None:
+
+class Service:
+    """Answers with what it is given, in turn, and at last always the same; notes what it is asked."""
+
+    def __init__(self, *answers: Answer, deleted: Answer | None = None) -> None:
         self.answers = list(answers)
+        self.deleted = deleted or httpx.Response(204)
         self.asked: list[str] = []
+        self.timeouts: list[dict[str, float]] = []
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
-        if request.url.path == "/v1/clouds":
+        path = request.url.path.removeprefix("/below")
+        if path == "/v1/clouds":
             return httpx.Response(201, json=CLOUD)
-        self.asked.append(f"{request.method} {request.url.path}")
-        if request.method == "DELETE":
-            return httpx.Response(204)
-        return self.answers.pop(0)
+        self.asked.append(f"{request.method} {path}")
+        self.timeouts.append(request.extensions["timeout"])
+        answer = self.deleted
+        if request.method != "DELETE":
+            answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
 
-    def cloud(self, progress: Any) -> gramian.Cloud:
+    def cloud(self, progress: Any, retries: int = 4) -> gramian.Cloud:
         transport = httpx.MockTransport(self)
-        client = gramian.Client("http://service", format="json", transport=transport, progress=progress)
+        client = gramian.Client(
+            "http://service/below", format="json", retries=retries, transport=transport, progress=progress
+        )
         return client.cloud([[0.0, 0.0]])
+
+
+class Clock:
+    """Goes on only while somebody sleeps."""
+
+    def __init__(self) -> None:
+        self.waits: list[float] = []
+
+    def sleep(self, seconds: float) -> None:
+        self.waits.append(seconds)
+
+    def monotonic(self) -> float:
+        return sum(self.waits)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("gramian.jobs.time", clock)
+    return clock
 
 
 ACCEPTED = httpx.Response(202, json=job("queued", 0.0), headers={"Location": PLACE})
 FINISHED = [f"GET {PLACE}/result", f"DELETE {PLACE}"]
+LEFT = (
+    f"The job {PLACE.rsplit('/', 1)[1]} may run on. GET http://service/below{PLACE} says how far it is, "
+    f"GET http://service/below{PLACE}/result is its answer, and DELETE http://service/below{PLACE} ends it, "
+    f"with the header Gramian-Cloud: {CLOUD['cloud_id']}."
+)
 
 
-def test_a_job_is_followed_to_its_end_over_as_many_connections_as_it_takes() -> None:
+def refusal(status: int, kind: str, **headers: str) -> httpx.Response:
+    document = {"type": f"/problems/{kind}", "title": "", "status": status, "detail": "none", "instance": "x"}
+    return httpx.Response(status, json=document, headers={"Content-Type": "application/problem+json", **headers})
+
+
+def interrupt(_: Job) -> None:
+    raise KeyboardInterrupt
+
+
+def test_a_job_is_followed_to_its_end_over_as_many_connections_as_it_takes(clock: Clock) -> None:
     told: list[Job] = []
-    refused = {"type": "/problems/invalid-cloud", "title": "", "status": 422, "detail": "none", "instance": "x"}
     service = Service(
         ACCEPTED,
         events(job("running", 0.25)),
         httpx.Response(200, json=job("running", 0.5)),
         events(job("running", 0.75), job("succeeded", 1.0)),
-        httpx.Response(422, json=refused, headers={"Content-Type": "application/problem+json"}),
+        refusal(422, "invalid-cloud"),
     )
     with pytest.raises(gramian.Problem, match="none"):
         service.cloud(told.append).normals()
     assert [state.progress.fraction for state in told] == [0.25, 0.5, 0.75, 1.0]
     followed = [f"GET {PLACE}/events", f"GET {PLACE}", f"GET {PLACE}/events"]
     assert service.asked == ["POST /v1/normals", *followed, *FINISHED]
+    assert clock.waits == [0.5]
 
 
-def test_what_ends_the_wait_cancels_the_job() -> None:
-    def interrupt(_: Job) -> None:
-        raise KeyboardInterrupt
+AWAY: dict[str, Callable[[], Answer]] = {
+    "refused": lambda: httpx.ConnectError("gone"),
+    "silent": lambda: httpx.ReadTimeout("slow"),
+    "draining": lambda: refusal(503, "overloaded"),
+    "limited": lambda: refusal(429, "rate-limited"),
+    "proxied": lambda: httpx.Response(502, text="<html>Bad Gateway"),
+    "silent behind a proxy": lambda: httpx.Response(504, text="<html>Gateway Time-out"),
+}
 
-    service = Service(ACCEPTED, events(job("running", 0.25), job("succeeded", 1.0)))
-    with pytest.raises(KeyboardInterrupt):
+
+@pytest.mark.parametrize("away", AWAY.values(), ids=AWAY.keys())
+def test_a_job_outlasts_a_service_that_is_away(away: Callable[[], Answer], clock: Clock) -> None:
+    service = Service(
+        ACCEPTED,
+        events(job("running", 0.25)),
+        *[away() for _ in range(8)],
+        httpx.Response(200, json=job("running", 0.5)),
+        events(job("succeeded", 1.0)),
+        *[away() for _ in range(2)],
+        refusal(422, "invalid-cloud"),
+    )
+    with pytest.raises(gramian.Problem, match="none") as caught:
+        service.cloud(lambda _: None, retries=0).normals()
+    assert not hasattr(caught.value, "__notes__")
+    looks, results = [f"GET {PLACE}"] * 9, [f"GET {PLACE}/result"] * 2
+    followed = [f"GET {PLACE}/events", *looks, f"GET {PLACE}/events"]
+    assert service.asked == ["POST /v1/normals", *followed, *results, *FINISHED]
+    assert clock.waits == [0.5, 1, 2, 4, 8, 15, 15, 15, 0.5, 0.5, 1]
+
+
+@pytest.mark.parametrize("away", AWAY.values(), ids=AWAY.keys())
+@pytest.mark.parametrize("ended", [False, True])
+def test_a_job_is_left_to_a_service_that_stays_away(away: Callable[[], Answer], ended: bool, clock: Clock) -> None:
+    service = Service(ACCEPTED, events(job("succeeded" if ended else "running", 1.0)), away())
+    with pytest.raises((httpx.TransportError, gramian.Problem)) as caught:
+        service.cloud(lambda _: None, retries=0).normals()
+    assert f"DELETE {PLACE}" not in service.asked
+    assert caught.value.__notes__[-1] == LEFT
+    assert 585 < clock.monotonic() <= 600
+
+
+def test_a_service_that_says_for_how_long_it_is_away_is_taken_at_its_word(clock: Clock) -> None:
+    answers = [refusal(503, "overloaded", **{"Retry-After": seconds}) for seconds in ("40", "0", "700")]
+    service = Service(ACCEPTED, events(job("running", 0.25)), *answers)
+    with pytest.raises(gramian.Overloaded) as caught:
+        service.cloud(lambda _: None, retries=0).normals()
+    assert (clock.waits, caught.value.retry_after, caught.value.__notes__) == ([40, 1], 700, [LEFT])
+
+
+def test_a_job_that_took_too_long_has_ended(clock: Clock) -> None:
+    service = Service(ACCEPTED, events(job("failed", 1.0)), refusal(504, "deadline-exceeded"))
+    with pytest.raises(gramian.Problem, match="none"):
+        service.cloud(lambda _: None).normals()
+    assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", *FINISHED]
+    assert clock.waits == []
+
+
+@pytest.mark.parametrize("status", [204, 404])
+def test_what_ends_the_wait_cancels_the_job(status: int) -> None:
+    deleted = httpx.Response(status)
+    service = Service(ACCEPTED, events(job("running", 0.25), job("succeeded", 1.0)), deleted=deleted)
+    with pytest.raises(KeyboardInterrupt) as caught:
         service.cloud(interrupt).normals()
     assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", f"DELETE {PLACE}"]
+    assert not hasattr(caught.value, "__notes__")
+
+
+@pytest.mark.parametrize("deleted", [refusal(503, "overloaded"), httpx.ReadError("gone"), httpx.ReadTimeout("slow")])
+def test_a_job_that_cannot_be_cancelled_is_named(deleted: Answer) -> None:
+    service = Service(ACCEPTED, events(job("running", 0.25)), deleted=deleted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        service.cloud(interrupt).normals()
+    assert caught.value.__notes__ == [LEFT]
+    assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", f"DELETE {PLACE}"]  # once: nobody is to wait
+    assert set(service.timeouts[-1].values()) == {5}
+
+
+def test_who_is_too_impatient_to_cancel_is_told_of_the_job() -> None:
+    service = Service(ACCEPTED, events(job("running", 0.25)), deleted=KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt) as caught:
+        service.cloud(interrupt).normals()
+    assert caught.value.__context__ is not None
+    assert caught.value.__context__.__notes__ == [LEFT]
+
+
+@pytest.mark.parametrize("deleted", [refusal(503, "overloaded"), httpx.ReadError("gone")])
+def test_an_answer_that_is_there_does_not_wait_until_its_job_is_deleted(deleted: Answer) -> None:
+    result = httpx.Response(200, json={})
+    service = Service(ACCEPTED, events(job("succeeded", 1.0)), result, deleted=deleted)
+    connection = service.cloud(lambda _: None)._connection
+    assert connection.post("/v1/normals", {}, cloud_id=CLOUD["cloud_id"]).json() == {}
+    assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", *FINISHED]
 
 
 def test_a_bar_shows_what_is_done_and_how_long_it_takes(capsys: pytest.CaptureFixture[str]) -> None:

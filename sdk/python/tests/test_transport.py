@@ -150,6 +150,18 @@ def test_a_connection_lost_too_often_is_an_error() -> None:
     assert (waits, len(requests)) == ([], 1)
 
 
+@pytest.mark.parametrize(
+    ("answer", "is_gone"),
+    [(httpx.Response(204), True), (refusal(404), True), (refusal(503, "1"), False), (httpx.ReadError("gone"), False)],
+)
+def test_what_is_not_wanted_any_more_is_deleted_in_one_attempt(answer: Answer, is_gone: bool) -> None:
+    handle, requests = service(answer)
+    connection, waits = connect(handle)
+    assert connection.delete("/v1/jobs/a", {"Gramian-Cloud": "b"}, 3.0) == is_gone
+    assert (waits, requests[0].headers["Gramian-Cloud"]) == ([], "b")
+    assert set(requests[0].extensions["timeout"].values()) == {3.0}
+
+
 def test_timeouts_and_other_refusals_are_not_tried_again() -> None:
     handle, requests = service(httpx.ReadTimeout("slow"), refusal(504), refusal(404))
     connection, waits = connect(handle)

@@ -25,7 +25,8 @@ BACKOFF_SECONDS = 0.1
 CLOUD_HEADER = "Gramian-Cloud"
 """Names the cloud that a request is about to proxies: the replica that it is always sent to has what was computed."""
 
-# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes.
+# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes. A job
+# whose 202 was lost is begun once more; the first one ends by itself, at the deadline of jobs at the latest.
 # Reading past the timeout is not among these, since the service is then busy with the first request still.
 _LOST_CONNECTION = (
     httpx.ConnectError,
@@ -34,6 +35,10 @@ _LOST_CONNECTION = (
     httpx.WriteError,
     httpx.RemoteProtocolError,
 )
+
+
+_RETRIES = "gramian.retries"
+"""The extension of a request that has a number of repetitions of its own."""
 
 
 class RetryingClient(httpx.Client):
@@ -70,7 +75,7 @@ class RetryingClient(httpx.Client):
             raise RuntimeError("a Client cannot be used after a fork: every process makes its own")
         request.read()  # a body that is read from a file can be sent once only
         waited = 0.0
-        for attempt in range(self._retries):
+        for attempt in range(request.extensions.get(_RETRIES, self._retries)):
             backoff = BACKOFF_SECONDS * 2**attempt
             try:
                 response = super().send(request, **options)
@@ -140,6 +145,14 @@ class Connection:
         if not response.is_success:
             raise problem_of(response, retry_after(response))
         return response
+
+    def delete(self, path: str, headers: dict[str, str], seconds: float) -> bool:
+        """Deletes in one attempt, since nobody is to wait for what is not wanted; says whether it is gone."""
+        try:
+            response = self.http.delete(path, headers=headers, timeout=seconds, extensions={_RETRIES: 0})
+        except Exception:  # whatever it was, such as a closed client, what led here matters more
+            return False
+        return response.is_success or response.status_code == httpx.codes.NOT_FOUND
 
     def post(
         self, path: str, request: Mapping[str, object], accept: str | None = None, cloud_id: str | None = None
