@@ -59,9 +59,9 @@ class Client:
         How arrays travel, `"safetensors"` or `"json"`: the former if absent and that package is installed. The numbers
         are the same.
     progress : bool or callable, optional
-        Whether computations are jobs of the service, which have no deadline, with a progress bar for each (extra
-        `progress`). Ctrl-C cancels them. A function instead is called with each state of a job, a
-        `gramian.rest.models.Job`.
+        Whether computations are jobs of the service, with a progress bar for each (extra `progress`). Their deadline is
+        that of jobs, a day if not configured. A service that is away meanwhile is waited for, ten minutes at most.
+        Ctrl-C cancels them. A function instead is called with each state of a job, a `gramian.rest.models.Job`.
     transport : httpx.BaseTransport, optional
         Instead of the network, as in `httpx.Client`.
 
