@@ -118,7 +118,7 @@ class Soak:
 
 
 def cloud(n, k, dimension=3):
-    """A sphere that no other request has, or points in a cube of more dimensions."""
+    """A sphere that no other request has, or points in a cube of more dimensions. All are as smooth: it is times that are compared."""
     if dimension != 3:
         source = random.Random(k)
         return [[source.random() for _ in range(dimension)] for _ in range(n)]
@@ -128,7 +128,7 @@ def cloud(n, k, dimension=3):
         z = 1 - (2 * i + 1) / n
         r = math.sqrt(1 - z * z)
         points.append([r * math.cos(golden * i), r * math.sin(golden * i), z])
-    points[0][0] += 1e-7 * k
+    points[0][0] += 1e-10 * k
     return points
 
 
