@@ -21,7 +21,6 @@ import gramian.dask
 from gramian.dask.cut import Cut
 from gramian.dask.parts import Part, Reach, join, look, rim, split
 from gramian.dask.replicas import Replicas
-from gramian.dask.signs import Regions, joined
 from gramian.dask.thinning import distinct, thinned
 from gramian.dask.tile import assemble
 from gramian.tensors import Array
@@ -256,36 +255,12 @@ def test_thinned_clouds_are_spread() -> None:
     np.testing.assert_allclose(np.bincount(quarters), 16, atol=2)
 
 
-@pytest.mark.parametrize("n_tiles", [1, 3])
-def test_flipped_regions_are_turned_back_to_the_coarse_side(n_tiles: int) -> None:
-    random = np.random.default_rng(0)
-    outward = random.normal(size=(3000, 3))
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    is_flipped = outward[:, 2] > 0.2
-    normals = np.where(is_flipped, -1, 1)[:, None] * outward
-    directions = np.where(random.uniform(size=3000) < 0.9, 1, 0.1)[:, None] * normals  # a tenth says little
-    cells = np.digitize(outward[:, 0], [-0.4, 0.4]) if n_tiles == 3 else np.zeros(3000, dtype=np.int64)
-    for side in (1, -1):
-        coarse = np.arange(0, 3000, 50), side * outward[::50]
-        found, labels, shared = [], [], []
-        for cell in range(n_tiles):
-            edge = np.abs(outward[:, :1] - outward[cells == cell, 0]).min(axis=1)
-            near = np.flatnonzero((cells == cell) | (edge < 0.15))
-            own = np.flatnonzero(cells[near] == cell)
-            of_points, regions = Regions.of(near, outward[near], normals[near], directions[near], own, coarse)
-            found.append(regions)
-            labels.append(of_points[own])
-            shared.append((near[own], of_points[own]))
-        for cell, signs in enumerate(joined(found, shared)):
-            expected = side * np.where(is_flipped, -1, 1)[cells == cell]
-            np.testing.assert_array_equal(signs[labels[cell]], expected)
-
-
 @pytest.mark.parametrize(
     ("points", "n_tiles", "message"),
     [
         ([1.0, 2.0], 1, r"\[n, d\], not \[2\]"),
-        (np.empty((0, 3)), 1, "no rows"),
+        (np.empty((0, 3)), 1, "it is empty"),
+        (da.empty((0, 3)), 1, "no rows"),
         (np.zeros((5, 3)), 6, "from 1 to the number of points, 5, not 6"),
         ([[0.0, 1.0], [np.nan, 0.0]], 1, r"points\[1, 0\] is nan"),
     ],

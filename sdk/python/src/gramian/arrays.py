@@ -62,20 +62,23 @@ def as_array(name: str, value: object, axes: Sequence[str], sizes: Sizes) -> Arr
     ValueError
         If it has another shape, or a number that is masked, not finite or not exact in float64.
     """
-    found = _read(name, value)
+    found = read(name, value)
     _check_shape(name, found, axes, sizes)
-    array = _in_float64(name, found)
-    _refuse_first(name, ~np.isfinite(array), array, "and only finite numbers can be sent")
-    return array
+    return _in_float64(name, found)
 
 
-def _read(name: str, value: object) -> AnyArray:
+def as_block(name: str, value: object, first: int) -> Array:
+    """Returns some rows of an array as they are sent; the first of them, which messages count from, is row `first`."""
+    return _in_float64(name, read(name, value, first), first)
+
+
+def read(name: str, value: object, first: int = 0) -> AnyArray:
     """Returns the array that NumPy sees, of real numbers, none of them masked."""
     if isinstance(value, Mapping | Set | Iterator):
         raise TypeError(f"{name} is to be an array, not a {type(value).__name__}; list(…) makes one of its entries")
-    array = _refuse_masked(name, value)
+    array = _refuse_masked(name, value, first)
     if array.dtype.kind == "O":
-        _refuse_objects(name, value, array)
+        _refuse_objects(name, value, array, first)
     if array.dtype.kind not in "fiu":
         kind, dtype = KINDS.get(array.dtype.kind, "no plain numbers"), array.dtype
         remedy = REMEDIES.get(dtype.kind, "only real numbers can be sent")
@@ -83,7 +86,7 @@ def _read(name: str, value: object) -> AnyArray:
     return array
 
 
-def _refuse_masked(name: str, value: object) -> AnyArray:
+def _refuse_masked(name: str, value: object, first: int) -> AnyArray:
     """Returns the array if nothing in it is masked: what lies under a mask is no number to compute with."""
     rows = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
     try:
@@ -93,7 +96,7 @@ def _refuse_masked(name: str, value: object) -> AnyArray:
         raise kind(f"{name} cannot be read as an array: {_ragged(name, value) or error}") from error
     if isinstance(array, np.ma.MaskedArray):
         hint = f"and nothing can be sent for it; leave such rows out, or {name}.filled(…)"
-        _refuse_first(name, np.ma.getmaskarray(array), None, hint)
+        _refuse_first(name, np.ma.getmaskarray(array), None, hint, first)
     return np.asarray(array)
 
 
@@ -108,26 +111,27 @@ def _ragged(name: str, value: object) -> str | None:
     return f"{name}[0] has the length {lengths[0]}, {name}[{other}] the length {lengths[other]}"
 
 
-def _refuse_objects(name: str, value: object, array: AnyArray) -> None:
+def _refuse_objects(name: str, value: object, array: AnyArray, first: int) -> None:
     if array.ndim == 0:
         raise TypeError(f"{name} is to be an array of numbers, not of the type {type(value).__name__}")
     for place, entry in np.ndenumerate(array):
         if isinstance(entry, bool) or not isinstance(entry, Real | Decimal):
-            raise TypeError(
-                f"{name}{list(place)} is {reprlib.repr(entry)} ({type(entry).__name__}), and only numbers can be sent"
-            )
+            at, kind = [first + place[0], *place[1:]], type(entry).__name__
+            raise TypeError(f"{name}{at} is {reprlib.repr(entry)} ({kind}), and only numbers can be sent")
     raise TypeError(f"{name} is an array of Python objects; np.asarray({name}, dtype=float) makes numbers of them")
 
 
-def _in_float64(name: str, array: AnyArray) -> Array:
-    """Widens floating-point numbers, rounds longer ones; integers that float64 does not have are refused."""
+def _in_float64(name: str, array: AnyArray, first: int = 0) -> Array:
+    """Widens floating-point numbers, rounds longer ones; refuses integers that float64 does not have, and infinity."""
     with np.errstate(over="ignore"):  # a long double out of range becomes infinite, and is refused as such
         converted = np.asarray(array, dtype="<f8", order="C")
     if array.dtype.kind in "iu" and array.dtype.itemsize > 4:
         # Beyond the largest integer a cast back has no meaning: what rounded up to that is not exact for sure.
         beyond = converted >= 2.0 ** (8 * array.dtype.itemsize - (array.dtype.kind == "i"))
         back = np.where(beyond, 0, converted).astype(array.dtype)
-        _refuse_first(name, beyond | (back != array), array, "which float64 does not have: beyond 2**53 it has gaps")
+        gaps = "which float64 does not have: beyond 2**53 it has gaps"
+        _refuse_first(name, beyond | (back != array), array, gaps, first)
+    _refuse_first(name, ~np.isfinite(converted), converted, "and only finite numbers can be sent", first)
     return converted
 
 
@@ -169,9 +173,10 @@ def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[in
     return f": rows are {rows}" + (f"; it looks transposed, send {name}.T" if transposed else "")
 
 
-def _refuse_first(name: str, bad: npt.NDArray[np.bool_], array: AnyArray | None, why: str) -> None:
-    """Refuses an array by the first of its bad entries."""
+def _refuse_first(name: str, bad: npt.NDArray[np.bool_], array: AnyArray | None, why: str, first: int = 0) -> None:
+    """Refuses an array by the first of its bad entries; its rows are counted from `first`."""
     if bad.any():
         place = np.unravel_index(int(np.argmax(bad)), bad.shape)
         what = "masked" if array is None else array[place]
-        raise ValueError(f"{name}{[int(i) for i in place] or ''} is {what}, {why}")
+        at = [int(i) + (first if axis == 0 else 0) for axis, i in enumerate(place)]
+        raise ValueError(f"{name}{at or ''} is {what}, {why}")

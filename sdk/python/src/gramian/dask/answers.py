@@ -10,6 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import dask.array as da
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..arrays import read
+from ..tensors import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +30,9 @@ class Normals:
     normal_deviations
         `[n]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it.
     reasons
-        `[n]`, text: why a point has no normal or a doubtful one, as in `gramian.DegenerateReason`; empty for all
-        others.
+        `[n]`, text: why a point has no normal or a doubtful one, as in `gramian.DegenerateReason`;
+        `uncertain_orientation` where its side is nearly a matter of chance, `other_hyperparameters` where its tile
+        learned something else than the cloud; empty for all others.
     """
 
     normals: da.Array
@@ -64,8 +70,9 @@ class Curvatures:
     gaussian_curvature_deviations
         `[n]`, 1/L^(d − 1).
     reasons
-        `[n]`, text: why a point has no curvatures or doubtful ones, as in `gramian.DegenerateReason`; empty for all
-        others.
+        `[n]`, text: why a point has no curvatures or doubtful ones, as in `gramian.DegenerateReason`;
+        `uncertain_orientation` where its side is nearly a matter of chance, `other_hyperparameters` where its tile
+        learned something else than the cloud; empty for all others.
     """
 
     principal_curvatures: da.Array
@@ -116,7 +123,8 @@ class SparseOperator:
         `[n, n]`, a Dask array whose blocks are rows as `scipy.sparse.csr_matrix`; `compute()` makes one matrix of them.
         Rows have no entries where there is no value.
     reasons
-        `[n]`, text: why a row is empty or doubtful, as in `gramian.DegenerateReason`; "" for all others.
+        `[n]`, text: why a row is empty or doubtful, as in `gramian.DegenerateReason`, or `other_hyperparameters`
+        where its tile learned something else than the cloud; "" for all others.
     """
 
     matrices: tuple[da.Array, ...]
@@ -127,8 +135,14 @@ class SparseOperator:
 
         Every block of rows sees all values, so these are to fit into memory.
         """
-        whole = da.asarray(values).rechunk(-1)
+        array = values if isinstance(values, da.Array) else da.from_array(read("values", values))
+        whole = array.rechunk(-1)
         return tuple(
-            da.map_blocks(lambda rows, all_values: rows @ all_values, matrix, whole, drop_axis=1, dtype=float)
+            da.map_blocks(_product, matrix, whole, drop_axis=1, dtype=float, meta=np.empty(0))
             for matrix in self.matrices
         )
+
+
+def _product(rows: csr_matrix, values: Array) -> Array:
+    product: Array = rows @ read("values", values)
+    return product

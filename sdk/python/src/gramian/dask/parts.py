@@ -16,6 +16,9 @@ from .thinning import distinct
 SLACK = 1 + 1e-9
 """By how much more is taken than distances say, which are rounded."""
 
+MAX_FOUND = 10_000_000
+"""Neighbours that are held at once; rims of noisy clouds have thousands for each place that looks for them."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -83,24 +86,8 @@ class Reach:
         return part[distinct(part.points)] if self.are_distinct else part
 
 
-def checked(block: Array, first: int) -> Array:
-    """Returns a block as float64, row by row.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite.
-    """
-    block = np.ascontiguousarray(block, dtype=np.float64)
-    if not np.isfinite(block).all():
-        row, axis = np.argwhere(~np.isfinite(block))[0].tolist()
-        raise ValueError(f"points[{first + row}, {axis}] is {block[row, axis]}, and only finite numbers can be sent")
-    return block
-
-
 def split(block: Array, first: int, cut: Cut, values: Array | None = None) -> list[Part]:
     """Sorts the rows of a block, of which the first is row `first` of the cloud, into cells."""
-    block = checked(block, first)
     cells = cut.cells_of(block)
     order = np.argsort(cells, kind="stable")
     bounds = np.searchsorted(cells[order], np.arange(cut.n_cells + 1))
@@ -152,11 +139,15 @@ def rim(core: Part, looking: Looking, reach: Reach) -> Part:
 
 def nearest(part: Part, places: Array, reach: Reach, radii: Array | None = None) -> Ints:
     """Returns the rows of a part that are among the nearest of some stretched places `[n, d]`; ascending, each once."""
+    is_near = np.zeros(len(part), dtype=bool)
     count = min(reach.count, len(part))
-    bound = np.inf if radii is None else float(radii.max()) * 2
-    distances, rows = cKDTree(reach.stretched(part.points)).query(places, count, distance_upper_bound=bound)
-    distances, rows = distances.reshape(len(places), count), rows.reshape(len(places), count)
-    found = np.isfinite(distances)
-    if radii is not None:
-        found &= distances <= (radii * SLACK)[:, None]
-    return np.unique(rows[found])
+    if count == 0:
+        return np.arange(0)
+    tree, step = cKDTree(reach.stretched(part.points)), max(MAX_FOUND // count, 1)
+    for first in range(0, len(places), step):
+        some = slice(first, first + step)
+        within = np.full(len(places[some]), np.inf) if radii is None else radii[some] * SLACK
+        distances, rows = tree.query(places[some], count, distance_upper_bound=float(within.max()) * 2)
+        distances, rows = distances.reshape(-1, count), rows.reshape(-1, count)
+        is_near[rows[np.isfinite(distances) & (distances <= within[:, None])]] = True
+    return np.flatnonzero(is_near)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -20,7 +21,16 @@ ROUNDS = 4
 """How often all replicas are asked before a task gives up; Dask's own retries come on top."""
 
 PAUSE_SECONDS = 1.0
-"""The wait after the first round; doubled from one to the next."""
+"""The wait after the first round; doubled from one to the next. Longer where replicas ask for more."""
+
+MAX_PAUSE_SECONDS = 60.0
+"""What they may ask for."""
+
+CONNECT_SECONDS = 10.0
+"""The wait for a connection: a machine that is lost says nothing at all."""
+
+SILENT_SECONDS = 30.0
+"""How long a replica that did not answer is asked after all others, by this process."""
 
 DEADLINE_EXCEEDED = 504
 """What would take as long anywhere else."""
@@ -35,7 +45,7 @@ class Replicas:
     urls
         Addresses, as for `gramian.Client`.
     api_key
-        One for all; None if they want none.
+        One for all, which travels with the tasks; None for that of the environment of each worker, if it has one.
     timeout
         Seconds to wait for each next part of an answer.
     """
@@ -64,17 +74,39 @@ class Replicas:
         httpx.TransportError
             If none answers after all rounds.
         """
-        attempts = ROUNDS * len(self.urls)
-        for attempt in range(attempts):
-            url = self.urls[(first + attempt) % len(self.urls)]
-            try:
-                return call(_client(url, self.api_key, self.timeout, os.getpid()))
-            except (Problem, httpx.TransportError) as error:
-                if attempt + 1 == attempts or not _may_work_elsewhere(error):
-                    raise
-            if (attempt + 1) % len(self.urls) == 0:
-                time.sleep(PAUSE_SECONDS * 2 ** (attempt // len(self.urls)))
+        for round_ in range(ROUNDS):
+            waits = [PAUSE_SECONDS * 2**round_]
+            for at, url in enumerate(urls := self._in_turn(first)):
+                try:
+                    answer = call(_client(url, self.api_key, self.timeout, os.getpid()))
+                except (Problem, httpx.TransportError) as error:
+                    is_last = (round_, at) == (ROUNDS - 1, len(urls) - 1)
+                    if is_last or not _may_work_elsewhere(error):
+                        raise
+                    waits.append(_noted(url, error))
+                else:
+                    _silent.pop(url, None)
+                    return answer
+            time.sleep(max(waits))
         raise AssertionError("a replica answers or raises")
+
+    def _in_turn(self, first: int) -> list[str]:
+        """Returns the addresses from number `first` on, those that did not answer lately after all others."""
+        start, now = first % len(self.urls), time.monotonic()
+        urls = self.urls[start:] + self.urls[:start]
+        return sorted(urls, key=lambda url: _silent.get(url, now) > now)
+
+
+_silent: dict[str, float] = {}
+"""Addresses that did not answer, with the time until which they are asked last. Of this process."""
+
+
+def _noted(url: str, error: Problem | httpx.TransportError) -> float:
+    """Remembers who is silent; returns the seconds that the others ask for."""
+    if isinstance(error, Problem):
+        return min(error.retry_after or 0.0, MAX_PAUSE_SECONDS)
+    _silent[url] = time.monotonic() + SILENT_SECONDS
+    return 0.0
 
 
 def _may_work_elsewhere(error: Problem | httpx.TransportError) -> bool:
@@ -85,5 +117,7 @@ def _may_work_elsewhere(error: Problem | httpx.TransportError) -> bool:
 
 @lru_cache(maxsize=64)
 def _client(url: str, api_key: str | None, timeout: float, process: int) -> Client:  # noqa: ARG001 (a key of the cache)
-    """Returns the client of a replica, one for all threads of a process."""
-    return Client(url, api_key=api_key, timeout=timeout, retries=1)
+    """Returns the client of a replica, one for all threads of a process. `ask` tries again, elsewhere."""
+    seconds = None if timeout == math.inf else timeout
+    bounds = httpx.Timeout(seconds, connect=min(timeout, CONNECT_SECONDS))
+    return Client(url, api_key=api_key, timeout=bounds, retries=0)

@@ -16,15 +16,22 @@ from ..tensors import Array
 from .cut import Ints
 from .replicas import Replicas
 from .settling import Settled
+from .signs import Sides
 
 Rows: TypeAlias = dict[str, Any]
 """Arrays by name with a row for each of `index`, the rows of a cloud or of queries, ascending."""
 
 REASON = "U24"
 
+OTHER_HYPERPARAMETERS = "other_hyperparameters"
+"""The tile learned something else than the cloud."""
 
-def surface(replicas: Replicas, settled: Settled, sides: Array, what: str, deviations: bool) -> Rows:
-    """Asks for normals or curvatures at the points of a cell; `sides` are the signs of its regions."""
+UNCERTAIN_ORIENTATION = "uncertain_orientation"
+"""What says which side of a connected piece is outward says little."""
+
+
+def surface(replicas: Replicas, settled: Settled, sides: Sides, what: str, deviations: bool) -> Rows:
+    """Asks for normals or curvatures at the points of a cell; `sides` are those of its regions."""
     tile = settled.tile
     if len(tile.own) == 0:
         return {}
@@ -35,9 +42,10 @@ def surface(replicas: Replicas, settled: Settled, sides: Array, what: str, devia
         return ask(solver="local", deviations=deviations)
 
     answer = replicas.ask(tile.number, call)
-    rows: Rows = {"index": tile.rows, "reasons": _reasons(answer.degenerate, len(tile.points))[tile.own]}
-    rows |= _turned(_arrays(answer), sides[settled.labels], answer.normals.shape[1], tile.own)
-    return rows
+    reasons = _reasons(answer.degenerate, settled)
+    reasons[(reasons == "") & sides.are_doubtful[settled.labels[tile.own]]] = UNCERTAIN_ORIENTATION
+    turned = _turned(_arrays(answer), sides.signs[settled.labels], answer.normals.shape[1], tile.own)
+    return {"index": tile.rows, "reasons": reasons, **turned}
 
 
 def operator(replicas: Replicas, settled: Settled, what: str, n_points: int) -> Rows:
@@ -55,7 +63,7 @@ def operator(replicas: Replicas, settled: Settled, what: str, n_points: int) -> 
         return list(of_gradients.matrices), of_gradients.degenerate
 
     matrices, degenerate = replicas.ask(tile.number, call)
-    rows: Rows = {"index": tile.rows, "reasons": _reasons(degenerate, len(tile.points))[tile.own]}
+    rows: Rows = {"index": tile.rows, "reasons": _reasons(degenerate, settled)}
     for component, matrix in enumerate(matrices):
         own = matrix[tile.own]
         entries = (own.data, tile.index[own.indices], own.indptr)
@@ -87,7 +95,10 @@ def _turned(arrays: Mapping[str, Array], signs: Array, dimension: int, rows: Int
     return found
 
 
-def _reasons(degenerate: tuple[Degenerate, ...], count: int) -> npt.NDArray[np.str_]:
-    reasons = np.zeros(count, dtype=REASON)
+def _reasons(degenerate: tuple[Degenerate, ...], settled: Settled) -> npt.NDArray[np.str_]:
+    """Returns why answers at the points of the cell are doubtful; what the service says of one comes first."""
+    reasons = np.zeros(len(settled.tile.points), dtype=REASON)
     reasons[[entry.query for entry in degenerate]] = [entry.reason.value for entry in degenerate]
-    return reasons
+    if not settled.is_alike:
+        reasons[reasons == ""] = OTHER_HYPERPARAMETERS
+    return reasons[settled.tile.own]

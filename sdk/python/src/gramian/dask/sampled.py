@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from . import graph
 from .parts import Part, Reach, join
-from .plan import PROBE_POINTS, Plan
+from .plan import PROBE_POINTS, REGRESSED, Plan
 from .replicas import Replicas
 from .settling import Learned, Settled, learn, orient, settle
 from .signs import joined
@@ -21,9 +21,6 @@ from .tile import assemble
 
 AROUND = {2: 24, 3: 48, 4: 96}
 """Positions that answers depend on, by dimension: regressions see 16, 30 or 50 of them, stencils 13, 38 or 88."""
-
-REGRESSED = {2: 16, 3: 30, 4: 50}
-"""Those of regressions."""
 
 GROUPS = (1, 3, 8, 24, 72, 216, 648)
 """Points of which regressions take means, where there is noise: src/numerics/patches/mod.rs."""
@@ -43,10 +40,13 @@ The service takes 0.95. What lies between depends on which points a mean happens
 MORE = (48, 64, 96, 160, 320)
 """Positions around each site that tiles carry instead, one after the other, while they learn something else."""
 
+MAX_AROUND = 2500
+"""Those at most: a quarter of a million points that each tile carries."""
+
 
 @dataclass(frozen=True)
 class SurfaceTiles:
-    """Delayed: a `Settled` tile for each cell, and the signs of its regions."""
+    """Delayed: a `Settled` tile for each cell, and the `Sides` of its regions."""
 
     tiles: list[Any]
     sides: list[Any]
@@ -63,10 +63,12 @@ class SurfaceTiles:
         if plan.dimension not in AROUND:
             raise ValueError(f"surfaces in tiles have 2, 3 or 4 coordinates, not {plan.dimension}")
         learned, factor = decide(replicas, plan)
-        counts = ((REGRESSED[plan.dimension] + 2) * factor, *MORE)
+        first = (REGRESSED[plan.dimension] + 2) * factor
+        counts = [first, *[count for count in MORE if count > first]]
+        plan = plan.reaching(points, min(first, MAX_AROUND))
         carried, *more = [join([plan.around_sites(count), plan.extremes]) for count in counts]
         sites = plan.sites.index
-        coarse = dask.delayed(orient, pure=True)(replicas, plan.coarse, learned.noise)
+        coarse = dask.delayed(orient(plan.coarse, learned.noise), pure=True)
         cores = graph.cores(points, plan)
         rims = graph.rims(cores, plan, Reach(AROUND[plan.dimension] * factor))
         shared, others, spare = (dask.delayed(part, pure=True) for part in (carried, more, plan.spare))
@@ -81,9 +83,9 @@ def sides(tiles: list[Any]) -> list[Any]:
     attribute, share = dask.delayed(getattr, pure=True), dask.delayed(Settled.shared, pure=True)
     regions = [attribute(tile, "regions") for tile in tiles]
     halos = dask.delayed(list, pure=True)([attribute(of_tile, "halo") for of_tile in regions])
-    signs = dask.delayed(joined, pure=True)(regions, [share(tile, halos) for tile in tiles])
+    of_all = dask.delayed(joined, pure=True)(regions, [share(tile, halos) for tile in tiles])
     of_cell = dask.delayed(getitem, pure=True)
-    return [of_cell(signs, cell) for cell in range(len(tiles))]
+    return [of_cell(of_all, cell) for cell in range(len(tiles))]
 
 
 def decide(replicas: Replicas, plan: Plan) -> tuple[Learned, int]:

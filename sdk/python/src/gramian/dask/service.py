@@ -48,8 +48,10 @@ class Service:
 
         Raises
         ------
+        TypeError
+            If they are something else than real numbers.
         ValueError
-            If there are no points, or other axes than these.
+            If there are no points, other axes than these, or a number that is masked or not finite.
         """
         array = graph.rows_of(points)
         count = -(-len(array) // TILE_POINTS) if n_tiles is None else n_tiles
@@ -69,9 +71,10 @@ def connect(urls: str | Iterable[str] | None = None, *, api_key: str | None = No
     urls : str or several, optional
         Their addresses; if absent that of the environment variable `GRAMIAN_URL`, or `http://127.0.0.1:8080`.
     api_key : str, optional
-        A key, where they want one; if absent the environment variable `GRAMIAN_API_KEY`, as it is here.
+        A key, where they want one; if absent the environment variable `GRAMIAN_API_KEY` of each worker, as it is there.
+        One that is given is part of the tasks, so that Dask's scheduler and all who see its graphs have it as well.
     timeout : float, optional
-        Seconds to wait for each next part of an answer.
+        Seconds to wait for each next part of an answer; a connection is waited for 10 s at most.
 
     Raises
     ------
@@ -82,4 +85,4 @@ def connect(urls: str | Iterable[str] | None = None, *, api_key: str | None = No
     addresses = (given,) if isinstance(given, str) else tuple(given)
     if not addresses:
         raise ValueError("urls has no address")
-    return Service(Replicas(addresses, api_key or os.environ.get("GRAMIAN_API_KEY"), timeout))
+    return Service(Replicas(addresses, api_key, timeout))

@@ -2,13 +2,12 @@
 
 Where the cloud has noise the service tries means of points instead of points, and takes what promises less deviation.
 Which points a mean is of differs from tile to tile, so that a tile may decide otherwise than the cloud. It is asked,
-and if so is given more of the neighbourhoods that are learned from until it does not. The replica keeps what it
-computed for the answers.
+and if so is given more of the neighbourhoods that are learned from until it does not, or there are no more; then the
+answers at its points say so. The replica keeps what it computed for the answers.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,8 +20,8 @@ from ..tensors import Array
 from .cut import Ints
 from .parts import Part
 from .plan import N_SITES
+from .regions import Regions
 from .replicas import Replicas
-from .signs import Regions
 from .thinning import scales
 from .tile import Tile, widened
 
@@ -66,14 +65,11 @@ class Coarse:
     ----------
     part
         The points `[c, d]`.
-    normals
-        `[c, d]`, consistent and outward; NaN where there is none.
     fit
         Kernel, α and solver.
     """
 
     part: Part
-    normals: Array
     fit: Fit
 
     def directions(self, client: Client, points: Array) -> Array:
@@ -101,14 +97,12 @@ def learn(replicas: Replicas, tile: Tile) -> Learned:
     return replicas.ask(0, call)
 
 
-def orient(replicas: Replicas, part: Part, noise: float) -> Coarse:
-    """Fits the coarse cloud as the service does for local regressions, and asks for its normals."""
+def orient(part: Part, noise: float) -> Coarse:
+    """Says how the coarse cloud is fitted: as the service does for local regressions."""
     extent, spacing = scales(part.points)
     length_scale = max(0.45 * extent, 4 * spacing)
     kernel = Kernel("laplace", length_scale=length_scale, epsilon=(0.4 * spacing / length_scale) ** 2)
-    fit = Fit(solver="dense", kernel=kernel, alpha=max(1e-3, 5 * (noise / spacing) ** 1.5))
-    normals = replicas.ask(0, lambda client: client.cloud(part.points).normals(**fit).normals)
-    return Coarse(part, normals, fit)
+    return Coarse(part, Fit(solver="dense", kernel=kernel, alpha=max(1e-3, 5 * (noise / spacing) ** 1.5)))
 
 
 @dataclass(frozen=True)
@@ -125,19 +119,22 @@ class Settled:
         `[n]`. The region of each point, 0 for those that are neither in its cell nor in the halo.
     regions
         What they say of one another.
+    is_alike
+        Whether it learns what the cloud would, and not something else in spite of all that it was given.
     """
 
     tile: Tile
     directions: Array
     labels: Ints
     regions: Regions
+    is_alike: bool
 
     @classmethod
-    def of(cls, client: Client, tile: Tile, directions: Array, coarse: Coarse) -> Settled:
+    def of(cls, client: Client, tile: Tile, directions: Array, coarse: Coarse, is_alike: bool) -> Settled:
         """Asks for normals, and finds the regions."""
         normals = client.cloud(tile.points, directions).normals(solver="local").normals
         labels = np.zeros(len(tile.points), dtype=np.int64)
-        near, known = np.flatnonzero(tile.is_near), ~np.isnan(coarse.normals[:, 0])
+        near = np.flatnonzero(tile.is_near)
         place = np.empty(len(tile.points), dtype=np.int64)
         place[near] = np.arange(len(near))
         labels[near], regions = Regions.of(
@@ -146,9 +143,9 @@ class Settled:
             normals=np.nan_to_num(normals[near]),
             outward=directions[near],
             own=place[tile.own],
-            coarse=(coarse.part.index[known], coarse.normals[known]),
+            coarse=coarse.part.index,
         )
-        return cls(tile, directions, labels, regions)
+        return cls(tile, directions, labels, regions, is_alike)
 
     def cloud(self, client: Client) -> Cloud:
         """Returns it as a cloud of a replica, with these sides."""
@@ -168,14 +165,12 @@ def settle(
     def call(client: Client) -> Settled:
         candidate, directions = tile, coarse.directions(client, tile.points)
         for carried in [*more, None]:
-            if learned.is_like(_learned(client.cloud(candidate.points, directions))):
-                break
-            if carried is None:
-                logging.getLogger(__name__).warning("tile %d learns something else than the cloud", tile.number)
-                break
+            is_alike = learned.is_like(_learned(client.cloud(candidate.points, directions)))
+            if is_alike or carried is None:
+                return Settled.of(client, candidate, directions, coarse, is_alike)
             candidate = widened(tile, carried, sites, spare)
             directions = coarse.directions(client, candidate.points)
-        return Settled.of(client, candidate, directions, coarse)
+        raise AssertionError("the last one is taken as it is")
 
     return replicas.ask(tile.number, call)
 

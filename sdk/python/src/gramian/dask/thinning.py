@@ -59,8 +59,11 @@ def distinct(points: Array) -> Ints:
 def scales(points: Array) -> tuple[float, float]:
     """Returns two lengths of distinct points `[n, d]`, L: the root mean square distance to the centroid, and h₄.
 
-    h₄ is the median over the points of the mean distance to the 4 nearest others.
+    h₄ is the median over the points of the mean distance to the 4 nearest others. Both are 1 for one point alone, which
+    has no scale, as in the service.
     """
+    if len(points) < 2:
+        return 1.0, 1.0
     count = min(5, len(points))
     distances, _ = cKDTree(points).query(points, count)
     means = np.sort(np.reshape(distances, (len(points), count))[:, 1:].mean(axis=1))

@@ -37,10 +37,10 @@ class Tiles:
         What tiles have in common: cells, coarse cloud, samples.
     """
 
-    def __init__(self, replicas: Replicas, points: npt.ArrayLike | da.Array, n_tiles: int) -> None:
-        """Looks at the points; `Service.tiles` makes tiles."""
+    def __init__(self, replicas: Replicas, points: da.Array, n_tiles: int) -> None:
+        """Looks at the points, in blocks of rows; `Service.tiles` makes tiles."""
         self._replicas = replicas
-        self._points = graph.rows_of(points)
+        self._points = points
         self._surface: SurfaceTiles | None = None
         self.plan = Plan.of(self._points, n_tiles)
 
@@ -113,7 +113,7 @@ class Tiles:
         fit = ValuesFit(solver="dense", kernel=kernel, alpha=alpha, mean=mean)
         law = kriging.given_law(fit) or self._law(own, fit)
         cores = graph.cores(self._points, self.plan, own)
-        asked = self._points if queries is None else graph.rows_of(queries)
+        asked = self._points if queries is None else graph.rows_of(queries, "queries", self.plan.dimension)
         wanted = cores if queries is None else graph.cores(asked, self.plan)
         rims = graph.rims(cores, self.plan, kriging.reach_of(law.kernel), wanted)
         krige = dask.delayed(kriging.krige, pure=True)
@@ -132,7 +132,7 @@ class Tiles:
 
     def _law(self, values: da.Array, fit: ValuesFit) -> kriging.Law:
         rows = self.plan.learning.index
-        sample = parts.Part(rows, self.plan.learning.points, np.asarray(values[rows].compute(), dtype=np.float64))
+        sample = parts.Part(rows, self.plan.learning.points, values[rows].compute())
         law: kriging.Law = dask.delayed(kriging.learn_law)(self._replicas, sample, fit).compute()
         return law
 
