@@ -91,6 +91,12 @@ ROWS = {
             {"{{instance}}": f"{gauge('gramian_compute_admitted')} / {gauge('gramian_compute_places')}"},
             "At 100 % the next request is answered 503.",
         ),
+        (
+            "Jobs",
+            "none",
+            {"{{status}}": f"sum by (status) ({gauge('gramian_jobs')})"},
+            "Asked for with Prefer: respond-async. As many run at a replica as it has threads; more wait.",
+        ),
         ("Requests in flight", "none", {"{{instance}}": gauge("gramian_http_requests_in_flight")}, ""),
         (
             "Cores in use",

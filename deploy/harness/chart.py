@@ -1,10 +1,11 @@
-"""The Helm chart, by Helm's own engine and the schemas of Kubernetes; compose.yaml, without its program."""
+"""The Helm chart, by Helm's own engine and the schemas of Kubernetes; what else the fleet has, without its programs."""
 
 import re
 
 import helm_python as helm
 import kubernetes_validate
 import yaml
+from cluster import cluster
 from fleet import DEPLOY, REPLICAS
 
 CHART = DEPLOY / "helm/gramian"
@@ -49,17 +50,44 @@ def check(report):
     text = "".join(chart.render(VARIANTS["keys and store"][0], name="gramian", namespace="test").values())
     missing = [value for value in WRITTEN if f"value: {value}" not in text]
     report.line("the chart's settings as the server reads them, missing", missing or "none", not missing)
+    pod = stateful_set(rendered(chart, {**OPEN, **STORE}))["template"]["spec"]
+    variables = {variable["name"]: variable["value"] for variable in pod["containers"][0]["env"]}
+    required, linked = variables["GRAMIAN_STORE_REQUIRED"], pod["enableServiceLinks"]
+    report.line("chart: ready only while the store takes clouds", required, required == "0")
+    report.line("chart: variables of services beside those of the server", linked, not linked)
+    scaling(report, chart)
     compare_routers(report, rendered(chart, {**OPEN, "router": {"replicas": 1}}))
     compose(report)
+    envoy(report)
 
 
-def rendered(chart, values):
-    """The objects that the chart makes."""
-    files = chart.render(values, name="gramian", namespace="test")
+def rendered(chart, values, live=None):
+    """The objects that the chart makes, of a cluster that is asked for those that are there."""
+    release = {"name": "gramian", "namespace": "test"}
+    files = live.render(chart, values, **release) if live else chart.render(values, **release)
     documents = [
         document for name, text in files.items() if name.endswith(".yaml") for document in yaml.safe_load_all(text)
     ]
     return [document for document in documents if document]
+
+
+def scaling(report, chart):
+    """Who turns autoscaling on keeps the replicas that are there."""
+
+    def n_replicas(n, is_on, live=None):
+        values = {**OPEN, "replicas": n, "autoscaling": {"enabled": is_on, "minReplicas": 3}}
+        return stateful_set(rendered(chart, values, live))["replicas"]
+
+    new = [n_replicas(2, False), n_replicas(2, True), n_replicas(4, True)]
+    report.line("chart: replicas where none are, 2 without autoscaling, 2 and 4 with it", new, new == [2, 3, 4])
+    with cluster("gramian", "test", 7) as live:
+        kept = [n_replicas(2, False, live), n_replicas(2, True, live)]
+    report.line("chart: replicas where 7 are, 2 without autoscaling and with it", kept, kept == [2, 7])
+
+
+def stateful_set(documents):
+    """What the replicas are."""
+    return next(document["spec"] for document in documents if document["kind"] == "StatefulSet")
 
 
 def faults(document):
@@ -114,3 +142,16 @@ def compose(report):
     absent += [name for service in services.values() for name in service.get("depends_on", {}) if name not in services]
     absent += [name for name in REPLICAS if name not in services]
     report.line("compose.yaml: files and services that are missing", absent or "none", not absent)
+    lines = (DEPLOY / ".gitignore").read_text().splitlines()
+    secrets = {f"deploy/{line.strip('/')}" for line in lines if line.startswith("/")}
+    sent = secrets - set((DEPLOY.parent / ".dockerignore").read_text().splitlines())
+    report.line("compose.yaml: secrets that are sent to the build of the image", sorted(sent) or "none", not sent)
+
+
+def envoy(report):
+    """No route has an end for whole answers: those that stream, such as events of jobs, have none."""
+    text = (DEPLOY / "envoy/envoy.yaml").read_text()
+    timeouts = re.findall(r"^ +cluster: replicas\n +timeout: (\S+)$", text, re.MULTILINE)
+    n_routes = len(re.findall(r"^ +route:$", text, re.MULTILINE))
+    holds = timeouts == ["0s"] * n_routes and n_routes > 0
+    report.line("envoy.yaml: ends of whole answers, by route", timeouts, holds)

@@ -5,7 +5,8 @@ import signal
 import time
 from pathlib import Path
 
-from processes import Failed, free_port, get, put
+import yaml
+from processes import Failed, free_port, get, post, put
 
 DEPLOY = Path(__file__).parent.parent
 REPLICAS = ("replica-1", "replica-2", "replica-3")
@@ -28,15 +29,24 @@ class Fleet:
         self.processes.start(
             "s3", ["moto_server", "-H", "127.0.0.1", "-p", port], ready=f"{self.store}/moto-api/data.json"
         )
-        put(f"{self.store}/gramian")
+        self.make_bucket()
         for name in REPLICAS:
             self.start_replica(name)
+
+    def make_bucket(self):
+        """Makes the bucket, without anything in it."""
+        put(f"{self.store}/gramian")
+
+    def lose_bucket(self):
+        """Takes the bucket away with all that is in it: the store refuses writes from now on."""
+        post(f"{self.store}/moto-api/reset")
 
     def start_replica(self, name):
         """Starts one, and waits until it is ready."""
         variables = {
             "GRAMIAN_BIND": f"127.0.0.1:{self.ports[name]}",
             "GRAMIAN_STORE": "s3://gramian/clouds",
+            "GRAMIAN_STORE_REQUIRED": store_required(),
             "GRAMIAN_THREADS": "2",
             "GRAMIAN_MEMORY_BYTES": str(1 << 30),
             "GRAMIAN_DRAIN_SECONDS": DRAIN_SECONDS,
@@ -85,6 +95,12 @@ class Fleet:
         return path
 
 
+def store_required():
+    """Whether the shipped fleet is ready only while the store takes what it is given."""
+    services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
+    return services[REPLICAS[0]]["environment"]["GRAMIAN_STORE_REQUIRED"]
+
+
 def wait_until(holds, what):
     """Waits until something holds; `Failed` if it does not for twenty seconds."""
     until = time.monotonic() + 20
@@ -101,7 +117,12 @@ def metric(text, family, labels=""):
 
 
 class Router:
-    """What the three have in common."""
+    """What the three have in common.
+
+    `counts_kept_connections`: whether a try on a connection that was kept from a request before counts as one.
+    """
+
+    counts_kept_connections = True
 
     def __init__(self, fleet):
         self.fleet, self.port = fleet, free_port()
@@ -147,6 +168,7 @@ class Nginx(Router):
     """The router for those who have nginx."""
 
     name = "nginx"
+    counts_kept_connections = False
 
     def start(self):
         """Starts it with the shipped configuration."""

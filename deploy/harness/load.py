@@ -1,6 +1,8 @@
 """Clients at once, and what became of their requests."""
 
+import http.client
 import itertools
+import json
 import math
 import random
 import threading
@@ -13,7 +15,10 @@ import numpy as np
 
 N_CLIENTS = 8
 N_POINTS, N_MANY_POINTS = 120, 1500
+# Seconds of work, a quarter of the memory of a replica here.
+N_LONG_POINTS = 8000
 FIT = {"kernel": gramian.Kernel("matern", length_scale=0.4), "alpha": 1e-6}
+FIT_IN_JSON = {"kernel": {"family": "matern", "length_scale": 0.4}, "alpha": 1e-6}
 GOLDEN = math.pi * (1 + math.sqrt(5))
 
 
@@ -37,6 +42,33 @@ def points(seed, n=None):
 def values(cloud_points):
     """Something to interpolate."""
     return np.sin(3 * cloud_points[:, 0]) + cloud_points[:, 2]
+
+
+class Long:
+    """A request that a replica works on for seconds, of a client that repeats nothing."""
+
+    def __init__(self, url):
+        cloud_points = points(new_seeds(), N_LONG_POINTS)
+        with httpx.Client(base_url=url, timeout=60) as registering:
+            response = registering.post("/v1/clouds", json={"points": cloud_points.tolist()})
+        cloud = response.raise_for_status().headers["gramian-cloud"]
+        request = {"cloud": {"id": cloud}, "values": values(cloud_points).tolist(), "queries": [[0.0, 0.0, 1.0]]}
+        request |= {**FIT_IN_JSON, "solver": "dense"}
+        headers = {"Content-Type": "application/json", "Gramian-Cloud": cloud}
+        self.outcome = None
+        self._connection = http.client.HTTPConnection(url.removeprefix("http://"), timeout=120)
+        self._connection.request("POST", "/v1/interpolation", json.dumps(request), headers)
+
+    def leave(self):
+        """Ends the connection, without waiting for an answer."""
+        self._connection.close()
+
+    def wait(self):
+        """Waits for the answer; `outcome` is its status, or why there is none."""
+        try:
+            self.outcome = self._connection.getresponse().status
+        except (OSError, http.client.HTTPException) as error:
+            self.outcome = type(error).__name__
 
 
 class Load:

@@ -7,7 +7,7 @@ import sys
 import chart
 import observed
 from fleet import Envoy, Fleet, Haproxy, Nginx
-from phases import Report, hit_rate, kill, rolling_restart, running, smoke
+from phases import Report, deadly, hit_rate, kill, leave, refusing_store, rolling_restart, running, silent_store, smoke
 from processes import Failed, Processes
 
 
@@ -37,18 +37,25 @@ def run(report, processes, binary):
     fleet.start()
     prometheus.start()
     with running(fleet, Haproxy(fleet)) as router:
-        smoke(report, router)
-        hit_rate(report, fleet, router)
-        kill(report, fleet, router)
-        rolling_restart(report, fleet, router)
+        behind(report, fleet, router)
         observed.dashboard(report, prometheus)
         observed.alerts(report, prometheus)
+        refusing_store(report, fleet, router)
+        silent_store(report, fleet, router)
     for router in (Nginx(fleet), Envoy(fleet)):
         with running(fleet, router):
-            smoke(report, router)
-            hit_rate(report, fleet, router)
-            kill(report, fleet, router)
-            rolling_restart(report, fleet, router)
+            behind(report, fleet, router)
+
+
+def behind(report, fleet, router):
+    """What holds behind every router."""
+    smoke(report, router)
+    leave(report, fleet, router)
+    hit_rate(report, fleet, router)
+    kill(report, fleet, router)
+    if router.counts_kept_connections:
+        deadly(report, fleet, router)
+    rolling_restart(report, fleet, router)
 
 
 if __name__ == "__main__":

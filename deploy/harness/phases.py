@@ -1,16 +1,25 @@
 """What is done to the fleet, and what has to hold."""
 
 import contextlib
+import threading
 import time
 
 import httpx
-from fleet import REPLICAS, metric
-from load import FIT, Load, new_seeds, points, repeat, values
+from fleet import REPLICAS, metric, wait_until
+from load import FIT, FIT_IN_JSON, N_POINTS, Load, Long, new_seeds, points, repeat, values
 from processes import get
 
 # Under load before and after something happens.
 SECONDS_BEFORE, SECONDS_AFTER = 4, 6
+# Longer than a router waits until a replica that is not ready loses its clouds.
+SECONDS_REFUSING = 15
+# A cloud in memory is taken to be in the store for so long. Then that has five seconds for an answer to each of a few
+# questions.
+SECONDS_TRUSTED, SECONDS_SILENT = 11, 25
 PREPARED = "gramian_solvers_prepared_total"
+REQUESTS = "gramian_http_requests_total"
+RUNNING, ADMITTED = "gramian_compute_running", "gramian_compute_admitted"
+UP_TO_DATE = "gramian_store_up_to_date"
 N_LARGE_POINTS = 20_000
 
 
@@ -48,6 +57,85 @@ def smoke(report, router):
         statuses,
         statuses == (201, 200, 200, 404),
     )
+
+
+def leave(report, fleet, router):
+    """A client leaves while a large cloud is factorized: the replica is told, and has its place for others again."""
+    before = fleet.total(REQUESTS, 'status="499"')
+    request = Long(router.url)
+    wait_until(lambda: fleet.total(RUNNING) > 0, "somebody computes")
+    # In the middle of it: it takes several seconds in all.
+    time.sleep(0.5)
+    n_running = fleet.total(RUNNING)
+    request.leave()
+    began = time.monotonic()
+    wait_until(lambda: fleet.total(RUNNING) + fleet.total(ADMITTED) == 0, "nobody computes for a client that left")
+    seconds = time.monotonic() - began
+    n_left = fleet.total(REQUESTS, 'status="499"') - before
+    what = f"{router.name}: computing, counted as left, seconds until its place is free, of a client that left"
+    figures = (f"{n_running:.0f}", f"{n_left:.0f}", f"{seconds:.1f}")
+    report.line(what, ", ".join(figures), n_running > 0 and n_left == 1 and seconds < 2)
+
+
+def deadly(report, fleet, router):
+    """A request ends every replica that computes it: that is one and one more, not the whole fleet."""
+    ended = []
+    request = Long(router.url)
+    client = threading.Thread(target=request.wait, daemon=True)
+    client.start()
+    while client.is_alive():
+        for name in REPLICAS:
+            if name not in ended and metric(get(f"{fleet.address(name)}/metrics"), RUNNING) > 0:
+                fleet.kill(name)
+                ended.append(name)
+        time.sleep(0.05)
+    for name in ended:
+        fleet.start_replica(name)
+    for name in ended:
+        router.wait_for(name)
+    what = f"{router.name}: replicas that a request ends which ends whoever computes it"
+    report.line(what, f"{len(ended)} of {len(REPLICAS)}, answered {request.outcome}", 1 <= len(ended) <= 2)
+
+
+def refusing_store(report, fleet, router):
+    """The store takes nothing for a while: memory answers, and the router loses no replica over it."""
+    fleet.lose_bucket()
+    with Load(router.url, retries=0) as load:
+        wait_until(lambda: fleet.total(UP_TO_DATE) == 0, "no replica is up to date")
+        time.sleep(SECONDS_REFUSING)
+    n = load.n_answers + len(load.acknowledged) + len(load.failures)
+    what = f"{router.name}: failed, the store takes nothing for {SECONDS_REFUSING} s, no retries of clients"
+    report.line(what, f"{len(load.failures)} of {n}", not load.failures)
+    report.failures(load)
+    fleet.make_bucket()
+    wait_until(lambda: fleet.total(UP_TO_DATE) == len(REPLICAS), "all replicas are up to date")
+    n_lost = lost(load)
+    what = f"{router.name}: acknowledged clouds that are lost, the store takes them again"
+    report.line(what, f"{n_lost} of {len(load.acknowledged)}", n_lost == 0)
+
+
+def silent_store(report, fleet, router):
+    """The store does not answer for a while: what is in memory is served from there, known clouds and new ones."""
+    known, new = (points(new_seeds(), N_POINTS).tolist() for _ in range(2))
+    with httpx.Client(base_url=router.url, timeout=60) as client:
+
+        def seconds(body, headers):
+            began = time.monotonic()
+            status = client.post("/v1/normals", json=body, headers=headers).status_code
+            return status, time.monotonic() - began
+
+        cloud = client.post("/v1/clouds", json={"points": known}).raise_for_status().headers["gramian-cloud"]
+        of_known = {"cloud": {"id": cloud}, **FIT_IN_JSON}, {"Gramian-Cloud": cloud}
+        first, _ = seconds(*of_known)
+        time.sleep(SECONDS_TRUSTED)
+        with fleet.processes.halted("s3"):
+            answers = [seconds(*of_known), seconds(*of_known), seconds({"cloud": {"points": new}, **FIT_IN_JSON}, {})]
+    report.line(
+        f"{router.name}: status and seconds, the store is silent: a known cloud, again, a new one",
+        ", ".join(f"{status} {took:.1f}" for status, took in answers),
+        first == 200 and all(status == 200 and took < SECONDS_SILENT for status, took in answers),
+    )
+    wait_until(lambda: fleet.total(UP_TO_DATE) == len(REPLICAS), "all replicas are up to date")
 
 
 def hit_rate(report, fleet, router, n_clouds=40, n_requests=30):

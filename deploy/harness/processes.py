@@ -80,6 +80,16 @@ class Processes:
             process.kill()
             return process.wait()
 
+    @contextlib.contextmanager
+    def halted(self, name):
+        """Stops a process for a while: connections to it are made, and nothing comes."""
+        process = self._running[name]
+        process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            process.send_signal(signal.SIGCONT)
+
     def end_all(self):
         """Ends what still runs, at once, with the workers of each."""
         for process in self._running.values():
@@ -117,5 +127,10 @@ def answers(address):
 
 
 def put(address):
-    """Makes a bucket."""
+    """Makes what is at an address."""
     urllib.request.urlopen(urllib.request.Request(address, method="PUT"), timeout=10).close()
+
+
+def post(address):
+    """Has done what is at an address."""
+    urllib.request.urlopen(urllib.request.Request(address, method="POST"), timeout=10).close()

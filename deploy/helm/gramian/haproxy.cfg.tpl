@@ -30,10 +30,14 @@ defaults
     timeout queue 30s
     # Waits for the body before a replica is chosen, so that there is something to send again.
     option http-buffer-request
-    # Every operation may be repeated: clouds are named by their content, all else computes or deletes. 503 is a replica that
-    # ends, or one whose queue is full: another one may have room. Nothing is repeated after a timeout: the replica is busy with it.
+    # Who leaves is told to the replica: else it computes to the end for nobody, in a place and a lane that others wait for.
+    option abortonclose
+    # Repeating does no harm: clouds are named by their content, all else computes or deletes. Only a POST with
+    # `Prefer: respond-async` makes a second job. 503 is a replica that ends, or one whose queue is full: another one may have
+    # room. Nothing is repeated after a timeout: the replica is busy with it.
+    # Once, and elsewhere: a request that ends the process that computes it would end the whole fleet with more.
     retry-on conn-failure empty-response junk-response 503
-    retries 3
+    retries 1
     option redispatch 1
 
 resolvers dns
