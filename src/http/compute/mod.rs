@@ -1,9 +1,9 @@
 //! The only door to the compute threads: admission, lanes, cancellation, timing.
 //!
 //! THREE LANES, by what a job costs. A factorization uses every thread for seconds, a warm query takes microseconds. Each lane
-//! has threads of its own, so that the operating system shares the cores, and prefers the lanes of small jobs: parsing
-//! and planning, small clouds and the chunks of answers run on threads that no work of size can take, each job on one. The
-//! exclusive lane runs one job at a time: two factorizations side by side would take as long and twice the memory.
+//! has a thread pool of its own, so that the operating system shares the cores, and prefers the lanes of small jobs: parsing
+//! and planning, small clouds and the chunks of answers run on threads that no work of size can take. The exclusive lane runs
+//! one job at a time: two factorizations side by side would take as long and twice the memory.
 //!
 //! OWNERS. Places and turns go round among the owners, so that many requests of one do not hold up those of another.
 //!
@@ -29,7 +29,7 @@ use std::time::Duration;
 use super::problem::Problem;
 use crate::store::Owner;
 pub use calibration::Work;
-use lane::{Lane, Threads};
+use lane::Lane;
 pub use observer::{JobObserver, StageTimes};
 pub use places::Admission;
 use places::Places;
@@ -84,9 +84,9 @@ impl Compute {
         deadline: Duration,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         Ok(Self {
-            light: Lane::new("gramian-light", Threads::OneEach, n_threads, 0)?,
-            shared: Lane::new("gramian-shared", Threads::Shared(n_threads), n_threads, 2)?,
-            exclusive: Lane::new("gramian-exclusive", Threads::Shared(n_threads), 1, 5)?,
+            light: Lane::new("gramian-light", n_threads, n_threads, 0)?,
+            shared: Lane::new("gramian-shared", n_threads, n_threads, 2)?,
+            exclusive: Lane::new("gramian-exclusive", n_threads, 1, 5)?,
             places: Places::new(n_threads.saturating_add(max_queue), n_owners, deadline),
             n_threads,
         })
