@@ -10,7 +10,7 @@ use crate::config::Config;
 const OWN_BYTES: usize = 48 << 20;
 
 /// Stacks and packing buffers of a further thread of each lane.
-const BYTES_PER_THREAD: usize = 16 << 20;
+const BYTES_PER_THREAD: usize = 20 << 20;
 
 /// Of the budget without what the process itself takes: the part for requests that are read, unpacked, parsed or wait.
 const INTAKE_SHARE: usize = 4;

@@ -327,6 +327,57 @@ async fn a_job_is_cancelled_by_another_process() {
 }
 
 #[tokio::test]
+async fn a_job_that_waits_is_begun_by_whoever_has_a_turn_and_once() {
+    let folder = Folder::new("jobs-waiting");
+    let flags = [&folder.flags()[..], &["--threads", "1"]].concat();
+    let one = Process::start(&flags);
+    let kernel = json!({"family": "matern", "length_scale": 0.3});
+    let minutes = json!({"cloud": {"points": fibonacci_sphere(18_000)}, "kernel": kernel, "alpha": 1e-6});
+    let slow = ask(one.url("/v1/normals"), &minutes, &[]).await;
+    wait_for(&one, &slow, "running").await;
+    let path = ask(one.url("/v1/normals"), &long_request(), &[]).await;
+    let two = Process::start(&flags);
+    // Also where it waits, one learns that it goes on elsewhere.
+    wait_for(&one, &path, "running").await;
+    get(&one, &format!("{path}/result")).await;
+    assert_eq!(get(&one, &path).await["status"], "succeeded");
+    assert_eq!(get(&one, &slow).await["status"], "running");
+    let waits_for_nothing = async || {
+        let metrics = receive(reqwest::Client::new().get(one.url("/metrics"))).await;
+        String::from_utf8(metrics.bytes).unwrap().contains("gramian_jobs{status=\"queued\"} 0\n")
+    };
+    while !waits_for_nothing().await {
+        tokio::task::yield_now().await;
+    }
+    for path in [&slow, &path] {
+        assert_eq!(receive(reqwest::Client::new().delete(two.url(path))).await.status, 204);
+    }
+    let (_, log) = {
+        two.terminate();
+        two.finish()
+    };
+    let n_taken_up =
+        log.iter().filter(|line| line.contains("a job that nobody works on is taken up")).count();
+    assert_eq!(n_taken_up, 1, "{log:?}");
+}
+
+#[tokio::test]
+async fn a_request_does_not_wait_for_a_job() {
+    let server = Server::with_flags(&["--threads", "1"]).await;
+    let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
+    while server.get(&path).await.expect_ok()["progress"]["stage"] != "factor" {
+        tokio::task::yield_now().await;
+    }
+    // As much work as makes others wait for it.
+    let points = fibonacci_sphere(3200);
+    let kernel = json!({"family": "matern", "length_scale": 0.3});
+    let request = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6});
+    server.post("/v1/normals", &request).await.expect_ok();
+    assert_eq!(server.get(&path).await.expect_ok()["status"], "running");
+    assert_eq!(delete(&server, &path).await, 204);
+}
+
+#[tokio::test]
 async fn jobs_of_one_key_leave_places_to_another() {
     // Four may wait or run here; of each of two keys, two.
     let flags = ["--threads", "1", "--max-queue", "3", "--api-keys", "greedy,modest"];
@@ -338,8 +389,15 @@ async fn jobs_of_one_key_leave_places_to_another() {
     for (key, status) in [("greedy", 202), ("greedy", 202), ("greedy", 503), ("modest", 202)] {
         assert_eq!(asking(key).await.unwrap().status(), status, "{key}");
     }
-    // One runs. What a fleet grows by counts the others, which no lane knows yet.
-    while !server.get("/metrics").await.text.contains("\ngramian_queue_depth 2\n") {
+    // One of each runs, though there is one thread: no job of one keeps those of the other waiting for its end. What a fleet grows by counts
+    // the one that waits, which no lane knows yet.
+    let is_so = |metrics: &str| {
+        ["queue_depth", "jobs{status=\"queued\"}"]
+            .iter()
+            .all(|name| metrics.contains(&format!("\ngramian_{name} 1\n")))
+            && metrics.contains("\ngramian_jobs{status=\"running\"} 2\n")
+    };
+    while !is_so(&server.get("/metrics").await.text) {
         tokio::task::yield_now().await;
     }
 }
@@ -356,6 +414,8 @@ async fn as_many_may_follow_jobs_as_half_of_the_connections() {
         following.push(events);
     }
     assert_eq!(follow().await.unwrap().status(), 503);
+    // Who waits for a result has a connection as well.
+    result(&server, &path).await.expect_problem(503, "overloaded");
     drop(following);
     while follow().await.unwrap().status() == 503 {}
     assert_eq!(delete(&server, &path).await, 204);

@@ -15,7 +15,6 @@ use crate::store::Owner;
 
 /// A pool of threads of its own with turns on it.
 pub(super) struct Lane {
-    n_turns: usize,
     pool: Arc<rayon::ThreadPool>,
     turns: Arc<Turns>,
     pulse: Arc<Pulse>,
@@ -29,7 +28,7 @@ impl Lane {
     pub(super) fn new(
         name: &'static str,
         n_threads: usize,
-        n_turns: usize,
+        turns: Arc<Turns>,
         niceness: i32,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -37,12 +36,12 @@ impl Lane {
             .thread_name(move |index| format!("{name}-{index}"))
             .start_handler(move |_| be_nice(niceness))
             .build()?;
-        Ok(Self { n_turns, pool: Arc::new(pool), turns: Turns::new(n_turns), pulse: Pulse::new() })
+        Ok(Self { pool: Arc::new(pool), turns, pulse: Pulse::new() })
     }
 
     /// Jobs that have their turn, and those that wait for one.
     pub(super) fn load(&self) -> (usize, usize) {
-        self.turns.load(self.n_turns)
+        self.turns.load()
     }
 
     /// Waits for a turn of this owner.
@@ -120,7 +119,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_lane_whose_threads_wait_for_each_other_is_not_moving() {
-        let lane = Lane::new("lane", 2, 2, 0).unwrap();
+        let lane = Lane::new("lane", 2, Turns::new(2), 0).unwrap();
         assert!(lane.is_moving(Duration::ZERO).await);
         let (release, released) = std::sync::mpsc::channel::<()>();
         let released = std::sync::Mutex::new(released);
@@ -137,7 +136,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_lane_that_works_is_moving_however_long_the_work() {
-        let lane = Lane::new("lane", 1, 1, 0).unwrap();
+        let lane = Lane::new("lane", 1, Turns::new(1), 0).unwrap();
         let (done, is_done) = std::sync::mpsc::channel::<()>();
         let work = move |observer: &JobObserver| {
             use crate::numerics::observer::Observer;

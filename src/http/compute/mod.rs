@@ -1,9 +1,10 @@
 //! The only door to the compute threads: admission, lanes, cancellation, timing.
 //!
-//! THREE LANES, by what a job costs. A factorization uses every thread for seconds, a warm query takes microseconds. Each lane
+//! FOUR LANES, by what a job costs. A factorization uses every thread for seconds, a warm query takes microseconds. Each lane
 //! has a thread pool of its own, so that the operating system shares the cores, and prefers the lanes of small jobs: parsing
 //! and planning, small clouds and the chunks of answers run on threads that no work of size can take. The exclusive lane runs
-//! one job at a time: two factorizations side by side would take as long and twice the memory.
+//! one job at a time: two factorizations side by side would take as long and twice the memory. What costs as much and nobody waits for, work
+//! of `/v1/jobs`, has a lane of its own behind all others, or hours of it would be in front of requests with a deadline.
 //!
 //! OWNERS. Places and turns go round among the owners, so that many requests of one do not hold up those of another.
 //!
@@ -53,7 +54,7 @@ pub struct Load {
     /// Requests that have a place, and how many places there are.
     pub n_admitted: usize,
     pub n_places: usize,
-    pub lanes: [LaneLoad; 3],
+    pub lanes: [LaneLoad; 4],
 }
 
 /// Jobs of a lane.
@@ -68,6 +69,7 @@ pub struct Compute {
     light: Lane,
     shared: Lane,
     exclusive: Lane,
+    jobs: Lane,
     places: Arc<Places>,
     n_threads: usize,
 }
@@ -84,9 +86,10 @@ impl Compute {
         deadline: Duration,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         Ok(Self {
-            light: Lane::new("gramian-light", n_threads, n_threads, 0)?,
-            shared: Lane::new("gramian-shared", n_threads, n_threads, 2)?,
-            exclusive: Lane::new("gramian-exclusive", n_threads, 1, 5)?,
+            light: Lane::new("gramian-light", n_threads, Turns::new(n_threads), 0)?,
+            shared: Lane::new("gramian-shared", n_threads, Turns::new(n_threads), 2)?,
+            exclusive: Lane::new("gramian-exclusive", n_threads, Turns::new(1), 5)?,
+            jobs: Lane::new("gramian-jobs", n_threads, Turns::of_owners(1, n_owners), 10)?,
             places: Places::new(n_threads.saturating_add(max_queue), n_owners, deadline),
             n_threads,
         })
@@ -99,8 +102,7 @@ impl Compute {
 
     /// What there is to do now.
     pub fn load(&self) -> Load {
-        let lanes = [("light", &self.light), ("shared", &self.shared), ("exclusive", &self.exclusive)];
-        let lanes = lanes.map(|(name, lane)| {
+        let lanes = self.lanes().map(|(name, lane)| {
             let (n_running, n_waiting) = lane.load();
             LaneLoad { name, n_running, n_waiting }
         });
@@ -135,7 +137,7 @@ impl Compute {
     /// 503 `overloaded`.
     pub async fn check_ready(&self) -> Result<(), Problem> {
         self.places.look_for_any().map_err(Problem::overloaded)?;
-        for lane in [&self.light, &self.shared, &self.exclusive] {
+        for (_, lane) in self.lanes() {
             if !lane.is_moving(PATIENCE).await {
                 tracing::error!("the threads of a lane do not move");
                 return Err(Problem::overloaded(PATIENCE.as_secs()));
@@ -154,7 +156,7 @@ impl Compute {
         flops: f64,
         job: impl FnOnce(&JobObserver) -> T + Send + 'static,
     ) -> Result<(T, StageTimes), Problem> {
-        let lane = self.lane(flops);
+        let lane = self.lane(flops, admission.is_job());
         let turn = lane.turn(admission.owner).await;
         admission.begin();
         lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)
@@ -174,9 +176,18 @@ impl Compute {
         Ok(result)
     }
 
-    fn lane(&self, flops: f64) -> &Lane {
+    fn lanes(&self) -> [(&'static str, &Lane); 4] {
+        [
+            ("light", &self.light),
+            ("shared", &self.shared),
+            ("exclusive", &self.exclusive),
+            ("jobs", &self.jobs),
+        ]
+    }
+
+    fn lane(&self, flops: f64, is_job: bool) -> &Lane {
         if flops > EXCLUSIVE_FLOPS {
-            &self.exclusive
+            if is_job { &self.jobs } else { &self.exclusive }
         } else if !is_light(flops) {
             &self.shared
         } else {

@@ -1,9 +1,10 @@
 //! Turns on a lane: as many at once as it has, handed from owner to owner.
 //!
 //! A semaphore hands its permits out in the order of arrival, so that a hundred requests of one key would go before the one
-//! of another. Here every owner has a queue, and the queues have their turns one after the other.
+//! of another. Here every owner has a queue, and the queues have their turns one after the other. Where a turn may last for hours,
+//! no owner of several has more than half of them, whoever else waits.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::oneshot;
@@ -12,32 +13,48 @@ use crate::store::Owner;
 
 /// Turns that are free, and who waits for one.
 pub struct Turns {
+    n: usize,
+    /// Turns that one owner may have.
+    most: usize,
     state: Mutex<State>,
 }
 
 struct State {
     n_free: usize,
+    taken: HashMap<Owner, usize>,
     /// Owners with somebody waiting, the next one first.
     waiting: VecDeque<(Owner, VecDeque<oneshot::Sender<Turn>>)>,
 }
 
 /// A turn, handed on when dropped.
 pub struct Turn {
-    turns: Option<Arc<Turns>>,
+    of: Option<(Arc<Turns>, Owner)>,
 }
 
 impl Turns {
+    /// Turns of which one owner may have all.
     pub fn new(n: usize) -> Arc<Self> {
-        Arc::new(Self { state: Mutex::new(State { n_free: n, waiting: VecDeque::new() }) })
+        Self::with_most(n, n)
+    }
+
+    /// Turns that may last: two at least where there are several owners, and half of them for each.
+    pub fn of_owners(n: usize, n_owners: usize) -> Arc<Self> {
+        if n_owners < 2 { Self::new(n) } else { Self::with_most(n.max(2), n.max(2) / 2) }
+    }
+
+    fn with_most(n: usize, most: usize) -> Arc<Self> {
+        let state = State { n_free: n, taken: HashMap::new(), waiting: VecDeque::new() };
+        Arc::new(Self { n, most, state: Mutex::new(state) })
     }
 
     /// Waits for a turn.
     pub async fn take(self: &Arc<Self>, owner: Owner) -> Turn {
         let receiver = {
             let mut state = self.state();
-            if state.n_free > 0 {
+            if state.n_free > 0 && state.n_taken_by(owner) < self.most {
                 state.n_free -= 1;
-                return Turn { turns: Some(self.clone()) };
+                *state.taken.entry(owner).or_default() += 1;
+                return Turn { of: Some((self.clone(), owner)) };
             }
             let (sender, receiver) = oneshot::channel();
             match state.waiting.iter_mut().find(|(waiting, _)| *waiting == owner) {
@@ -47,54 +64,89 @@ impl Turns {
             receiver
         };
         // The sender is only dropped unsent with the lane itself: then nobody counts turns any more.
-        receiver.await.unwrap_or(Turn { turns: None })
+        receiver.await.unwrap_or(Turn { of: None })
     }
 
-    /// The next who waits, whose owner goes to the end of the line. If there is none, the turn is counted as free.
-    fn next(&self) -> Option<oneshot::Sender<Turn>> {
+    /// Takes a turn back; the next who waits and may have it, whose owner goes to the end of the line. If there is none, it is free.
+    fn next(&self, last: Owner) -> Option<(Owner, oneshot::Sender<Turn>)> {
         let mut state = self.state();
-        while let Some((owner, mut queue)) = state.waiting.pop_front() {
+        state.give_back(last);
+        let mut passed_over = VecDeque::new();
+        let next = loop {
+            let Some((owner, mut queue)) = state.waiting.pop_front() else { break None };
             // Who has left costs its owner no turn.
             while queue.front().is_some_and(oneshot::Sender::is_closed) {
                 queue.pop_front();
+            }
+            if queue.is_empty() {
+                continue;
+            }
+            if state.n_taken_by(owner) >= self.most {
+                passed_over.push_back((owner, queue));
+                continue;
             }
             let Some(next) = queue.pop_front() else { continue };
             if !queue.is_empty() {
                 state.waiting.push_back((owner, queue));
             }
-            return Some(next);
+            break Some((owner, next));
+        };
+        // They keep their places in front.
+        passed_over.append(&mut state.waiting);
+        state.waiting = passed_over;
+        match &next {
+            Some((owner, _)) => *state.taken.entry(*owner).or_default() += 1,
+            None => state.n_free += 1,
         }
-        state.n_free += 1;
-        None
+        next
     }
 
     /// Turns that are taken, and who waits for one.
-    pub fn load(&self, n_turns: usize) -> (usize, usize) {
+    pub fn load(&self) -> (usize, usize) {
         let state = self.state();
         let is_here = |sender: &&oneshot::Sender<Turn>| !sender.is_closed();
         let n_waiting = state.waiting.iter().flat_map(|(_, queue)| queue).filter(is_here).count();
-        (n_turns.saturating_sub(state.n_free), n_waiting)
+        (self.n.saturating_sub(state.n_free), n_waiting)
     }
 
-    #[expect(clippy::disallowed_methods, reason = "a queue, for as long as it takes to look at its ends")]
+    /// Whether an owner could have one at once.
+    pub fn has_one_for(&self, owner: Owner) -> bool {
+        let state = self.state();
+        state.n_free > 0 && state.n_taken_by(owner) < self.most
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "a queue, for as long as it takes to look through it")]
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Drop for Turn {
-    fn drop(&mut self) {
-        let Some(turns) = self.turns.take() else { return };
-        let mut turn = Turn { turns: Some(turns.clone()) };
-        while let Some(next) = turns.next() {
-            match next.send(turn) {
-                Ok(()) => return,
-                // Who waited has left.
-                Err(returned) => turn = returned,
+impl State {
+    fn n_taken_by(&self, owner: Owner) -> usize {
+        self.taken.get(&owner).copied().unwrap_or(0)
+    }
+
+    fn give_back(&mut self, owner: Owner) {
+        if let Some(n) = self.taken.get_mut(&owner) {
+            *n -= 1;
+            if *n == 0 {
+                self.taken.remove(&owner);
             }
         }
-        // It was counted as free.
-        turn.turns = None;
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let Some((turns, mut last)) = self.of.take() else { return };
+        while let Some((owner, next)) = turns.next(last) {
+            match next.send(Turn { of: Some((turns.clone(), owner)) }) {
+                Ok(()) => return,
+                // Who waited has left.
+                Err(mut returned) => returned.of = None,
+            }
+            last = owner;
+        }
     }
 }
 
@@ -125,6 +177,39 @@ mod tests {
         drop(of_b);
         drop(of_a.remove(0).await);
         assert_eq!(turns.state().n_free, 1);
+    }
+
+    #[tokio::test]
+    async fn no_owner_of_several_has_more_than_half() {
+        let turns = Turns::of_owners(1, 2);
+        let first = turns.take(A).await;
+        let mut second = Box::pin(turns.take(A));
+        let mut third = Box::pin(turns.take(A));
+        assert!(
+            futures_util::poll!(&mut second).is_pending() && futures_util::poll!(&mut third).is_pending()
+        );
+        assert!(!turns.has_one_for(A) && turns.has_one_for(B) && turns.load() == (1, 2));
+        let of_b = turns.take(B).await;
+        let mut next_of_b = Box::pin(turns.take(B));
+        assert!(futures_util::poll!(&mut next_of_b).is_pending());
+        // Though A has waited for longer, it has its half.
+        drop(of_b);
+        let next_of_b = next_of_b.await;
+        assert!(futures_util::poll!(&mut second).is_pending());
+        drop(first);
+        drop(second.await);
+        drop(third.await);
+        drop(next_of_b);
+        assert_eq!((turns.load(), turns.state().taken.len()), ((0, 0), 0));
+    }
+
+    #[tokio::test]
+    async fn one_owner_alone_has_all() {
+        let turns = Turns::of_owners(3, 1);
+        let taken = [turns.take(A).await, turns.take(A).await, turns.take(A).await];
+        assert_eq!((turns.load(), turns.has_one_for(A)), ((3, 0), false));
+        drop(taken);
+        assert_eq!((turns.load(), turns.has_one_for(A)), ((0, 0), true));
     }
 
     #[tokio::test]

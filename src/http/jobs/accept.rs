@@ -66,7 +66,7 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
     let request = JobRequest { path, headers: kept.chain(trace).collect() };
     let id = JobId::new();
-    let Some(here) = app.jobs.add(id, owner) else { return Err(app.compute.out_of_memory()) };
+    let Some(here) = app.jobs.add(id, owner, None) else { return Err(app.compute.out_of_memory()) };
     // It is not here any more, unless it is taken up below.
     let mut entered = Entered { runner: &runner, here: Some(here) };
     if !app.jobs.hold(id, owner, bytes.len()) {

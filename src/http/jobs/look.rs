@@ -84,7 +84,7 @@ pub struct JobView {
     problem: Option<Value>,
 }
 
-/// A job of this process.
+/// A job of this process, as far as that knows.
 pub fn view_of_here(here: &Here) -> JobView {
     let (status, progress) = match here.is_running() {
         true => (Status::Running, of_snapshot(here.progress.now())),
@@ -98,7 +98,8 @@ pub fn view_of_here(here: &Here) -> JobView {
 /// # Errors
 /// 404 `unknown-job`; 503 if the store does not answer.
 pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
-    if let Some(here) = here_of(app, owner, id) {
+    // One that waits here may have been begun elsewhere.
+    if let Some(here) = here_of(app, owner, id).filter(|here| here.is_running()) {
         return Ok(view_of_here(&here));
     }
     let (objects, name) = (&app.jobs.objects, app.keys.name_of(owner));

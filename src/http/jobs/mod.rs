@@ -3,7 +3,8 @@
 //! WHERE. A job is objects in the store (store/objects/jobs/), of which all processes see the same; without a store it is objects in memory,
 //! within a part of the budget. What follows needs no second way of doing things.
 //!
-//! WHO. The process that took a request works on it when its turn has come; as many run at once as there are threads, owner after owner.
+//! WHO. The process that took a request works on it when its turn has come; as many run at once as there are threads, owner after owner,
+//! and half of them at most of one owner of several.
 //! A job that nobody works on, or whose process has ended, is anybody's (rounds.rs).
 //!
 //! HOW. The request goes through the routes as any other (answer.rs), without a deadline. An answer that asks to come back later is not
@@ -18,6 +19,7 @@ mod run;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 use axum::Router;
 use tokio_util::sync::CancellationToken;
@@ -44,7 +46,6 @@ pub struct Jobs {
     memory: Option<Budget>,
     held: Mutex<HashMap<JobId, Reservation>>,
     turns: Arc<Turns>,
-    n_turns: usize,
     /// Jobs that may wait or run here, of all owners and of one.
     most: usize,
     most_of_owner: usize,
@@ -56,6 +57,8 @@ pub struct Jobs {
 pub struct Here {
     pub id: JobId,
     pub owner: Owner,
+    /// The last attempt at it when it came here. One that is newer when its turn comes is another process's.
+    last: Option<(u32, SystemTime)>,
     pub progress: Arc<Progress>,
     is_running: AtomicBool,
     cancelled: CancellationToken,
@@ -83,18 +86,17 @@ impl Jobs {
         store: Option<Arc<Objects>>,
         n_bytes: usize,
         n_owners: usize,
-        n_turns: usize,
+        n_threads: usize,
         max_queue: usize,
         max_followers: usize,
     ) -> Self {
-        let most = n_turns.saturating_add(max_queue);
+        let most = n_threads.saturating_add(max_queue);
         Self {
             memory: store.is_none().then(|| Budget::new(n_bytes, n_owners)),
             objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
             here: Mutex::default(),
             held: Mutex::default(),
-            turns: Turns::new(n_turns),
-            n_turns,
+            turns: Turns::of_owners(n_threads, n_owners),
             most,
             most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
             followers: Budget::new(max_followers, n_owners),
@@ -132,7 +134,7 @@ impl Jobs {
     }
 
     /// Makes a job one of this process, unless it is, or there are too many, of all owners or of this one.
-    fn add(&self, id: JobId, owner: Owner) -> Option<Arc<Here>> {
+    fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<Here>> {
         let mut here = self.here();
         let n_of_owner = here.values().filter(|job| job.owner == owner).count();
         if here.len() >= self.most || n_of_owner >= self.most_of_owner || here.contains_key(&id) {
@@ -141,6 +143,7 @@ impl Jobs {
         let job = Arc::new(Here {
             id,
             owner,
+            last,
             progress: Arc::default(),
             is_running: AtomicBool::new(false),
             cancelled: CancellationToken::new(),
@@ -156,9 +159,9 @@ impl Jobs {
         job.over.cancel();
     }
 
-    /// Whether another job could begin at once.
-    fn has_turn(&self) -> bool {
-        self.turns.load(self.n_turns).0 < self.n_turns
+    /// Whether another job of an owner could begin at once.
+    fn has_turn(&self, owner: Owner) -> bool {
+        self.turns.has_one_for(owner)
     }
 
     /// Takes memory for a job, where jobs are in memory; says whether there is any.

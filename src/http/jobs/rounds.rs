@@ -45,11 +45,18 @@ impl Runner {
             let age = now.duration_since(since).unwrap_or_default();
             if is_over && age > self.app.config.job_result() {
                 jobs.forget(&job).await?;
-            } else if !is_over && jobs.find(job.id).is_none() {
+            } else if let Some(here) = jobs.find(job.id) {
+                // It waited here, and another process had a turn for it before.
+                if !here.is_running() && (is_over || job.lease != here.last) {
+                    here.cancelled.cancel();
+                }
+            } else if !is_over {
                 let last = seen.get(&job.id).filter(|(lease, _)| *lease == job.lease);
                 let since = last.map_or_else(Instant::now, |&(_, since)| since);
                 next.insert(job.id, (job.lease, since));
-                if jobs.has_turn() && (since.elapsed() >= EXPIRING || self.is_released(&name, &job).await?) {
+                if jobs.has_turn(owner)
+                    && (since.elapsed() >= EXPIRING || self.is_released(&name, &job).await?)
+                {
                     self.take_up(&job, owner);
                 }
             }
@@ -65,7 +72,7 @@ impl Runner {
     }
 
     fn take_up(&self, job: &JobObjects, owner: Owner) {
-        if let Some(here) = self.app.jobs.add(job.id, owner) {
+        if let Some(here) = self.app.jobs.add(job.id, owner, job.lease) {
             tracing::info!(job = %job.id, "a job that nobody works on is taken up");
             tokio::spawn(self.clone().run(here));
         }

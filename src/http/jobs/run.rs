@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::look::name_of;
 use super::{Here, Jobs, Runner};
-use crate::store::objects::jobs::Lease;
+use crate::store::objects::jobs::{JobObjects, Lease};
 use crate::store::objects::{OwnerName, Unavailable};
 
 /// How often a lease is written again, and how long it holds after that.
@@ -51,12 +51,13 @@ impl Runner {
             () = here.cancelled.cancelled() => return,
             () = self.app.draining.cancelled() => return,
         };
+        // From here on it is this process's, or nobody's here.
+        here.is_running.store(true, Ordering::Relaxed);
         let attempt = match self.claim(here, &name).await {
             Ok(Some(attempt)) => attempt,
             Ok(None) => return,
             Err(error) => return tracing::error!(job = %here.id, %error, "a job is put off"),
         };
-        here.is_running.store(true, Ordering::Relaxed);
         let ended = tokio::select! {
             () = here.cancelled.cancelled() => Ok(Ended::Done),
             () = self.app.draining.cancelled() => Ok(Ended::Released),
@@ -77,9 +78,9 @@ impl Runner {
     async fn claim(&self, here: &Here, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
         let objects = &self.app.jobs.objects;
         let found = objects.find_job(name, here.id).await?;
-        let Some(job) = found.filter(|job| job.has_request && job.ended_at.is_none()) else {
-            return Ok(None);
-        };
+        // While it waited here, another process may have begun it: that one has it, and if it leaves it, the rounds find it.
+        let is_to_do = |job: &JobObjects| job.has_request && job.ended_at.is_none() && job.lease == here.last;
+        let Some(job) = found.filter(is_to_do) else { return Ok(None) };
         let attempt = match job.lease {
             None => Attempt { number: 0, lease: Lease::default() },
             Some((last, _)) => {

@@ -21,6 +21,7 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::serve::durable::{SECONDS_UNTIL_BACK, unavailable};
 use crate::store::Owner;
+use crate::store::budget::Reservation;
 use crate::store::objects::jobs::{JobId, Outcome};
 
 /// How often those who follow a job are told how far it is, if it is any further.
@@ -99,7 +100,7 @@ pub async fn follow_job(
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Problem> {
     let id = parse(&job_id)?;
     let first = look(&app, owner, id).await?;
-    let Some(followed) = app.jobs.follow(owner) else { return Err(app.compute.out_of_memory()) };
+    let followed = follow(&app, owner)?;
     let events = futures_util::stream::unfold(Following::First(Box::new(first)), move |following| {
         // For as long as there are events.
         let _ = &followed;
@@ -167,6 +168,9 @@ pub async fn get_job_result(
     Path(job_id): Path<String>,
 ) -> Result<Response, Problem> {
     let id = parse(&job_id)?;
+    let first = look(&app, owner, id).await?;
+    // Who waits has a connection for as long as who follows.
+    let waiting = if first.has_ended() { None } else { Some(follow(&app, owner)?) };
     let deadline = app.config.deadline();
     let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
     match tokio::time::timeout(patience, look_until_ended(&app, owner, id)).await {
@@ -176,6 +180,7 @@ pub async fn get_job_result(
             return Err(Problem::new(Slug::DeadlineExceeded, detail));
         }
     };
+    drop(waiting);
     let found = app.jobs.objects.get_result(&app.keys.name_of(owner), id).await;
     let again = || Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK);
     let found = found.map_err(|error| unavailable(&error))?.ok_or_else(again)?;
@@ -196,6 +201,11 @@ pub async fn get_job_result(
     }
     response.headers_mut().insert(header::CONTENT_LENGTH, found.n_body_bytes.into());
     Ok(response)
+}
+
+/// A place among those who wait for jobs.
+fn follow(app: &App, owner: Owner) -> Result<Reservation, Problem> {
+    app.jobs.follow(owner).ok_or_else(|| app.compute.out_of_memory())
 }
 
 fn parse(job_id: &str) -> Result<JobId, Problem> {
