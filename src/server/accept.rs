@@ -1,8 +1,9 @@
 //! Newcomers, and room for them.
 //!
 //! ROOM. A newcomer beyond the limit takes the place of the connection that has been without a request for longest, as HTTP lets
-//! a server end such a connection at any time. So connections that are opened and left alone keep nobody out. If all have
-//! requests, the newcomer is told so at once (503). The other way, to accept nobody while all places are taken, would leave
+//! a server end such a connection at any time. So connections that are opened and left alone keep nobody out. Where all have
+//! requests, the one goes whose client has been waited for longest to read its answers. If all are being answered, the newcomer is told
+//! so at once (503). The other way, to accept nobody while all places are taken, would leave
 //! clients and probes in the backlog without an answer, for as long as others please.
 
 use std::collections::HashMap;
@@ -25,6 +26,9 @@ const BACK_OFF: Duration = Duration::from_millis(200);
 
 /// Between two log lines about such failures.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
+
+/// What a client may owe as a reader without giving way to a newcomer.
+const UNREAD: Duration = Duration::from_secs(2);
 
 /// Newcomers being turned away at once; more are dropped without a word.
 const TURNED_AWAY_AT_ONCE: usize = 64;
@@ -107,11 +111,16 @@ impl Connections {
         }
     }
 
-    /// Ends the one that has been without a request for longest. False if all have requests.
+    /// Ends the one that has been without a request for longest, or else the one whose client reads least. False if all have requests that
+    /// are being answered.
     pub async fn evict(&mut self) -> bool {
-        let idle = self.activities.values().filter_map(|activity| Some((activity.idle_for()?, activity)));
-        let Some((_, longest)) = idle.max_by_key(|(time, _)| *time) else { return false };
-        longest.evict();
+        let longest = |time: fn(&Activity) -> Option<Duration>| {
+            let times = self.activities.values().filter_map(|activity| Some((time(activity)?, activity)));
+            times.max_by_key(|(time, _)| *time)
+        };
+        let unread = || longest(Activity::owed).filter(|(owed, _)| *owed > UNREAD);
+        let Some((_, activity)) = longest(Activity::idle_for).or_else(unread) else { return false };
+        activity.evict();
         // It ends as soon as a thread looks at it; none that hangs may keep others out.
         let _ = tokio::time::timeout(Duration::from_secs(1), self.ended()).await;
         true

@@ -26,6 +26,9 @@ pub struct Activity {
     lingering_since: AtomicU64,
     /// The client as a reader of its socket.
     pub pace: Pace,
+    /// Streams of HTTP/2 that have something for the client to take, and the client as a reader while there is nothing else.
+    n_unread: AtomicUsize,
+    streams: Pace,
     /// Somebody else has decided about it: see [`Activity::notice`].
     noticed: Notify,
     is_evicted: AtomicBool,
@@ -63,6 +66,8 @@ impl Activity {
             idle_since: 0.into(),
             lingering_since: 0.into(),
             pace: Pace::new(),
+            n_unread: 0.into(),
+            streams: Pace::new(),
             noticed: Notify::new(),
             is_evicted: false.into(),
             is_draining: false.into(),
@@ -79,6 +84,8 @@ impl Activity {
     /// A request has arrived; it is under way until the guard is dropped, with the body of its answer.
     pub fn enter(self: &Arc<Self>) -> InFlight {
         self.n_in_flight.fetch_add(1, Relaxed);
+        // The client may wait for this one before it reads the others.
+        self.streams.took(0);
         self.is_answered_early.store(false, Relaxed);
         InFlight(self.clone())
     }
@@ -86,6 +93,32 @@ impl Activity {
     /// The client took bytes that waited for it: that is not idle.
     pub fn stir(&self) {
         self.idle_since.store(self.now(), Relaxed);
+    }
+
+    /// A stream has something for the client to take.
+    pub fn give(&self) {
+        self.n_unread.fetch_add(1, Relaxed);
+        self.wait_if_all_are_unread();
+    }
+
+    /// The client took it, or never will.
+    pub fn took(&self, n_bytes: usize) {
+        self.n_unread.fetch_sub(1, Relaxed);
+        self.streams.took(n_bytes);
+        self.wait_if_all_are_unread();
+    }
+
+    fn wait_if_all_are_unread(&self) {
+        let n_unread = self.n_unread.load(Relaxed);
+        if n_unread > 0 && n_unread >= self.n_in_flight.load(Relaxed) {
+            self.streams.wait();
+        }
+    }
+
+    /// How long it was only the client that was waited for, beyond what its bytes take; `None` if it is on its way out. What it owes it
+    /// owes whatever it asks for next: a new request on a connection whose client reads none pays nothing.
+    pub fn owed(&self) -> Option<Duration> {
+        (!self.is_evicted.load(Relaxed)).then(|| self.pace.owed().max(self.streams.owed()))
     }
 
     pub fn break_answer(&self) {
@@ -179,5 +212,6 @@ impl Drop for InFlight {
     fn drop(&mut self) {
         self.0.stir();
         self.0.n_in_flight.fetch_sub(1, Relaxed);
+        self.0.wait_if_all_are_unread();
     }
 }

@@ -85,6 +85,7 @@ impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
         self.is_ended = self.n_announced == Some(0) || self.is_end_stream();
         if let Some(pace) = &self.pace {
             pace.wait();
+            self.in_flight.activity().give();
         }
         Frame::data(piece)
     }
@@ -101,7 +102,11 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
         let this = &mut *self;
         if let Some(pace) = &this.pace {
             // Whoever asks for more has taken what was given.
-            pace.took(std::mem::take(&mut this.n_given));
+            let n_given = std::mem::take(&mut this.n_given);
+            pace.took(n_given);
+            if n_given > 0 {
+                this.in_flight.activity().took(n_given);
+            }
         }
         if this.rest.is_empty() {
             let frame = match std::task::ready!(Pin::new(&mut this.body).poll_frame(cx)) {
@@ -140,6 +145,9 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
 
 impl<B> Drop for Sending<B> {
     fn drop(&mut self) {
+        if self.pace.is_some() && self.n_given > 0 {
+            self.in_flight.activity().took(0);
+        }
         // A stream of HTTP/2 has a reset of its own.
         if !self.is_ended && self.pace.is_none() {
             self.in_flight.activity().break_answer();

@@ -79,8 +79,12 @@ impl Drop for Watched {
     }
 }
 
-/// Serves answers of several kinds.
 async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
+    start_with_limit(sending, 100).await
+}
+
+/// Serves answers of several kinds.
+async fn start_with_limit(sending: Duration, limit: usize) -> (SocketAddr, Arc<Count>) {
     let count = Arc::new(Count::default());
     let [huge, small, paused, whole] = [(); 4].map(|()| count.clone());
     let none = Duration::ZERO;
@@ -91,7 +95,7 @@ async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
         .route("/paused", get(async move || Watched::body(&paused, 4, 100, 2 * SENDING)))
         .route("/whole", get(async move || Watched::body(&whole, 1, 8 << 20, none)));
     let patience = Patience { idle: Duration::from_secs(30), sending };
-    let listening = Listening { router, tls: None, patience, limit: 100 };
+    let listening = Listening { router, tls: None, patience, limit };
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     tokio::spawn(async move { listening.until(listener, std::future::pending()).await });
@@ -188,6 +192,38 @@ async fn a_stream_that_leaves_no_room_is_reset_and_the_others_go_on() {
         let mut other = client.ready().await.unwrap();
         let answer = other.send_request(request(address, "/ok"), true).unwrap().0.await.unwrap();
         assert_eq!(answer.status(), 200);
+    }
+}
+
+#[tokio::test]
+async fn who_reads_nothing_of_what_it_asks_for_again_and_again_gives_way_to_a_newcomer() {
+    // No stream is unread for long enough to be reset.
+    let (address, _) = start_with_limit(Duration::from_secs(600), 3).await;
+    let mut clients = Vec::new();
+    for _ in 0..3 {
+        clients.push(http_2(address, 0).await);
+    }
+    let mut unread = Vec::new();
+    let began = Instant::now();
+    loop {
+        for (client, _) in &mut clients {
+            // One that was turned out asks no more.
+            let Ok(mut ready) = client.clone().ready().await else { continue };
+            let Ok((answer, _)) = ready.send_request(request(address, "/small"), true) else { continue };
+            let Ok(answer) = answer.await else { continue };
+            unread.push(answer);
+            if unread.len() > 6 {
+                unread.remove(0);
+            }
+        }
+        let mut newcomer = ask(address, "/ok", "1.1").await;
+        let mut received = String::new();
+        newcomer.read_to_string(&mut received).await.ok();
+        if received.starts_with("HTTP/1.1 200") {
+            break;
+        }
+        assert!(received.is_empty() || received.starts_with("HTTP/1.1 503"), "{received}");
+        assert!(began.elapsed() < Duration::from_secs(20), "nobody gives way");
     }
 }
 
