@@ -29,7 +29,7 @@ impl Folder {
     }
 
     /// Files below, by the last part of their names.
-    fn files(&self) -> Vec<PathBuf> {
+    pub fn files(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();
         let mut folders = vec![self.0.clone()];
         while let Some(folder) = folders.pop() {
@@ -400,6 +400,42 @@ async fn a_store_that_is_full_lets_the_oldest_go() {
     // Also from memory.
     assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[0])).await.0, 404);
     assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[19])).await.0, 200);
+}
+
+#[tokio::test]
+async fn what_could_not_be_read_again_is_not_kept() {
+    let folder = Folder::new("unreadable");
+    // A digit in two bytes becomes a number of eight.
+    let digits = |n: usize| {
+        let point = |i: usize| (0..16).map(|k| (i >> (2 * k)) % 4).collect::<Vec<_>>();
+        json!({"points": (0..n).map(point).collect::<Vec<_>>()})
+    };
+    let small = [&folder.flags()[..], &["--memory-bytes", "268435456"]].concat();
+    let process = Process::start(&small);
+    let (status, problem) = post(&process, "/v1/clouds", &digits(100_000)).await;
+    assert_eq!((status, &problem["type"]), (413, &json!("/problems/problem-too-large")), "{problem}");
+    assert_eq!(get(&process, "/v1/clouds").await.1["clouds"], json!([]));
+    let (status, cloud) = post(&process, "/v1/clouds", &digits(50_000)).await;
+    assert_eq!(status, 201, "{cloud}");
+    kill(process);
+    let process = Process::start(&small);
+    assert_eq!(get(&process, &format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap())).await.0, 200);
+    kill(process);
+    // Where there was more memory before, asking again does not help, and nothing asks again.
+    let process = Process::start(&[&folder.flags()[..], &["--memory-bytes", "1073741824"]].concat());
+    let (status, cloud) = post(&process, "/v1/clouds", &digits(100_000)).await;
+    assert_eq!(status, 201);
+    kill(process);
+    let process = Process::start(&small);
+    let id = cloud["cloud_id"].as_str().unwrap();
+    assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 500);
+    let request =
+        json!({"cloud": {"id": id}, "kernel": {"family": "matern", "length_scale": 1.0}, "alpha": 1.0});
+    let asking = reqwest::Client::new().post(process.url("/v1/normals")).header("prefer", "respond-async");
+    let accepted = asking.json(&request).send().await.unwrap();
+    let path = accepted.headers()["location"].to_str().unwrap().to_owned();
+    let (status, problem) = get(&process, &format!("{path}/result")).await;
+    assert_eq!(status, 500, "{problem}");
 }
 
 /// Copies of one cloud under other names: their heads are whole, and nothing else is looked at before they are asked for.

@@ -1,6 +1,6 @@
 //! Clouds that outlive the process, where there is a store: written before they are acknowledged, read again where memory has let them go.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
@@ -10,10 +10,11 @@ use tokio::sync::Notify;
 use super::app::App;
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
-use crate::store::objects::cloud_object::{decode, encode};
+use crate::store::objects::cloud_object::{CloudHead, decode, encode, object_bytes};
 use crate::store::objects::{Listed, Objects, OwnerName, Place, Retention, Swept, Unavailable, Written};
 
 /// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
@@ -21,6 +22,12 @@ pub const SECONDS_UNTIL_BACK: u64 = 5;
 
 /// How often it is looked what of the store is to go, unless more comes than may be there.
 const SWEEPING: Duration = Duration::from_secs(600);
+
+/// The least time between two looks at all of it: once it is full, every new cloud makes it fuller than it may be.
+const BETWEEN_SWEEPS: Duration = Duration::from_secs(1);
+
+/// Memory that reading a cloud takes, of the bytes of its object: as they come, in one piece, and as numbers.
+const READING: usize = 3;
 
 /// How long a cloud in memory is taken to be in the store as well: another process may have deleted it there.
 pub const TRUST: Duration = Duration::from_secs(10);
@@ -142,8 +149,12 @@ async fn read_cloud(
     let (owner, name) = (admission.owner, app.keys.name_of(admission.owner));
     let refused = |error: Unavailable| unavailable(&error);
     let Some(n_bytes) = objects.cloud_bytes(&name, id).await.map_err(refused)? else { return Ok(None) };
-    // Its bytes, and the numbers that they become.
-    let n_reserved = usize::try_from(n_bytes).ok().and_then(|n| n.checked_mul(3)).unwrap_or(usize::MAX);
+    let n_reserved = usize::try_from(n_bytes).map_or(usize::MAX, |n| n.saturating_mul(READING));
+    if n_reserved > app.intake.largest() {
+        // Nothing that is kept today: there was more memory when it was written, or it is damaged.
+        tracing::error!(cloud = %id, n_bytes, "a cloud of the store takes more memory than there may be for one");
+        return Err(Problem::internal());
+    }
     let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
     if !app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
         return Err(app.compute.out_of_memory());
@@ -181,9 +192,13 @@ pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredClou
 /// The same of one; says whether it is new to the store, or there is none.
 ///
 /// # Errors
-/// 503 if neither the store nor memory keeps it.
+/// 413 if there would never be the memory to read it again; 503 if neither the store nor memory keeps it.
 pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<bool, Problem> {
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(true) };
+    if let Err(problem) = check_readable(app, cloud) {
+        app.clouds.remove(owner, cloud.id);
+        return Err(problem);
+    }
     // An answer says that it is there: also if another process has deleted it meanwhile.
     if cloud.is_durable()
         && !matches!(objects.cloud_bytes(&app.keys.name_of(owner), cloud.id).await, Ok(None))
@@ -207,6 +222,17 @@ pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) ->
             SECONDS_UNTIL_BACK,
         )),
     }
+}
+
+/// Whether what is written of a cloud could be read again.
+fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
+    let (n_bytes, most) = (object_bytes(&CloudHead::of(cloud)), app.intake.largest() / READING);
+    if n_bytes.is_some_and(|n_bytes| n_bytes <= most) {
+        return Ok(());
+    }
+    let what = "bytes of a cloud, 8 for a coordinate,";
+    let remedy = "register it in parts, or raise the memory of the service";
+    Err(Problem::too_large(Slug::ProblemTooLarge, what, most, n_bytes).with_remedy(remedy))
 }
 
 /// Whether it is new to the store; nothing if that does not take it.
@@ -259,9 +285,11 @@ pub async fn list_clouds(
 ) -> Result<(Vec<(Listed, Option<Arc<RegisteredCloud>>)>, bool), Problem> {
     let owner = admission.owner;
     let stored = match &app.durable {
-        None => Vec::new(),
+        None => BTreeSet::new(),
         Some(Durable { objects, .. }) => {
-            objects.list(&app.keys.name_of(owner), after).await.map_err(|error| unavailable(&error))?
+            // One more says whether they are the last.
+            let stored = objects.list_first(&app.keys.name_of(owner), after, limit + 1).await;
+            stored.map_err(|error| unavailable(&error))?
         }
     };
     let shared = app.clone();
@@ -269,7 +297,8 @@ pub async fn list_clouds(
     let job = move |_: &JobObserver| {
         let mut all: BTreeMap<Listed, Option<Arc<RegisteredCloud>>> =
             stored.into_iter().map(|listed| (listed, None)).collect();
-        // What is in memory alone is there as well; what was in the store and is no longer is nowhere.
+        // What is in memory alone is there as well; what was in the store and is no longer is nowhere. One that is behind these in the store is
+        // on another page.
         let in_store: HashSet<CloudId> = all.keys().map(|listed| listed.id).collect();
         let is_there = |cloud: &Arc<RegisteredCloud>| !cloud.is_durable() || in_store.contains(&cloud.id);
         for cloud in shared.clouds.list(owner).into_iter().filter(is_there) {
@@ -349,6 +378,7 @@ pub async fn retain(app: Arc<App>) {
                 }
             }
         }
+        tokio::time::sleep(BETWEEN_SWEEPS).await;
     }
 }
 

@@ -55,7 +55,7 @@ pub(super) fn head_bytes_of(bytes: &[u8]) -> u64 {
 }
 
 /// Bytes of the object of a cloud.
-fn object_bytes(head: &CloudHead) -> Option<usize> {
+pub fn object_bytes(head: &CloudHead) -> Option<usize> {
     let lists = if head.has_normals { 2 } else { 1 };
     let numbers = head.n_points.checked_mul(head.dimension)?.checked_mul(8 * lists)?;
     numbers.checked_add(head_bytes(head.dimension))?.checked_add(HASH_BYTES)

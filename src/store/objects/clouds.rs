@@ -1,11 +1,15 @@
 //! Clouds as objects: written, found whole, listed and forgotten.
 
+use std::collections::BTreeSet;
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
+use futures_util::stream::BoxStream;
 use futures_util::{StreamExt, TryStreamExt};
 use object_store::path::Path;
-use object_store::{Error, GetOptions, GetRange, ObjectStoreExt, PutMode, PutOptions, PutPayload};
+use object_store::{
+    Error, GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutMode, PutOptions, PutPayload,
+};
 
 use super::cloud_object::{self, CloudHead};
 use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
@@ -159,13 +163,45 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn list(&self, owner: &OwnerName, after: Option<Listed>) -> Result<Vec<Listed>, Unavailable> {
         let folder = self.path(&[&owner.0, "listed"]);
-        let names = match after {
-            None => self.store.list(Some(&folder)),
-            Some(last) => self.store.list_with_offset(Some(&folder), &self.listed(owner, last)),
-        };
-        let names =
-            self.counted(Verb::List, &folder, names.try_collect::<Vec<_>>().await)?.unwrap_or_default();
+        let names = self.names(&folder, owner, after).try_collect::<Vec<_>>().await;
+        let names = self.counted(Verb::List, &folder, names)?.unwrap_or_default();
         Ok(names.iter().filter_map(|found| Listed::parse(found.location.filename()?)).collect())
+    }
+
+    /// The first `n` clouds of an owner behind a place of the list, in its order: no more than they are in memory, however long the list is.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn list_first(
+        &self,
+        owner: &OwnerName,
+        after: Option<Listed>,
+        n: usize,
+    ) -> Result<BTreeSet<Listed>, Unavailable> {
+        let folder = self.path(&[&owner.0, "listed"]);
+        // Not every store lists in an order.
+        let smallest =
+            self.names(&folder, owner, after).try_fold(BTreeSet::new(), |mut first, found| async move {
+                first.extend(found.location.filename().and_then(Listed::parse));
+                if first.len() > n {
+                    first.pop_last();
+                }
+                Ok(first)
+            });
+        Ok(self.counted(Verb::List, &folder, smallest.await)?.unwrap_or_default())
+    }
+
+    /// What is in the list of an owner behind a place of it.
+    fn names(
+        &self,
+        folder: &Path,
+        owner: &OwnerName,
+        after: Option<Listed>,
+    ) -> BoxStream<'static, object_store::Result<ObjectMeta>> {
+        match after {
+            None => self.store.list(Some(folder)),
+            Some(last) => self.store.list_with_offset(Some(folder), &self.listed(owner, last)),
+        }
     }
 
     /// Forgets a cloud, and what was put aside of it; says whether there was any of it.
@@ -213,8 +249,12 @@ impl Objects {
         let mut n_bytes = FIRST_BYTES;
         loop {
             let options = GetOptions { range: Some(GetRange::Bounded(0..n_bytes)), ..GetOptions::default() };
-            let found = async { self.store.get_opts(name, options).await?.bytes().await };
-            let Some(bytes) = self.counted(Verb::Read, name, found.await)? else { return Ok(None) };
+            let found = async { self.store.get_opts(name, options).await?.bytes().await }.await;
+            // Of an object without bytes no store gives any range.
+            if found.is_err() && self.store.head(name).await.is_ok_and(|empty| empty.size == 0) {
+                return Ok(Some(Bytes::new()));
+            }
+            let Some(bytes) = self.counted(Verb::Read, name, found)? else { return Ok(None) };
             // Points of many coordinates have a long head.
             let n_needed = cloud_object::head_bytes_of(&bytes).min(MAX_HEAD_BYTES);
             if n_needed <= n_bytes {

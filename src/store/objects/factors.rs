@@ -88,7 +88,8 @@ impl Objects {
     pub async fn find_factor(&self, name: &FactorName) -> Result<Option<FoundFactor>, Unavailable> {
         let path = self.factor(name);
         let found = self.counted(Verb::Find, &path, self.store.head(&path).await)?;
-        let Some(ObjectMeta { size: n_bytes, .. }) = found else { return Ok(None) };
+        // One without bytes has no range that could be read, and is written again.
+        let Some(ObjectMeta { size: n_bytes @ 1.., .. }) = found else { return Ok(None) };
         let Some(first) = self.factor_range(name, 0..MAX_LINE.min(n_bytes)).await? else { return Ok(None) };
         let head = first.iter().position(|&byte| byte == b'\n').and_then(|end| {
             let line = first.slice(..=end);
@@ -167,7 +168,7 @@ impl Objects {
         Ok(n_bytes)
     }
 
-    fn factor(&self, name: &FactorName) -> Path {
+    pub(super) fn factor(&self, name: &FactorName) -> Path {
         self.path(&[&name.owner.0, FOLDER, &name.cloud.to_string(), &name.fit])
     }
 }

@@ -1,6 +1,7 @@
-//! What goes by itself: clouds beyond an age or a number of bytes, oldest first, and what was damaged.
+//! What goes by itself: clouds beyond an age or a number of bytes, oldest first of whoever has most, and what was damaged.
 
-use std::collections::{HashMap, HashSet};
+use std::cmp::Reverse;
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
@@ -36,8 +37,53 @@ pub struct Swept {
 
 struct Kept {
     listed: Listed,
-    owner: OwnerName,
     n_bytes: u64,
+}
+
+/// The clouds of an owner, the oldest first.
+struct Holding {
+    owner: OwnerName,
+    clouds: VecDeque<Kept>,
+    n_bytes: u64,
+}
+
+impl Holding {
+    fn new(owner: OwnerName, mut clouds: Vec<Kept>) -> Self {
+        clouds.sort_by_key(|cloud| cloud.listed);
+        let n_bytes = clouds.iter().map(|cloud| cloud.n_bytes).sum();
+        Self { owner, clouds: clouds.into(), n_bytes }
+    }
+
+    fn pop_oldest(&mut self) -> Option<Listed> {
+        let Kept { listed, n_bytes } = self.clouds.pop_front()?;
+        self.n_bytes -= n_bytes;
+        Some(listed)
+    }
+
+    fn into_ids(self) -> (OwnerName, HashSet<CloudId>) {
+        (self.owner, self.clouds.into_iter().map(|cloud| cloud.listed.id).collect())
+    }
+}
+
+/// The next cloud that is to go: one that is too old, or the oldest of who has most where there is too much, so that nobody loses what is
+/// within an equal share to another.
+fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> Option<(OwnerName, Listed)> {
+    let is_too_old = |cloud: &Kept| {
+        let age = now.duration_since(cloud.listed.created_at).unwrap_or_default();
+        limits.age.is_some_and(|most| age > most)
+    };
+    let old = holdings.iter().position(|holding| holding.clouds.front().is_some_and(is_too_old));
+    let at = match old {
+        Some(at) => at,
+        None => {
+            let n_bytes: u64 = holdings.iter().map(|holding| holding.n_bytes).sum();
+            limits.n_bytes.filter(|&most| n_bytes > most)?;
+            let oldest = |holding: &Holding| Reverse(holding.clouds.front().map(|cloud| cloud.listed));
+            (0..holdings.len()).max_by_key(|&at| (holdings[at].n_bytes, oldest(&holdings[at])))?
+        }
+    };
+    let holding = &mut holdings[at];
+    Some((holding.owner.clone(), holding.pop_oldest()?))
 }
 
 impl Objects {
@@ -46,32 +92,21 @@ impl Objects {
     /// # Errors
     /// [`Unavailable`]: what was to go is gone in part then.
     pub async fn sweep(&self, limits: Retention, now: SystemTime) -> Result<Swept, Unavailable> {
-        let mut kept = Vec::new();
-        let owners = self.owners().await?;
-        for owner in &owners {
-            kept.extend(self.kept(owner).await?);
-            self.forget_damaged(owner, now).await?;
+        let mut holdings = Vec::new();
+        for owner in self.owners().await? {
+            let clouds = self.kept(&owner).await?;
+            self.forget_damaged(&owner, now).await?;
+            holdings.push(Holding::new(owner, clouds));
         }
         self.remove_half_written(now).await;
-        let mut there: Vec<(OwnerName, HashSet<CloudId>)> =
-            owners.into_iter().map(|owner| (owner, HashSet::new())).collect();
-        kept.sort_by_key(|cloud| cloud.listed);
         let mut swept = Swept::default();
-        let mut n_bytes: u64 = kept.iter().map(|cloud| cloud.n_bytes).sum();
-        for cloud in kept {
-            let age = now.duration_since(cloud.listed.created_at).unwrap_or_default();
-            let is_too_old = limits.age.is_some_and(|most| age > most);
-            if is_too_old || limits.n_bytes.is_some_and(|most| n_bytes > most) {
-                self.delete_listed(&cloud.owner, cloud.listed).await?;
-                n_bytes -= cloud.n_bytes;
-                swept.gone.push((cloud.owner, cloud.listed.id));
-            } else {
-                swept.n_clouds += 1;
-                let of_owner = there.iter_mut().find(|(owner, _)| *owner == cloud.owner);
-                of_owner.into_iter().for_each(|(_, clouds)| _ = clouds.insert(cloud.listed.id));
-            }
+        while let Some((owner, listed)) = next_to_go(&mut holdings, limits, now) {
+            self.delete_listed(&owner, listed).await?;
+            swept.gone.push((owner, listed.id));
         }
-        swept.n_bytes = n_bytes;
+        swept.n_bytes = holdings.iter().map(|holding| holding.n_bytes).sum();
+        swept.n_clouds = holdings.iter().map(|holding| holding.clouds.len() as u64).sum();
+        let there: Vec<_> = holdings.into_iter().map(Holding::into_ids).collect();
         swept.n_factor_bytes = self.sweep_factors(&there, limits.n_factor_bytes, now).await?;
         Ok(swept)
     }
@@ -106,7 +141,7 @@ impl Objects {
             let id = CloudId::parse(object.location.filename()?)?;
             let unlisted = Listed { created_at: object.last_modified.into(), id };
             let listed = listed.get(&id).copied().unwrap_or(unlisted);
-            Some(Kept { listed, owner: owner.clone(), n_bytes: object.size })
+            Some(Kept { listed, n_bytes: object.size })
         });
         let kept: Vec<Kept> = kept.collect();
         let there: HashSet<CloudId> = kept.iter().map(|cloud| cloud.listed.id).collect();

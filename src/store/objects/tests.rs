@@ -45,6 +45,10 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     let mut behind = objects.list(&owner, Some(listed[1])).await.unwrap();
     behind.sort();
     assert_eq!(behind, listed[2..]);
+    let first = |after, n| objects.list_first(&owner, after, n);
+    assert!(first(None, 2).await.unwrap().iter().eq(&listed[..2]));
+    assert!(first(Some(listed[1]), 2).await.unwrap().iter().eq(&listed[2..4]));
+    assert!(first(Some(listed[1]), 9).await.unwrap().iter().eq(&listed[2..]));
     let bytes = objects.get_cloud(&owner, clouds[3].id).await.unwrap().unwrap();
     assert_eq!(objects.cloud_bytes(&owner, clouds[3].id).await.unwrap(), Some(bytes.len() as u64));
     let read = cloud_object::decode(clouds[3].id, &bytes).unwrap();
@@ -57,8 +61,8 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     assert_eq!(objects.heads(&owner, ids).await.unwrap().len(), 4);
     assert_eq!(objects.n_damaged(), 0);
     assert!(Verb::ALL.into_iter().all(|verb| objects.tally().of(verb)[1] == 0));
-    // Three of clouds, and one of factors with each deletion.
-    assert_eq!(objects.tally().of(Verb::List), [5, 0]);
+    // Six of clouds, and one of factors with each deletion.
+    assert_eq!(objects.tally().of(Verb::List), [8, 0]);
 }
 
 #[tokio::test]
@@ -98,6 +102,17 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
     assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
+    // Also where nothing is left of it: no store gives a range of that.
+    for find in [true, false] {
+        objects.store.put(&name, PutPayload::new()).await.unwrap();
+        if find {
+            assert!(objects.heads(&owner, vec![cloud.id]).await.unwrap().is_empty());
+        }
+        assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
+    }
+    objects.store.put(&name, PutPayload::new()).await.unwrap();
+    assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
+    assert_eq!((put(&objects, &owner, &cloud).await, objects.n_damaged()), (Written::Now, 5));
     // Also where it is in the points alone, or behind them.
     for at in [bytes.len() - 1, bytes.len() - 40] {
         let mut other = bytes.to_vec();
@@ -106,10 +121,10 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
         assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     }
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
-    assert_eq!((objects.n_damaged(), objects.list(&owner, None).await.unwrap().len()), (4, 1));
+    assert_eq!((objects.n_damaged(), objects.list(&owner, None).await.unwrap().len()), (7, 1));
     // One that is whole again is left where it is, and what was put aside goes with it.
     objects.put_aside(&owner, cloud.id, CUT).await;
-    assert_eq!(objects.n_damaged(), 4);
+    assert_eq!(objects.n_damaged(), 7);
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
     let left = objects.objects_in(&owner, &[]).await.unwrap();
     assert!(left.is_empty(), "{left:?}");
@@ -126,6 +141,11 @@ async fn factors_go_with_their_clouds_whoever_wrote_them_last() {
         let pieces = [Bytes::from_static(b"numbers")].into_iter();
         objects.put_factor(&name_of(cloud), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
     }
+    // One without bytes is none, and can be written.
+    objects.store.put(&objects.factor(&name_of(&kept)), PutPayload::new()).await.unwrap();
+    assert!(objects.find_factor(&name_of(&kept)).await.unwrap().is_none());
+    let pieces = [Bytes::from_static(b"numbers")].into_iter();
+    objects.put_factor(&name_of(&kept), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
     let limits = Retention { n_factor_bytes: 1 << 20, ..Retention::default() };
     // Its writer may be at it: the cloud, too.
     for (seconds, is_there) in [(0, true), (7200, false)] {
@@ -182,6 +202,26 @@ async fn the_oldest_clouds_go_by_age_and_by_bytes() {
     assert!(objects.get_cloud(&one, clouds[2].id).await.unwrap().is_none());
     assert_eq!(objects.list(&one, None).await.unwrap().len(), 1);
     assert_eq!(objects.list(&two, None).await.unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn who_has_most_makes_room() {
+    let (objects, modest, greedy) = (objects(), owner("modest"), owner("greedy"));
+    let clouds: Vec<_> = (0..5).map(|k| registered(f64::from(k), 3)).collect();
+    let now = SystemTime::now();
+    for (k, cloud) in clouds.iter().enumerate() {
+        let since = now - Duration::from_secs(60 * (10 - k as u64));
+        cloud.set_durable(Some(since));
+        let of = if k == 0 { &modest } else { &greedy };
+        objects.put_cloud(of, (cloud.id, since), cloud_object::encode(cloud)).await.unwrap();
+    }
+    let n_bytes = objects.cloud_bytes(&modest, clouds[0].id).await.unwrap().unwrap();
+    let limits = Retention { age: None, n_bytes: Some(2 * n_bytes), n_factor_bytes: 0 };
+    let gone = objects.sweep(limits, now).await.unwrap().gone;
+    assert_eq!(gone, [1, 2, 3].map(|k| (greedy.clone(), clouds[k].id)));
+    // Where all have as much, it is the oldest of all.
+    let limits = Retention { n_bytes: Some(n_bytes), ..limits };
+    assert_eq!(objects.sweep(limits, now).await.unwrap().gone, [(modest, clouds[0].id)]);
 }
 
 #[tokio::test]
