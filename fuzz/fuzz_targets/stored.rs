@@ -24,7 +24,7 @@ fuzz_target!(|data: &[u8]| {
         assert_eq!(CloudId::of(&cloud.cloud, cloud.normals.as_ref()), id);
         assert_eq!(encode(&cloud).concat(), bytes);
     }
-    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime without drivers");
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime with a clock");
     runtime.block_on(read_job(bytes));
 });
 
