@@ -2,5 +2,6 @@
 
 pub mod clouds;
 pub mod fits;
+pub mod hostile;
 pub mod kernels;
 pub mod random;

@@ -47,8 +47,10 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         let deviations: Vec<f64> =
             variances(&solver, &queries, &Unobserved).unwrap().latent.iter().map(|v| v.sqrt()).collect();
         let request = MovingRequest { order: JetOrder::Gradient, has_variances: true, has_deviations: false };
-        let found =
-            Moving::new(system(), sampling.clone()).at(&values, &queries, request, &Unobserved).unwrap();
+        let found = Moving::new(system(), sampling.clone(), &Unobserved)
+            .unwrap()
+            .at(&values, &queries, request, &Unobserved)
+            .unwrap();
         let m = queries.n_points();
         let means = rms((0..m).map(|q| (found.jets.value(q) - dense.value(q)) / deviations[q]));
         let latent = found.variances.unwrap().latent;

@@ -23,6 +23,7 @@ mod estimate;
 mod examples;
 mod fits;
 mod golden;
+mod hostile;
 mod jobs;
 mod keys;
 mod learned;

@@ -105,7 +105,10 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
         let at = |kernel: Kernel, cloud: &Cloud, queries: &Cloud| {
             let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
             let system = System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-3)).unwrap();
-            Moving::new(system, sampling).at(&values, queries, request, &Unobserved).unwrap()
+            Moving::new(system, sampling, &Unobserved)
+                .unwrap()
+                .at(&values, queries, request, &Unobserved)
+                .unwrap()
         };
         let a = at(of_axes(family), &cloud, &queries);
         let b = at(of_one(family), &far_cloud, &far_queries);

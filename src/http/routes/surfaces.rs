@@ -254,7 +254,11 @@ fn matrix_of(
     observer: &JobObserver,
 ) -> Result<SparseMatrix, Problem> {
     let of = |neighbours: &Neighbours| assemble(&surface.geometry, nodes, neighbours, queries, observer);
-    let found = with_neighbours(&surface.surface, nodes, of);
+    let found = match surface.surface.cloud() == nodes {
+        // Known already where the nodes are the points of the surface.
+        true => of(surface.surface.neighbours()),
+        false => Neighbours::of(nodes, observer).and_then(|neighbours| of(&neighbours)),
+    };
     let found = found.map_err(|error| fits.surface().refused(error))?;
     surface.geometry.take_resolutions(&found.resolutions);
     Ok(found.matrix)
@@ -291,14 +295,6 @@ fn stencils_lack(what: &str, pointer: &str) -> Problem {
         "stencils reproduce polynomials and have no {what}; leave it out, or take \"solver\": \"dense\""
     );
     Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
-}
-
-/// Who is near whom among nodes: known where they are the points of the surface.
-fn with_neighbours<T>(surface: &Surface, nodes: &Cloud, of: impl FnOnce(&Neighbours) -> T) -> T {
-    match surface.cloud() == nodes {
-        true => of(surface.neighbours()),
-        false => of(&Neighbours::of(nodes)),
-    }
 }
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.

@@ -344,7 +344,7 @@ async fn prepare_moving(
             None => Arc::new(Sampling::of(&plan.fitted, observer)?),
         };
         let system = System::new(plan.fitted, kernel, regularization)?;
-        Ok((Moving::new(system, sampling), memory))
+        Ok((Moving::new(system, sampling, observer)?, memory))
     };
     let (outcome, _) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
     let (moving, memory) = outcome.map_err(FitFailure::Refused)?;

@@ -7,6 +7,7 @@ pub(crate) mod functionals;
 pub mod interpolant;
 mod mean_variance;
 pub mod moving;
+mod pivoted_root;
 pub mod posterior;
 pub mod samples;
 

@@ -1,10 +1,9 @@
 //! Joint draws from a posterior.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt_pivoting::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef};
 
+use super::pivoted_root::PivotedRoot;
 use super::posterior::Covariance;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::random::Random;
@@ -43,22 +42,11 @@ impl Root {
         if covariance.latent.iter().step_by(m + 1).all(|variance| *variance <= rounding) {
             return Ok(Self { directions: Vec::new(), n_queries: m });
         }
+        if covariance.latent.iter().any(|entry| !entry.is_finite()) {
+            return Err(NumericsError::WeightsOverflow);
+        }
         let mut factor = covariance.latent.clone();
-        let (mut order, mut inverse) = (vec![0usize; m], vec![0usize; m]);
-        let par = parallelism((m * m * m) as f64 / 3.0);
-        let requirement = cholesky_in_place_scratch::<usize, f64>(m, par, Default::default());
-        let mut scratch = MemBuffer::new(requirement);
-        let (info, _) = cholesky_in_place(
-            MatMut::from_column_major_slice_mut(&mut factor, m, m),
-            &mut order,
-            &mut inverse,
-            par,
-            MemStack::new(&mut scratch),
-            Default::default(),
-        )
-        .map_err(|_| NumericsError::WeightsOverflow)?;
-        let is_signal = |column: &usize| factor[column * (m + 1)].powi(2) > rounding;
-        let rank = (0..info.rank).take_while(is_signal).count();
+        let PivotedRoot { order, rank } = PivotedRoot::of(&mut factor, m, rounding, observer)?;
         let mut directions = vec![0.0; rank * m];
         for (column, direction) in directions.chunks_exact_mut(m).enumerate() {
             (column..m).for_each(|row| direction[order[row]] = factor[column * m + row]);

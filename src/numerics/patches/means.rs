@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::vec_bytes;
+use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::sampling::Sampling;
@@ -32,14 +33,14 @@ impl Support {
     /// Means of at most `group` points, by halving the cloud across its widest side until that is so.
     ///
     /// # Errors
-    /// None in practice: means of points of a cloud are points of a cloud.
-    pub(crate) fn means(cloud: &Cloud, group: usize) -> Result<Self, NumericsError> {
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let d = cloud.dimension();
         let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
         let mut found = Gathered::default();
         halve(cloud, &mut order, group, &mut found);
         let cloud = Cloud::new(found.coordinates, d)?;
-        let neighbours = Neighbours::of(&cloud);
+        let neighbours = Neighbours::of(&cloud, observer)?;
         Ok(Self::Means(Means { cloud, neighbours, counts: found.counts, moments: found.moments }))
     }
 

@@ -82,7 +82,7 @@ impl Patches {
             }
             let support = match group {
                 1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
-                _ => Support::means(&cloud, group)?,
+                _ => Support::means(&cloud, group, observer)?,
             };
             let (deviation, patches) = Self::over(&cloud, support, group, observer)?;
             let is_exact = patches.noise == 0.0;

@@ -56,7 +56,7 @@ impl Room {
         let mut places = Vec::with_capacity(range.len());
         for (lane, query) in range.enumerate() {
             let x = queries.point(query);
-            support.neighbours().nearest_positions_into(support.cloud(), x, patches.count, &mut self.nearest);
+            support.neighbours().nearest_positions_into(x, patches.count, &mut self.nearest);
             let place =
                 Neighbourhood::put(support, x, &mut self.nearest, &mut self.batch, lane, &mut self.scratch);
             if place.is_none() {

@@ -171,7 +171,7 @@ mod tests {
     fn around(cloud: &Cloud, x: &[f64], count: usize) -> LocalQuadrics {
         let d = cloud.dimension();
         let mut rows = vec![0.0; width(d)];
-        let nearest = Neighbours::of(cloud).nearest_positions(cloud, x, count);
+        let nearest = Neighbours::of(cloud, &Unobserved).unwrap().nearest_positions(x, count);
         let found = fit(cloud, x, &nearest, &mut rows).unwrap_or(Found::Nothing);
         LocalQuadrics { dimension: d, rows, found: vec![found] }
     }
@@ -198,8 +198,9 @@ mod tests {
     #[test]
     fn spheres_and_circles_have_curvature_one() {
         for cloud in [circle(64), fibonacci_sphere(800)] {
-            let (tree, count) = (Neighbours::of(&cloud), n_quadric_neighbours(cloud.dimension()));
-            let around = Neighbourhoods::of(&cloud, &tree, &cloud, count, &Unobserved).unwrap();
+            let (tree, count) =
+                (Neighbours::of(&cloud, &Unobserved).unwrap(), n_quadric_neighbours(cloud.dimension()));
+            let around = Neighbourhoods::of(&tree, &cloud, count, &Unobserved).unwrap();
             let quadrics = LocalQuadrics::of(&cloud, &around, &cloud, &Unobserved).unwrap();
             for (point, x) in cloud.points().enumerate() {
                 assert_eq!(around.nearest(point), Neighbour { point, squared_distance: 0.0 });

@@ -19,20 +19,19 @@ impl Neighbourhoods {
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of(
-        cloud: &Cloud,
         neighbours: &Neighbours,
         queries: &Cloud,
         count: usize,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         // Every query sees as many positions.
-        let count = neighbours.nearest_positions(cloud, queries.point(0), count).len();
+        let count = neighbours.nearest_positions(queries.point(0), count).len();
         let mut found = vec![Neighbour { point: 0, squared_distance: 0.0 }; queries.n_points() * count];
         found.par_chunks_exact_mut(count).enumerate().try_for_each_init(
             Vec::new,
             |nearest, (query, row)| {
                 observer.checkpoint()?;
-                neighbours.nearest_positions_into(cloud, queries.point(query), count, nearest);
+                neighbours.nearest_positions_into(queries.point(query), count, nearest);
                 row.iter_mut().zip(nearest).for_each(|(slot, found)| *slot = *found);
                 Ok(())
             },
@@ -56,7 +55,10 @@ mod tests {
 
     fn around(coordinates: &[f64], count: usize) -> Vec<Vec<usize>> {
         let cloud = Cloud::new(coordinates.to_vec(), 1).unwrap();
-        let found = Neighbourhoods::of(&cloud, &Neighbours::of(&cloud), &cloud, count, &Unobserved).unwrap();
+        let found = {
+            let neighbours = Neighbours::of(&cloud, &Unobserved).unwrap();
+            Neighbourhoods::of(&neighbours, &cloud, count, &Unobserved).unwrap()
+        };
         (0..cloud.n_points()).map(|point| found.around(point).iter().map(|n| n.point).collect()).collect()
     }
 

@@ -44,7 +44,7 @@ pub fn estimate_noise(
     let growth = 2f64.powf(6.0 / (d - 1) as f64);
     let variance_at = |point: usize| {
         let x = cloud.point(point);
-        let nearest = neighbours.nearest_positions(cloud, x, n_large);
+        let nearest = neighbours.nearest_positions(x, n_large);
         let variance = |count: usize| {
             let nearest = nearest.get(..count)?;
             let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
@@ -71,7 +71,7 @@ mod tests {
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     fn noise_of(cloud: &Cloud) -> f64 {
-        estimate_noise(cloud, &Neighbours::of(cloud), &Unobserved).unwrap()
+        estimate_noise(cloud, &Neighbours::of(cloud, &Unobserved).unwrap(), &Unobserved).unwrap()
     }
 
     /// The cloud with every coordinate moved by a number of mean 0 and this standard deviation: cosines of large angles.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::cloud::{Cloud, squared_distance};
-use super::neighbours::Neighbours;
+use super::neighbours::{Distances, Neighbour, Neighbours};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
@@ -24,22 +24,25 @@ impl Sampling {
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self, NumericsError> {
-        let neighbours = Neighbours::of(cloud);
-        let n = cloud.n_points();
-        let (mut distances, mut spacings) = (vec![0.0; n], vec![0.0; n]);
-        let slots = distances.par_iter_mut().zip(&mut spacings);
-        slots.enumerate().try_for_each_init(Vec::new, |found, (point, (nearest, spacing))| {
+        let neighbours = Neighbours::of(cloud, observer)?;
+        let measure = |found: &mut Vec<Neighbour>, position: usize| {
             observer.checkpoint()?;
-            if let Some(lengths) = neighbours.nearest_and_mean(cloud, point, SPACING_NEIGHBOURS, found) {
-                (*nearest, *spacing) = lengths;
-            }
-            Ok(())
-        })?;
-        // Nobody is elsewhere if all points coincide.
-        let (nearest, means) = match distances.iter().all(|&distance| distance == 0.0) {
-            true => (Vec::new(), Vec::new()),
-            false => (distances, spacings.clone()),
+            Ok(neighbours.distances(position, SPACING_NEIGHBOURS, found))
         };
+        let at_positions: Vec<Option<Distances>> = (0..neighbours.n_positions())
+            .into_par_iter()
+            .map_init(Vec::new, measure)
+            .collect::<Result<_, NumericsError>>()?;
+        let (mut nearest, mut spacings) = (Vec::with_capacity(cloud.n_points()), vec![0.0; cloud.n_points()]);
+        for (position, distances) in at_positions.iter().enumerate() {
+            // A position without others is the only one.
+            let Some(Distances { nearest: distance, mean }) = *distances else { continue };
+            for &point in neighbours.points_at(position) {
+                nearest.push(distance);
+                spacings[point as usize] = mean;
+            }
+        }
+        let means = if nearest.is_empty() { Vec::new() } else { spacings.clone() };
         Ok(Self { neighbours, spacings, scales: Scales::of(cloud, nearest, means) })
     }
 
@@ -52,7 +55,7 @@ impl Sampling {
         self.spacings[point]
     }
 
-    /// The same for all points, `[n]`.
+    /// [`Sampling::spacing`] of all points, `[n]`.
     pub fn spacings(&self) -> &[f64] {
         &self.spacings
     }

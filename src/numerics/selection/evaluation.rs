@@ -120,7 +120,7 @@ impl<'a> Evaluator<'a> {
             score: f64::NAN,
         };
         if self.criterion.needs_diagonal() {
-            state.diagonal = self.diagonal(&state.of_mean);
+            state.diagonal = self.diagonal(&state.of_mean, observer)?;
         }
         state.score = self.criterion.score(&state.parts());
         Ok(Some(state))
@@ -141,14 +141,12 @@ impl<'a> Evaluator<'a> {
             return Ok(Vec::new());
         }
         let sensitivity = self.criterion.sensitivity(&state.parts());
-        self.matrices.invert_factor();
-        observer.checkpoint()?;
-        self.matrices.multiply_inverse();
+        self.matrices.invert_factor(observer)?;
+        self.matrices.multiply_inverse(observer)?;
         let mut right = sensitivity.right;
         if let Some(of_columns) = &sensitivity.of_columns {
             right = self.projected(&state.of_mean, right);
-            observer.checkpoint()?;
-            self.matrices.multiply_columns(&state.of_mean, of_columns);
+            self.matrices.multiply_columns(&state.of_mean, of_columns, observer)?;
         }
         observer.checkpoint()?;
         let weights = PairWeights {
@@ -181,15 +179,15 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `P_ii = W_ii − |T_i|²`; 0 where it is rounding: then nothing but its value says what a point's value is.
-    fn diagonal(&mut self, of_mean: &[f64]) -> Vec<f64> {
-        self.matrices.invert_factor();
+    fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        self.matrices.invert_factor(observer)?;
         let n = self.subject.n_points();
         let entry = |(i, of_inverse): (usize, f64)| {
             let of_mean: f64 = of_mean.chunks_exact(n).map(|t| t[i] * t[i]).sum();
             let left = of_inverse - of_mean;
             if left <= UNDETERMINED * of_inverse { 0.0 } else { left }
         };
-        self.matrices.inverse_diagonal().into_iter().enumerate().map(entry).collect()
+        Ok(self.matrices.inverse_diagonal().into_iter().enumerate().map(entry).collect())
     }
 
     /// `P` times a vector.

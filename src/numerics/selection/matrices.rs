@@ -2,8 +2,8 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::ReborrowMut;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -14,13 +14,22 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::parallelism;
+use crate::numerics::solver::{factorize_in_place, parallelism};
 use crate::numerics::sums::gram::{fill_kernel_column, fill_lower_gram};
 use crate::numerics::sums::nodes::Nodes;
 use crate::numerics::sums::regularization::Regularization;
 
 /// A pivot up to this multiple of k₀ is rounding, as in a factorization that is kept.
 const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
+
+/// Columns of a product of matrices between two looks at the observer.
+const COLUMNS_PER_CHECKPOINT: usize = 512;
+
+/// The first column and the width of blocks of n columns.
+fn blocks(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    let firsts = (0..n).step_by(COLUMNS_PER_CHECKPOINT);
+    firsts.map(move |first| (first, COLUMNS_PER_CHECKPOINT.min(n - first)))
+}
 
 /// L with `K + N = LLᵀ`, and two matrices that are made from it; column by column, lower triangles.
 pub(super) struct Matrices {
@@ -33,14 +42,15 @@ pub(super) struct Matrices {
     inverse_factor: Vec<f64>,
     has_inverse_factor: bool,
     product: Vec<f64>,
-    scratch: MemBuffer,
+    /// For a factorization alone on its thread.
+    scratch: Option<MemBuffer>,
 }
 
 impl Matrices {
     /// For n points: alone on this thread, or on all of them. Memory is taken when it is needed.
     pub(super) fn new(n: usize, is_alone: bool) -> Self {
         let par = if is_alone { Par::Seq } else { parallelism((n as f64).powi(3) / 3.0) };
-        let requirement = llt::factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
+        let scratch = || llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
         Self {
             n,
             is_alone,
@@ -49,7 +59,7 @@ impl Matrices {
             inverse_factor: Vec::new(),
             has_inverse_factor: false,
             product: Vec::new(),
-            scratch: MemBuffer::new(requirement),
+            scratch: is_alone.then(|| MemBuffer::new(scratch())),
         }
     }
 
@@ -76,10 +86,13 @@ impl Matrices {
             fill_lower_gram(cloud, kernel, noise, &mut self.factor, n, observer)?;
         }
         let mut factor = MatMut::from_column_major_slice_mut(&mut self.factor, n, n);
-        let (stack, params) = (MemStack::new(&mut self.scratch), Default::default());
+        let least = SMALLEST_PIVOT * kernel.at_zero();
+        let Some(scratch) = &mut self.scratch else {
+            return Ok(factorize_in_place(factor, least, observer)?.is_ok());
+        };
+        let (stack, params) = (MemStack::new(scratch), Default::default());
         let made =
             llt::factor::cholesky_in_place(factor.rb_mut(), Default::default(), self.par, stack, params);
-        let least = SMALLEST_PIVOT * kernel.at_zero();
         Ok(made.is_ok() && (0..n).all(|i| factor[(i, i)] * factor[(i, i)] > least))
     }
 
@@ -108,15 +121,27 @@ impl Matrices {
     }
 
     /// Makes L⁻¹, if it is not there.
-    pub(super) fn invert_factor(&mut self) {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn invert_factor(&mut self, observer: &dyn Observer) -> Result<(), NumericsError> {
         if self.has_inverse_factor {
-            return;
+            return Ok(());
         }
         let n = self.n;
         self.inverse_factor.resize(n * n, 0.0);
-        let inverse = MatMut::from_column_major_slice_mut(&mut self.inverse_factor, n, n);
-        invert_lower_triangular(inverse, MatRef::from_column_major_slice(&self.factor, n, n), self.par);
+        let factor = MatRef::from_column_major_slice(&self.factor, n, n);
+        let mut inverse = MatMut::from_column_major_slice_mut(&mut self.inverse_factor, n, n);
+        for (first, width) in blocks(n) {
+            observer.checkpoint()?;
+            let rest = n - first;
+            let mut columns = inverse.rb_mut().submatrix_mut(first, first, rest, width);
+            columns.fill(0.0);
+            (0..width).for_each(|k| columns[(k, k)] = 1.0);
+            solve_lower_triangular_in_place(factor.submatrix(first, first, rest, rest), columns, self.par);
+        }
         self.has_inverse_factor = true;
+        Ok(())
     }
 
     /// `W_ii = |L⁻¹e_i|²`, from L⁻¹.
@@ -129,25 +154,42 @@ impl Matrices {
     }
 
     /// `W = L⁻ᵀL⁻¹`, from L⁻¹.
-    pub(super) fn multiply_inverse(&mut self) {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn multiply_inverse(&mut self, observer: &dyn Observer) -> Result<(), NumericsError> {
         let n = self.n;
         self.product.resize(n * n, 0.0);
         let inverse = MatRef::from_column_major_slice(&self.inverse_factor, n, n);
-        triangular::matmul(
-            MatMut::from_column_major_slice_mut(&mut self.product, n, n),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            inverse.transpose(),
-            BlockStructure::TriangularUpper,
-            inverse,
-            BlockStructure::TriangularLower,
-            1.0,
-            self.par,
-        );
+        let mut product = MatMut::from_column_major_slice_mut(&mut self.product, n, n);
+        for (first, width) in blocks(n) {
+            observer.checkpoint()?;
+            let rest = n - first;
+            triangular::matmul(
+                product.rb_mut().submatrix_mut(first, first, rest, width),
+                BlockStructure::Rectangular,
+                Accum::Replace,
+                inverse.submatrix(first, first, rest, rest).transpose(),
+                BlockStructure::TriangularUpper,
+                inverse.submatrix(first, first, rest, width),
+                BlockStructure::Rectangular,
+                1.0,
+                self.par,
+            );
+        }
+        Ok(())
     }
 
     /// `P diag(c) P` with `P = W − TTᵀ`, from W; c not negative. Takes the place of L⁻¹.
-    pub(super) fn multiply_columns(&mut self, of_mean: &[f64], c: &[f64]) {
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn multiply_columns(
+        &mut self,
+        of_mean: &[f64],
+        c: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
         let (n, product) = (self.n, &self.product);
         let fill = |(j, column): (usize, &mut [f64])| {
             let root = c[j].sqrt();
@@ -163,17 +205,15 @@ impl Matrices {
             false => self.inverse_factor.par_chunks_exact_mut(n).enumerate().for_each(fill),
         }
         let scaled = MatRef::from_column_major_slice(&self.inverse_factor, n, n);
-        triangular::matmul(
-            MatMut::from_column_major_slice_mut(&mut self.product, n, n),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            scaled,
-            BlockStructure::Rectangular,
-            scaled.transpose(),
-            BlockStructure::Rectangular,
-            1.0,
-            self.par,
-        );
+        let mut product = MatMut::from_column_major_slice_mut(&mut self.product, n, n);
+        for (first, width) in blocks(n) {
+            observer.checkpoint()?;
+            let rest = n - first;
+            let columns = product.rb_mut().submatrix_mut(first, first, rest, width);
+            let (rows, right) = (scaled.subrows(first, rest), scaled.subrows(first, width));
+            matmul(columns, Accum::Replace, rows, right.transpose(), 1.0, self.par);
+        }
+        Ok(())
     }
 
     /// The last product, `[n, n]`, of which the lower triangle counts.

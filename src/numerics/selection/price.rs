@@ -1,5 +1,6 @@
 //! What model selection takes, known before it begins.
 
+use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
 use super::select::SIDE_BY_SIDE;
 use crate::numerics::solver::choose::Price;
@@ -10,7 +11,8 @@ pub fn expected_evaluations(n_free: usize) -> usize {
     if n_free == 0 { 1 } else { 40 + 6 * n_free }
 }
 
-/// What so many evaluations take: with all slopes n³ for the likelihood, twice that for others, and a pass over the pairs.
+/// What so many evaluations take: with all slopes n³ for the likelihood, twice that for others, a third of it without slopes, and a pass over
+/// the pairs.
 ///
 /// `n_descents` are families times starts: those of up to 1,024 points run side by side, on `n_threads`, with memory of their own.
 pub fn selection_price(
@@ -22,7 +24,9 @@ pub fn selection_price(
 ) -> Price {
     let (n, d) = (n_points as f64, dimension as f64);
     let cubes = match criterion {
+        Criterion::MarginalLikelihood if n_free == 0 => 1.0 / 3.0,
         Criterion::MarginalLikelihood => 1.0,
+        _ if n_free == 0 => 2.0 / 3.0,
         Criterion::LeaveOneOut | Criterion::GeneralizedCrossValidation => 2.0,
     };
     let evaluation = n * n * (cubes * n + 40.0 + 2.0 * d + 4.0 * n_free as f64);
@@ -35,13 +39,17 @@ pub fn selection_price(
     }
 }
 
-/// What a path of so many α takes: an eigendecomposition, and a product of matrices for what needs the diagonal of the inverse.
+/// What a path of so many α takes: an eigendecomposition, and a product of matrices for what needs the diagonal of the inverse; or a
+/// factorization for each α.
 pub fn alpha_path_price(
     (n_points, dimension): (usize, usize),
     criterion: Criterion,
     n_functions: usize,
     n_alphas: usize,
 ) -> Price {
+    if !is_decomposed(n_points, n_alphas) {
+        return selection_price((n_points, dimension), criterion, 0, n_alphas, (1, 1));
+    }
     let (n, d, m, p) = (n_points as f64, dimension as f64, n_alphas as f64, n_functions as f64);
     let each = match criterion {
         Criterion::MarginalLikelihood => n * (10.0 + 4.0 * (p + 1.0) * (p + 1.0)),
@@ -51,7 +59,7 @@ pub fn alpha_path_price(
     let n_matrices = 5;
     let beside = n_points.saturating_mul(4 * dimension + 4 * n_functions + 20);
     let n_numbers = n_points.saturating_mul(n_points).saturating_mul(n_matrices).saturating_add(beside);
-    let at_once = n_points.saturating_mul(4 * super::alpha_path::ALPHAS_AT_ONCE.min(n_alphas));
+    let at_once = n_points.saturating_mul(4 * ALPHAS_AT_ONCE.min(n_alphas));
     Price {
         n_bytes: n_numbers.saturating_add(at_once).saturating_mul(size_of::<f64>()),
         flops: 9.0 * n.powi(3) + n * n * (20.0 + d + 4.0 * p) + m * each,

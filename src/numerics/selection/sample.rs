@@ -137,12 +137,7 @@ fn chosen(observed: &Observed<'_>) -> Vec<usize> {
     }
     let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER);
     let around = |&point: &usize| {
-        observed
-            .sampling
-            .neighbours()
-            .nearest(cloud, cloud.point(point), TOGETHER)
-            .into_iter()
-            .map(|n| n.point)
+        observed.sampling.neighbours().nearest(cloud.point(point), TOGETHER).into_iter().map(|n| n.point)
     };
     let mut points: Vec<usize> = centres.iter().flat_map(around).collect();
     points.sort_unstable();

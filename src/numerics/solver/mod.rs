@@ -22,6 +22,7 @@ use super::points::cloud::Cloud;
 use super::sums::expansion::Expansion;
 use super::sums::regularization::Regularization;
 use dense::Dense;
+pub(in crate::numerics) use dense::factorize_in_place;
 pub(crate) use dense::parallelism;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
 use kind::{Quantity, SolverKind};

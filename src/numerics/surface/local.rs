@@ -147,7 +147,7 @@ impl LocalSurface {
             return Some(DegeneracyReason::VanishingGradient);
         }
         if !is_point {
-            let nearest = self.sampling.neighbours().nearest(&self.cloud, x, 1);
+            let nearest = self.sampling.neighbours().nearest(x, 1);
             let is_far = |found: usize, squared: f64| is_far(squared, self.sampling.spacing(found));
             if nearest.first().is_none_or(|found| is_far(found.point, found.squared_distance)) {
                 return Some(DegeneracyReason::FarFromCloud);
@@ -179,12 +179,8 @@ impl LocalSurface {
         let d = self.cloud.dimension();
         let mut found = Vec::new();
         geometry.turn(|query, normal| {
-            self.sampling.neighbours().nearest_into(
-                &self.cloud,
-                queries.point(query),
-                SPACING_NEIGHBOURS,
-                &mut found,
-            );
+            let neighbours = self.sampling.neighbours();
+            neighbours.nearest_into(queries.point(query), SPACING_NEIGHBOURS, &mut found);
             let along: f64 = found
                 .iter()
                 .map(|found| {
@@ -224,7 +220,7 @@ fn orient(
         }
     }
     let count = super::orientation::n_around(cloud);
-    let around = Neighbourhoods::of(cloud, sampling.neighbours(), cloud, count, observer)?;
+    let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
     Ok(Oriented::of_directions(cloud, (&around, sampling.spacings()), directions, given.is_some()))
 }

@@ -414,7 +414,8 @@ mod tests {
     use crate::numerics::testing::fibonacci_sphere;
 
     fn around(cloud: &Cloud) -> Neighbourhoods {
-        Neighbourhoods::of(cloud, &Neighbours::of(cloud), cloud, 18, &Unobserved).unwrap()
+        let neighbours = Neighbours::of(cloud, &Unobserved).unwrap();
+        Neighbourhoods::of(&neighbours, cloud, 18, &Unobserved).unwrap()
     }
 
     fn directions(cloud: &Cloud, normals: Vec<f64>) -> Directions {

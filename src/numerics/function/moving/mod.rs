@@ -44,18 +44,18 @@ pub struct Moving {
 /// Who knows which points are near: those with the greatest covariances.
 enum Near {
     Sampled(Arc<Sampling>),
-    /// The cloud in coordinates in which the kernel has one length scale.
-    Stretched(Cloud, Neighbours),
+    /// In coordinates in which the kernel has one length scale.
+    Stretched(Neighbours),
 }
 
 impl Near {
     /// The nearest points, nearest first.
     fn nearest_into(&self, system: &System, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
         match self {
-            Self::Sampled(sampling) => sampling.neighbours().nearest_into(system.cloud(), x, count, found),
-            Self::Stretched(cloud, neighbours) => {
+            Self::Sampled(sampling) => sampling.neighbours().nearest_into(x, count, found),
+            Self::Stretched(neighbours) => {
                 let stretched = x.iter().enumerate().map(|(axis, x)| x * system.kernel().stretch(axis));
-                neighbours.nearest_into(cloud, &stretched.collect::<Small>(), count, found);
+                neighbours.nearest_into(&stretched.collect::<Small>(), count, found);
             }
         }
     }
@@ -63,7 +63,7 @@ impl Near {
     fn n_bytes(&self) -> usize {
         match self {
             Self::Sampled(sampling) => block_bytes(arc_payload::<Sampling>()) + sampling.n_bytes(),
-            Self::Stretched(cloud, neighbours) => cloud.n_bytes() + neighbours.n_bytes(),
+            Self::Stretched(neighbours) => neighbours.n_bytes(),
         }
     }
 }
@@ -89,16 +89,20 @@ pub struct MovingAnswer {
 }
 
 impl Moving {
-    /// Of a system and how its cloud is sampled.
-    pub fn new(system: System, sampling: Arc<Sampling>) -> Self {
+    /// Local kriging of a system, with how its cloud is sampled.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn new(
+        system: System,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
         let near = match system.kernel().stretched_cloud(system.cloud()) {
             None => Near::Sampled(sampling),
-            Some(cloud) => {
-                let neighbours = Neighbours::of(&cloud);
-                Near::Stretched(cloud, neighbours)
-            }
+            Some(cloud) => Near::Stretched(Neighbours::of(&cloud, observer)?),
         };
-        Self { system, near }
+        Ok(Self { system, near })
     }
 
     pub fn system(&self) -> &System {

@@ -17,7 +17,7 @@ fn system(cloud: &Cloud, family: Family, alpha: f64) -> System {
 
 fn moving(system: System) -> Moving {
     let sampling = Arc::new(Sampling::of(system.cloud(), &Unobserved).unwrap());
-    Moving::new(system, sampling)
+    Moving::new(system, sampling, &Unobserved).unwrap()
 }
 
 #[test]

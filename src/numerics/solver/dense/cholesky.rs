@@ -26,6 +26,12 @@ use crate::numerics::sums::regularization::Regularization;
 /// blocked factorization of the whole reaches 75–78 %.
 const LEAF_SIZE: usize = 256;
 
+/// Flops of a product of matrices between two looks at the observer: half a second of two cores.
+const FLOPS_PER_CHECKPOINT: f64 = 3e10;
+
+/// Rows or columns of such a product at least: with fewer it is slower.
+const LEAST_PIECE: usize = 128;
+
 /// `K + αI` first, and its factor L after [`Cholesky::factorize`].
 pub(super) struct Cholesky {
     packed: Packed,
@@ -170,10 +176,9 @@ fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Resu
     let n_first = parts.first().nrows();
     recurse(parts.first(), 0, floor, &mut leaf, observer)?;
     let (first, square) = parts.first_and_square();
-    solve_below(first, square);
-    observer.checkpoint().map_err(Stop::Cancelled)?;
+    solve_below(first, square, observer)?;
     let (second, square) = parts.second_and_square();
-    update(second, square);
+    update(second, square, observer)?;
     recurse(parts.second(), n_first, floor, &mut leaf, observer)
 }
 
@@ -182,7 +187,7 @@ fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Resu
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
-pub(super) fn factorize_in_place(
+pub(in crate::numerics) fn factorize_in_place(
     a: MatMut<'_, f64>,
     floor: f64,
     observer: &dyn Observer,
@@ -214,32 +219,56 @@ fn recurse(
     let half = (n / 2).next_multiple_of(64).min(n - 1);
     let (mut leading, _, mut below, mut trailing) = a.rb_mut().split_at_mut(half, half);
     recurse(leading.rb_mut(), first, floor, leaf, observer)?;
-    solve_below(leading.rb(), below.rb_mut());
-    observer.checkpoint().map_err(Stop::Cancelled)?;
-    update(trailing.rb_mut(), below.rb());
+    solve_below(leading.rb(), below.rb_mut(), observer)?;
+    update(trailing.rb_mut(), below.rb(), observer)?;
     recurse(trailing, first + half, floor, leaf, observer)
 }
 
 /// `below ← below·L⁻ᵀ`.
-fn solve_below(l: MatRef<'_, f64>, below: MatMut<'_, f64>) {
-    let par = parallelism((l.nrows() * l.nrows() * below.nrows()) as f64);
-    solve_lower_triangular_in_place(l, below.transpose_mut(), par);
+fn solve_below(l: MatRef<'_, f64>, mut below: MatMut<'_, f64>, observer: &dyn Observer) -> Result<(), Stop> {
+    let flops_per_row = (l.nrows() * l.nrows()) as f64;
+    for (first, n_rows) in pieces(below.nrows(), flops_per_row) {
+        observer.checkpoint().map_err(Stop::Cancelled)?;
+        let rows = below.rb_mut().subrows_mut(first, n_rows);
+        let par = parallelism(flops_per_row * n_rows as f64);
+        solve_lower_triangular_in_place(l, rows.transpose_mut(), par);
+    }
+    Ok(())
+}
+
+/// The first index and the length of parts of n, each of [`FLOPS_PER_CHECKPOINT`] at most or as short as matrix products are fast.
+fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
+    let most = ((FLOPS_PER_CHECKPOINT / flops_each) as usize).max(LEAST_PIECE);
+    let length = n.div_ceil(n.div_ceil(most).max(1)).max(1);
+    (0..n).step_by(length).map(move |first| (first, length.min(n - first)))
 }
 
 /// `trailing ← trailing − below·belowᵀ`, lower triangle.
-fn update(trailing: MatMut<'_, f64>, below: MatRef<'_, f64>) {
-    let par = parallelism((below.nrows() * below.nrows() * below.ncols()) as f64);
-    triangular::matmul(
-        trailing,
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        below,
-        BlockStructure::Rectangular,
-        below.transpose(),
-        BlockStructure::Rectangular,
-        -1.0,
-        par,
-    );
+fn update(
+    mut trailing: MatMut<'_, f64>,
+    below: MatRef<'_, f64>,
+    observer: &dyn Observer,
+) -> Result<(), Stop> {
+    let (n, k) = (below.nrows(), below.ncols());
+    for (first, width) in pieces(n, (n * k) as f64) {
+        observer.checkpoint().map_err(Stop::Cancelled)?;
+        let (diagonal, rest) = (below.subrows(first, width), first + width);
+        let par = parallelism((width * (n - first) * k) as f64);
+        triangular::matmul(
+            trailing.rb_mut().submatrix_mut(first, first, width, width),
+            BlockStructure::TriangularLower,
+            Accum::Add,
+            diagonal,
+            BlockStructure::Rectangular,
+            diagonal.transpose(),
+            BlockStructure::Rectangular,
+            -1.0,
+            par,
+        );
+        let under = trailing.rb_mut().submatrix_mut(rest, first, n - rest, width);
+        matmul(under, Accum::Add, below.subrows(rest, n - rest), diagonal.transpose(), -1.0, par);
+    }
+    Ok(())
 }
 
 /// Factorizes small diagonal blocks in a buffer of their own: column-major whichever way the block lies, and what shares the

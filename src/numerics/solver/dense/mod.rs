@@ -20,6 +20,7 @@ use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
 use cholesky::Cholesky;
+pub(in crate::numerics) use cholesky::factorize_in_place;
 pub use factor::{Factor, FactorBuilder};
 use pivoted_cholesky::PivotedCholesky;
 

@@ -101,10 +101,10 @@ impl Judged<'_> {
         let errors: Vec<f64> = errors.chunks_exact(k).map(norm).collect();
         let most = self.most(judged.into_iter().zip(errors.iter().copied()), &functionals)?;
         let coarse = places.select(&chosen);
-        let near = Neighbours::of(&coarse);
+        let near = Neighbours::of(&coarse, observer)?;
         let is_doubtful = |found: &mut Vec<Neighbour>, at: usize| {
             observer.checkpoint()?;
-            near.nearest_into(&coarse, places.point(at), AROUND, found);
+            near.nearest_into(places.point(at), AROUND, found);
             let count = if found[0].squared_distance == 0.0 { 1 } else { found.len() };
             Ok(!found[..count].iter().all(|n| errors[n.point] <= most))
         };

@@ -96,7 +96,7 @@ fn stencils(
             return Ok(Row::default());
         }
         let x = queries.point(query);
-        neighbours.nearest_positions_into(nodes, x, n_stencil_nodes(d), nearest);
+        neighbours.nearest_positions_into(x, n_stencil_nodes(d), nearest);
         let site = Site { x, normal: geometry.normal(query), curvature: geometry.largest_curvature(query) };
         let row = Row::at(nodes, &site, nearest, operator).unwrap_or_default();
         match row.weights.iter().all(|weight| weight.is_finite()) {

@@ -131,8 +131,7 @@ impl Unconfirmed<'_> {
     /// that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &SignatureSurface, share: f64) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
-        let nearest =
-            surface.sampling().neighbours().nearest_positions(surface.cloud(), self.x, SPACING_NEIGHBOURS);
+        let nearest = surface.sampling().neighbours().nearest_positions(self.x, SPACING_NEIGHBOURS);
         // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
         let is_at_point =
             nearest.first().is_some_and(|found| found.squared_distance <= (0.5 * self.spacing).powi(2));

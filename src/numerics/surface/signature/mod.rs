@@ -76,7 +76,7 @@ impl SignatureSurface {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
         let count = n_quadric_neighbours(cloud.dimension());
-        let around = Neighbourhoods::of(cloud, sampling.neighbours(), cloud, count, observer)?;
+        let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
         let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
         let directions = directions(&signature, &sampling, &quadrics, observer)?;
         let oriented = Oriented::of(cloud, (&around, sampling.spacings()), directions, &quadrics, given);
@@ -120,7 +120,7 @@ impl SignatureSurface {
     /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.
     pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
         let count = n_quadric_neighbours(self.cloud().dimension());
-        let nearest = self.sampling.neighbours().nearest_positions(self.cloud(), x, count);
+        let nearest = self.sampling.neighbours().nearest_positions(x, count);
         let patch = Patch::of(self.cloud(), x, nearest.iter().map(|found| found.point));
         patch.is_some_and(|patch| patch.n_points() == count && patch.is_thread())
     }
@@ -195,7 +195,7 @@ impl SignatureSurface {
         if !self.oriented.is_consistent && !self.orientation().is_given {
             return -1.0;
         }
-        self.sampling.neighbours().nearest_into(self.cloud(), x, SPACING_NEIGHBOURS, found);
+        self.sampling.neighbours().nearest_into(x, SPACING_NEIGHBOURS, found);
         let along: f64 = found
             .iter()
             .map(|found| {
@@ -212,7 +212,7 @@ impl SignatureSurface {
     /// room for them.
     pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64], found: &mut Vec<Neighbour>) -> f64 {
         let Some(jets) = self.jets_at_points() else { return -1.0 };
-        self.sampling.neighbours().nearest_positions_into(self.cloud(), x, SPACING_NEIGHBOURS, found);
+        self.sampling.neighbours().nearest_positions_into(x, SPACING_NEIGHBOURS, found);
         let along: f64 = found.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
         if along > 0.0 { 1.0 } else { -1.0 }
     }

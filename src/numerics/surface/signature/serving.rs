@@ -86,11 +86,11 @@ impl Surroundings {
         }
         if checks_curvatures {
             let count = n_quadric_neighbours(cloud.dimension());
-            let around = Neighbourhoods::of(cloud, neighbours, queries, count, observer)?;
+            let around = Neighbourhoods::of(neighbours, queries, count, observer)?;
             let quadrics = Some(LocalQuadrics::of(cloud, &around, queries, observer)?);
             return Ok(Self::OfQueries { around, quadrics });
         }
-        let around = Neighbourhoods::of(cloud, neighbours, queries, 1, observer)?;
+        let around = Neighbourhoods::of(neighbours, queries, 1, observer)?;
         Ok(Self::OfQueries { around, quadrics: None })
     }
 }

@@ -1,0 +1,156 @@
+//! Clouds that are hard on searches, through every route: as quick as others, and cancelled at their deadline.
+
+use std::time::{Duration, Instant};
+
+use gramian::numerics::observer::Unobserved;
+use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::sampling::Sampling;
+use serde_json::{Value, json};
+
+use crate::common::hostile::HOSTILE;
+use crate::process::Process;
+
+/// Every route that computes, with what its request has beside cloud, values and kernel.
+const REQUESTS: [(&str, &str); 22] = [
+    ("/v1/interpolation", r#"{"derivatives": 2}"#),
+    ("/v1/interpolation", r#"{"include": ["deviations"], "duplicates": "merge"}"#),
+    ("/v1/interpolation/batch", r#"{}"#),
+    (
+        "/v1/posterior",
+        r#"{"include": ["variance", "gradient_variances"], "solver": "local", "duplicates": "merge"}"#,
+    ),
+    ("/v1/posterior", r#"{"include": ["log_marginal_likelihood", "covariance"], "alpha": 0.01}"#),
+    ("/v1/posterior/batch", r#"{"include": ["variance"], "alpha": 0.01}"#),
+    ("/v1/normals", r#"{"surface": "offset", "duplicates": "merge"}"#),
+    ("/v1/normals", r#"{"surface": "signature", "alpha": 0.01}"#),
+    ("/v1/curvatures", r#"{"include": ["deviations"]}"#),
+    ("/v1/curvatures", r#"{"surface": "local", "duplicates": "merge"}"#),
+    ("/v1/curvatures", r#"{"kernel": {"family": "matern", "nu": 4.5}, "alpha": 0.01}"#),
+    ("/v1/surface-gradient", r#"{"include": ["deviations"]}"#),
+    ("/v1/surface-gradient", r#"{"solver": "local"}"#),
+    ("/v1/surface-gradient/matrix", r#"{"duplicates": "merge"}"#),
+    ("/v1/surface-gradient/sparse-matrix", r#"{}"#),
+    ("/v1/laplace-beltrami", r#"{"include": ["deviations"]}"#),
+    ("/v1/laplace-beltrami", r#"{"solver": "local", "duplicates": "merge"}"#),
+    ("/v1/laplace-beltrami/matrix", r#"{"alpha": 0.01}"#),
+    ("/v1/laplace-beltrami/sparse-matrix", r#"{"duplicates": "merge"}"#),
+    ("/v1/model-selection", r#"{"duplicates": "merge"}"#),
+    ("/v1/model-selection", r#"{"criterion": "leave_one_out", "alpha": 0.01}"#),
+    ("/v1/estimate", r#"{}"#),
+];
+
+/// The body of one of the requests.
+fn body(path: &str, members: &str, cloud_id: &str, n_points: usize) -> Value {
+    let mut body: Value = serde_json::from_str(members).unwrap();
+    body["cloud"] = json!({"id": cloud_id});
+    let values: Vec<f64> =
+        (0..n_points).map(|i| (i as f64 * 0.618).fract() + (i as f64 * 1e-3).sin()).collect();
+    match path {
+        "/v1/estimate" => body["operation"] = json!("compute_normals"),
+        _ if path.ends_with("/batch") => body["values"] = json!([values, values]),
+        _ if path.ends_with("matrix") || path == "/v1/normals" || path == "/v1/curvatures" => {}
+        _ => body["values"] = json!(values),
+    }
+    body
+}
+
+/// A cloud as npy, compressed: repeated positions are small then.
+fn packed(cloud: &Cloud) -> Vec<u8> {
+    let shape = format!("({}, {})", cloud.n_points(), cloud.dimension());
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
+    let header = format!("{header:<117}\n");
+    let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+    npy.extend((header.len() as u16).to_le_bytes());
+    npy.extend(header.as_bytes());
+    cloud.coordinates().iter().for_each(|x| npy.extend(x.to_le_bytes()));
+    zstd::encode_all(npy.as_slice(), 3).unwrap()
+}
+
+/// Seconds of processor time that a process has used.
+fn cpu_seconds(process: &Process) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.child.id())).unwrap();
+    // Behind the name, which may have blanks: the 12th and 13th are ticks of a hundredth of a second.
+    let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split_whitespace().collect();
+    (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
+}
+
+/// Seconds of processor time until the process has nothing to do.
+async fn cpu_seconds_until_idle(process: &Process) -> f64 {
+    let start = cpu_seconds(process);
+    let mut before = start;
+    loop {
+        tokio::time::sleep(Duration::from_millis(200)).await;
+        let now = cpu_seconds(process);
+        if now - before < 0.03 || now - start > 20.0 {
+            return now - start;
+        }
+        before = now;
+    }
+}
+
+async fn register(process: &Process, client: &reqwest::Client, cloud: &Cloud) -> (u16, String) {
+    let request = client.post(process.url("/v1/clouds")).header("content-type", "application/x-npy");
+    let request = request.header("content-encoding", "zstd").body(packed(cloud));
+    let answer = request.send().await.unwrap();
+    let status = answer.status().as_u16();
+    let answer: Value = answer.json().await.unwrap();
+    (status, answer["cloud_id"].as_str().unwrap_or_default().to_owned())
+}
+
+/// Sends every request at once; says how each was answered.
+async fn ask_all(
+    process: &Process,
+    client: &reqwest::Client,
+    cloud_id: &str,
+    n_points: usize,
+) -> Vec<(u16, &'static str)> {
+    let ask = |(path, members): (&'static str, &str)| {
+        let request = client.post(process.url(path)).json(&body(path, members, cloud_id, n_points));
+        async move { (request.send().await.unwrap().status().as_u16(), path) }
+    };
+    futures_util::future::join_all(REQUESTS.map(ask)).await
+}
+
+#[tokio::test]
+async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
+    let flags = ["--deadline-seconds", "2", "--threads", "2", "--max-queue", "64"];
+    let process = Process::start(&flags);
+    let client = reqwest::Client::new();
+    // Beyond what is factorized, and well within.
+    let large = HOSTILE.iter().map(|hostile| (hostile, 60_000));
+    let small = HOSTILE.iter().step_by(4).map(|hostile| (hostile, 4000));
+    let mut n_ended = 0;
+    for (hostile, n_points) in large.chain(small) {
+        let (status, id) = register(&process, &client, &hostile.cloud(n_points)).await;
+        assert_eq!(status, 201, "{}", hostile.name);
+        let answers = ask_all(&process, &client, &id, n_points).await;
+        n_ended += answers.iter().filter(|(status, _)| *status == 504).count();
+        let expected = |status: &u16| matches!(status, 200 | 413 | 422 | 503 | 504);
+        assert!(answers.iter().all(|(status, _)| expected(status)), "{}: {answers:?}", hostile.name);
+        // Idle after a second: two threads have used two seconds of processor time by then at most.
+        let seconds = cpu_seconds_until_idle(&process).await;
+        assert!(seconds < 2.0, "{} of {n_points}: {seconds} s of work nobody waits for", hostile.name);
+    }
+    assert!(n_ended > 100, "{n_ended} requests were cut off, too few to see anything");
+}
+
+/// The least time of three that looking at the neighbours of a cloud takes, seconds.
+fn seconds_to_sample(cloud: &Cloud) -> f64 {
+    let time = |_| {
+        let start = Instant::now();
+        Sampling::of(cloud, &Unobserved).unwrap();
+        start.elapsed().as_secs_f64()
+    };
+    (0..3).map(time).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn neighbours_of_hostile_clouds_take_no_three_times_as_long_as_those_of_random_ones() {
+    for hostile in &HOSTILE {
+        // Random points of many dimensions take a time that is quadratic.
+        let n_points = if hostile.dimension > 3 { 3000 } else { 20_000 };
+        let [hard, ordinary] =
+            [hostile, &hostile.ordinary()].map(|of| seconds_to_sample(&of.cloud(n_points)));
+        assert!(hard < 3.0 * ordinary, "{}: {hard} s, random points {ordinary} s", hostile.name);
+    }
+}
