@@ -234,7 +234,7 @@ pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) ->
                 Ok(true)
             }
             Kept::Nowhere(reason) => {
-                tracing::error!(%reason, cloud = %cloud.id, "neither the store nor memory takes a cloud");
+                durable.fell_behind(&reason);
                 let detail =
                     "the store of clouds does not answer, and memory is full of clouds that it has not taken";
                 Err(Problem::unavailable(detail, SECONDS_UNTIL_BACK))
