@@ -127,7 +127,7 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_STORE_REQUIRED", default_value_t = false, action = clap::ArgAction::Set, value_parser = flag)]
     pub store_required: bool,
 
-    /// Days that a cloud stays in the store after it was registered first. Absent: for ever.
+    /// Days that a cloud stays in the store after it was written. Absent: for ever.
     #[arg(long, env = "GRAMIAN_STORE_DAYS", value_parser = positive_days)]
     pub store_days: Option<f64>,
 

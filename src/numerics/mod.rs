@@ -27,4 +27,4 @@ pub mod function;
 pub mod surface;
 
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;

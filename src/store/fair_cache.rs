@@ -100,9 +100,7 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
 
     /// Weighs a value again that has grown; one that is gone stays away.
     pub(super) fn reweigh(&self, owner: Owner, key: K, n_bytes: usize) {
-        let value =
-            self.lock().of.get(&owner).and_then(|of| of.by_use.peek(&key)).map(|entry| entry.value.clone());
-        if let Some(value) = value {
+        if let Some(value) = self.peek(owner, &key) {
             self.insert(owner, key, value, n_bytes);
         }
     }
@@ -113,10 +111,15 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         self.lock().evict(owner, may_go).map(|entry| entry.value)
     }
 
-    /// Forgets a value; says whether it was there.
-    pub(super) fn remove(&self, owner: Owner, key: &K) -> bool {
+    /// Finds a value without using it: it stays where it is in the order of eviction.
+    pub(super) fn peek(&self, owner: Owner, key: &K) -> Option<V> {
+        self.lock().of.get(&owner)?.by_use.peek(key).map(|entry| entry.value.clone())
+    }
+
+    /// Forgets a value, and returns it.
+    pub(super) fn remove(&self, owner: Owner, key: &K) -> Option<V> {
         let gone = self.lock().remove(owner, key);
-        gone.is_some()
+        gone.map(|entry| entry.value)
     }
 
     /// Forgets all values of an owner whose key is meant.
@@ -264,7 +267,7 @@ mod tests {
         assert!(!cache.insert(A, 4, 4, 1000));
         cache.reweigh(A, 0, 150);
         assert_eq!(keys(&cache, A), [0, 3]);
-        assert!(cache.remove(A, &0) && !cache.remove(A, &0));
+        assert_eq!((cache.remove(A, &0), cache.remove(A, &0)), (Some(0), None));
         cache.remove_if(A, |&key| key == 3);
         assert_eq!(cache.n_bytes(), 0);
     }

@@ -11,6 +11,7 @@ mod batches;
 mod bodies;
 mod cache;
 mod clouds;
+mod clouds_at_once;
 mod compatibility;
 mod connections;
 mod contention;

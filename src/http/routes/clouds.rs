@@ -1,6 +1,5 @@
 //! `/v1/clouds`: registered clouds, named by their content.
 
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -18,7 +17,7 @@ use crate::http::fields::schemas::{CloudIdSchema, CursorSchema};
 use crate::http::openapi::responses::{DescribeProblems, ListProblems, LookUpProblems, RegisterProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
-use crate::http::serve::durable::{find_cloud, forget_cloud, keep, list_clouds as list_of, unavailable};
+use crate::http::serve::durable::{find_cloud, forget_cloud, keep, list_clouds as list_of};
 use crate::http::serve::intake::read_body;
 use crate::http::serve::planner::{Planner, unknown_cloud};
 use crate::http::serve::sampling::find_sampling;
@@ -28,10 +27,10 @@ use crate::http::wire::read::points::Points;
 use crate::numerics::points::sampling::{NearestRange, Scales};
 use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
-use crate::store::clouds::RegisteredCloud;
+use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
-use crate::store::objects::Listed;
 use crate::store::objects::cloud_object::CloudHead;
+use crate::store::objects::{ListWindow, Listed};
 
 /// Clouds in a page when the client names no number.
 const DEFAULT_PAGE: usize = 50;
@@ -127,6 +126,15 @@ impl Cloud {
     }
 }
 
+impl From<ListedCloud> for Cloud {
+    fn from(listed: ListedCloud) -> Self {
+        match listed {
+            ListedCloud::InMemory(stored) => Self::from(stored.as_ref()),
+            ListedCloud::InStore(id, head) => Self::of_head(id, head),
+        }
+    }
+}
+
 fn written(time: SystemTime) -> String {
     humantime::format_rfc3339_millis(time).to_string()
 }
@@ -182,8 +190,9 @@ pub async fn create_cloud(
         Ok::<_, Problem>((stored, is_new, memory))
     };
     let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;
-    // Memory may have let go of what the store has.
-    let is_new = keep(&app, owner, &stored).await? && is_new;
+    // With a store it is the store that knows: memory lets go of clouds, and other processes delete them.
+    let is_new_to_store = keep(&app, owner, &stored).await?;
+    let is_new = if app.durable.is_some() { is_new_to_store } else { is_new };
     let cloud = describe(&app, &admission, &stored).await?;
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
@@ -309,30 +318,11 @@ pub async fn list_clouds(
     Extension(owner): Extension<Owner>,
     RawQuery(query): RawQuery,
 ) -> Result<axum::Json<CloudList>, Problem> {
-    let page = Page::parse(query.as_deref().unwrap_or(""))?;
+    let window = parse_window(query.as_deref().unwrap_or(""))?;
     let admission = app.compute.admit(owner)?;
-    let (shown, is_last) = list_of(&app, &admission, page.after.map(|cursor| cursor.0), page.limit).await?;
-    let next = shown.last().filter(|_| !is_last).map(|(listed, _)| Cursor(*listed).to_string());
-    let elsewhere =
-        shown.iter().filter(|(_, stored)| stored.is_none()).map(|(listed, _)| listed.id).collect();
-    let mut heads = heads(&app, owner, elsewhere).await?;
-    let describe = |(listed, stored): (Listed, Option<Arc<RegisteredCloud>>)| match stored {
-        Some(stored) => Some(Cloud::from(stored.as_ref())),
-        // Those that were deleted meanwhile have none.
-        None => heads.remove(&listed.id).map(|head| Cloud::of_head(listed.id, head)),
-    };
-    Ok(axum::Json(CloudList { clouds: shown.into_iter().filter_map(describe).collect(), next }))
-}
-
-async fn heads(app: &App, owner: Owner, ids: Vec<CloudId>) -> Result<HashMap<CloudId, CloudHead>, Problem> {
-    let Some(durable) = app.durable.as_ref().filter(|_| !ids.is_empty()) else { return Ok(HashMap::new()) };
-    let found = durable.objects.heads(&app.keys.name_of(owner), ids).await;
-    Ok(found.map_err(|error| unavailable(&error))?.into_iter().collect())
-}
-
-struct Page {
-    limit: usize,
-    after: Option<Cursor>,
+    let CloudPage { clouds, next } = list_of(&app, &admission, window).await?;
+    let next = next.map(|place| Cursor(place).to_string());
+    Ok(axum::Json(CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next }))
 }
 
 /// The place of the last cloud of a page in the order of the list: it holds when that cloud is gone. Opaque to clients.
@@ -347,43 +337,42 @@ impl Cursor {
         let nanoseconds = u128::from_str_radix(nanoseconds, 16).ok().filter(|_| is_plain)?;
         // Behind all of them, where nothing is.
         let nanoseconds = u64::try_from(nanoseconds).unwrap_or(u64::MAX);
-        let created_at = SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
-        Some(Self(Listed { created_at, id: CloudId::parse(id)? }))
+        let since = SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
+        Some(Self(Listed { since, id: CloudId::parse(id)? }))
     }
 }
 
 impl fmt::Display for Cursor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let since_epoch = self.0.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let since_epoch = self.0.since.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         write!(f, "{:x}-{}", since_epoch.as_nanos(), self.0.id)
     }
 }
 
-impl Page {
-    fn parse(query: &str) -> Result<Self, Problem> {
-        let mut page = Self { limit: DEFAULT_PAGE, after: None };
-        for pair in query.split('&').filter(|pair| !pair.is_empty()) {
-            let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
-            match name {
-                "limit" => match value.parse() {
-                    Ok(limit) if (1..=MAX_PAGE).contains(&limit) => page.limit = limit,
-                    _ => {
-                        let detail = format!("limit must be an integer from 1 to {MAX_PAGE}");
-                        return Err(Problem::invalid_request("/limit", detail));
-                    }
-                },
-                "cursor" => match Cursor::parse(value) {
-                    Some(cursor) => page.after = Some(cursor),
-                    None => return Err(Problem::invalid_request("/cursor", "this is no cursor of a page")),
-                },
+/// The window that a query asks for.
+fn parse_window(query: &str) -> Result<ListWindow, Problem> {
+    let mut window = ListWindow { after: None, n: DEFAULT_PAGE };
+    for pair in query.split('&').filter(|pair| !pair.is_empty()) {
+        let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
+        match name {
+            "limit" => match value.parse() {
+                Ok(limit) if (1..=MAX_PAGE).contains(&limit) => window.n = limit,
                 _ => {
-                    let pointer = format!("/{}", name.chars().take(64).collect::<String>());
-                    return Err(Problem::invalid_request(pointer, "unknown query parameter"));
+                    let detail = format!("limit must be an integer from 1 to {MAX_PAGE}");
+                    return Err(Problem::invalid_request("/limit", detail));
                 }
+            },
+            "cursor" => match Cursor::parse(value) {
+                Some(cursor) => window.after = Some(cursor.0),
+                None => return Err(Problem::invalid_request("/cursor", "this is no cursor of a page")),
+            },
+            _ => {
+                let pointer = format!("/{}", name.chars().take(64).collect::<String>());
+                return Err(Problem::invalid_request(pointer, "unknown query parameter"));
             }
         }
-        Ok(page)
     }
+    Ok(window)
 }
 
 /// Weak: a cloud that was deleted and posted again has the same points, but another `created_at`.

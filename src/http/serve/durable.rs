@@ -1,21 +1,24 @@
-//! Clouds that outlive the process, where there is a store: written before they are acknowledged, read again where memory has let them go.
+//! Requests and clouds that outlive the process: memory and compute threads for what store/clouds/ does, and
+//! what clients are told of it.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
+use bytes::Bytes;
 use tokio::sync::Notify;
+use tracing::Instrument;
 
 use super::app::App;
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::store::Owner;
-use crate::store::clouds::RegisteredCloud;
+use crate::store::budget::Reservation;
+use crate::store::clouds::{CloudPage, Holder, Kept, Recalled, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{CloudHead, decode, encode, object_bytes};
-use crate::store::objects::{Listed, Objects, OwnerName, Place, Retention, Swept, Unavailable, Written};
+use crate::store::objects::{ListWindow, Objects, OwnerName, Place, Retention, Swept, Unavailable};
 
 /// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
 pub const SECONDS_UNTIL_BACK: u64 = 5;
@@ -118,6 +121,18 @@ pub fn unavailable(error: &Unavailable) -> Problem {
     Problem::unavailable("the store of clouds does not answer", SECONDS_UNTIL_BACK)
 }
 
+fn holder_of(app: &App, owner: Owner) -> Holder {
+    Holder { owner, name: app.keys.name_of(owner) }
+}
+
+/// Runs a change of a cloud to its end, also if the client leaves meanwhile: half of a change is none that
+/// anybody asked for.
+async fn to_its_end<T: Send + 'static>(
+    change: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<T, Problem> {
+    tokio::spawn(change.in_current_span()).await.unwrap_or_else(|_| Err(Problem::internal()))
+}
+
 /// A cloud of the owner who was admitted, from memory or from the store.
 ///
 /// # Errors
@@ -129,15 +144,16 @@ pub async fn find_cloud(
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
     let owner = admission.owner;
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
-    if let Some(cloud) = app.clouds.get(owner, id).filter(|cloud| !cloud.is_trusted(TRUST)) {
-        match objects.cloud_bytes(&app.keys.name_of(owner), id).await {
-            Ok(None) => forget_in_memory(app, owner, id),
-            // It is served from memory while the store does not answer.
-            Ok(Some(_)) | Err(_) => cloud.trust(),
+    match app.clouds.recall(objects, &holder_of(app, owner), id, TRUST).await {
+        Recalled::Here(cloud) => return Ok(Some(cloud)),
+        Recalled::Gone => {
+            forget_results(app, owner, id);
+            return Ok(None);
         }
+        Recalled::Unknown => {}
     }
-    let (shared, admitted) = (app.clone(), admission.clone());
-    app.clouds.get_or_read(admission.owner, id, || read_cloud(shared, admitted, id)).await
+    let read = || read_cloud(app.clone(), admission.clone(), id);
+    app.clouds.get_or_read(owner, id, read).await
 }
 
 async fn read_cloud(
@@ -146,9 +162,25 @@ async fn read_cloud(
     id: CloudId,
 ) -> Result<Option<Arc<RegisteredCloud>>, Problem> {
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(None) };
-    let (owner, name) = (admission.owner, app.keys.name_of(admission.owner));
+    let holder = holder_of(&app, admission.owner);
     let refused = |error: Unavailable| unavailable(&error);
-    let Some(n_bytes) = objects.cloud_bytes(&name, id).await.map_err(refused)? else { return Ok(None) };
+    let Some(n_bytes) = objects.cloud_bytes(&holder.name, id).await.map_err(refused)? else {
+        return Ok(None);
+    };
+    let memory = reserve_for_reading(&app, holder.owner, id, n_bytes).await?;
+    let Some(bytes) = objects.get_cloud(&holder.name, id).await.map_err(refused)? else { return Ok(None) };
+    let job = move |_: &JobObserver| (decode(id, &bytes), memory);
+    let (read, _memory) = app.compute.run(&admission, n_bytes as f64 * FLOPS_PER_BYTE, job).await?.0;
+    app.clouds.take_in(objects, &holder, id, read).await.map_err(refused)
+}
+
+/// Takes the memory that reading an object of so many bytes needs.
+async fn reserve_for_reading(
+    app: &App,
+    owner: Owner,
+    id: CloudId,
+    n_bytes: u64,
+) -> Result<Reservation, Problem> {
     let n_reserved = usize::try_from(n_bytes).map_or(usize::MAX, |n| n.saturating_mul(READING));
     if n_reserved > app.intake.largest() {
         // Nothing that is kept today: there was more memory when it was written, or it is damaged.
@@ -156,31 +188,14 @@ async fn read_cloud(
         return Err(Problem::internal());
     }
     let mut memory = app.intake.try_reserve(owner, 0).ok_or_else(Problem::internal)?;
-    if !app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
-        return Err(app.compute.out_of_memory());
-    }
-    let Some(bytes) = objects.get_cloud(&name, id).await.map_err(refused)? else { return Ok(None) };
-    let shared = app.clone();
-    let job = move |_: &JobObserver| {
-        let _memory = memory;
-        decode(id, &bytes).map(|cloud| shared.clouds.adopt(owner, cloud))
-    };
-    match app.compute.run(&admission, n_bytes as f64 * FLOPS_PER_BYTE, job).await?.0 {
-        Err(damaged) => {
-            objects.put_aside(&name, id, damaged).await;
-            Ok(None)
-        }
-        // Deleted while it was read: it must not come back.
-        Ok(_) if objects.cloud_bytes(&name, id).await.map_err(refused)?.is_none() => {
-            app.clouds.remove(owner, id);
-            Ok(None)
-        }
-        Ok(cloud) => Ok(Some(cloud)),
+    match app.intake.grow(&mut memory, n_reserved, PATIENCE).await {
+        true => Ok(memory),
+        false => Err(app.compute.out_of_memory()),
     }
 }
 
 /// Writes clouds that are in memory alone. A store that does not take them is reported, and offered them again: they are served from memory
-/// meanwhile. One that memory has no room for either is not there any more when its request has been answered.
+/// meanwhile. A cloud that neither store nor memory can hold is dropped once its request is answered.
 pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredCloud>]) {
     for cloud in clouds {
         if keep(app, owner, cloud).await.is_err() {
@@ -189,39 +204,50 @@ pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredClou
     }
 }
 
-/// The same of one; says whether it is new to the store, or there is none.
+/// Writes a cloud unless the store has it; says whether it is new to the store. Without a store every cloud
+/// is.
 ///
 /// # Errors
 /// 413 if there would never be the memory to read it again; 503 if neither the store nor memory keeps it.
 pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<bool, Problem> {
-    let Some(Durable { objects, .. }) = &app.durable else { return Ok(true) };
-    if let Err(problem) = check_readable(app, cloud) {
-        app.clouds.remove(owner, cloud.id);
-        return Err(problem);
-    }
-    // An answer says that it is there: also if another process has deleted it meanwhile.
-    if cloud.is_durable()
-        && !matches!(objects.cloud_bytes(&app.keys.name_of(owner), cloud.id).await, Ok(None))
-    {
-        cloud.trust();
+    if app.durable.is_none() {
         return Ok(true);
     }
-    // Another may be writing these points, which were deleted since: that writes nothing, or takes it away again.
-    for _ in 0..2 {
-        let (shared, kept) = (app.clone(), cloud.clone());
-        let written = app.clouds.write(owner, cloud.id, || write_cloud(shared, owner, kept)).await;
-        let Some(is_new) = written else { break };
-        if cloud.is_durable() || cloud.is_forgotten() {
-            return Ok(is_new);
+    let (app, cloud) = (app.clone(), cloud.clone());
+    to_its_end(async move {
+        let Some(durable) = &app.durable else { return Ok(true) };
+        let holder = holder_of(&app, owner);
+        if let Err(problem) = check_readable(&app, &cloud) {
+            app.clouds.drop_unreadable(owner, &cloud);
+            return Err(problem);
         }
-    }
-    match app.clouds.hold(owner, cloud) {
-        true => Ok(true),
-        false => Err(Problem::unavailable(
-            "the store of clouds does not answer, and memory is full of clouds that it has not taken",
-            SECONDS_UNTIL_BACK,
-        )),
-    }
+        let encode = || encoded(&app, owner, &cloud);
+        match app.clouds.keep(&durable.objects, &holder, &cloud, encode).await {
+            Kept::Known => Ok(false),
+            Kept::Deleted => Ok(true),
+            Kept::Written(n_bytes) => {
+                durable.grew_by(n_bytes, app.config.retention());
+                Ok(true)
+            }
+            Kept::Pending(reason) => {
+                durable.fell_behind(&reason);
+                Ok(true)
+            }
+            Kept::Nowhere(reason) => {
+                durable.fell_behind(&reason);
+                let detail =
+                    "the store of clouds does not answer, and memory is full of clouds that it has not taken";
+                Err(Problem::unavailable(detail, SECONDS_UNTIL_BACK))
+            }
+        }
+    })
+    .await
+}
+
+async fn encoded(app: &App, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<Vec<Bytes>, String> {
+    let cloud = cloud.clone();
+    let encoded = app.compute.run_small(owner, move || encode(&cloud)).await;
+    encoded.map_err(|_| "a cloud is not encoded".to_owned())
 }
 
 /// Whether what is written of a cloud could be read again.
@@ -235,82 +261,22 @@ fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
     Err(Problem::too_large(Slug::ProblemTooLarge, what, most, n_bytes).with_remedy(remedy))
 }
 
-/// Whether it is new to the store; nothing if that does not take it.
-async fn write_cloud(app: Arc<App>, owner: Owner, cloud: Arc<RegisteredCloud>) -> Option<bool> {
-    let durable = app.durable.as_ref()?;
-    if cloud.is_forgotten() {
-        return Some(false);
-    }
-    let (encoded, named) = (cloud.clone(), (cloud.id, cloud.created_at()));
-    let Ok(pieces) = app.compute.run_small(owner, move || encode(&encoded)).await else {
-        durable.fell_behind(&"a cloud is not encoded");
-        return None;
-    };
-    let n_bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
-    let name = app.keys.name_of(owner);
-    let written = match durable.objects.put_cloud(&name, named, pieces).await {
-        Ok(written) => written,
-        Err(error) => {
-            durable.fell_behind(&error);
-            return None;
-        }
-    };
-    // Deleted while it was written: it must not come back.
-    if cloud.is_forgotten() {
-        if let Err(error) = durable.objects.delete_cloud(&name, cloud.id).await {
-            tracing::error!(%error, cloud = %cloud.id, "a deleted cloud is in the store again");
-        }
-        return Some(false);
-    }
-    match written {
-        Written::Now => {
-            cloud.set_durable(None);
-            durable.grew_by(n_bytes, app.config.retention());
-        }
-        Written::Before(since) => cloud.set_durable(Some(since)),
-    }
-    Some(written == Written::Now)
-}
-
-/// The clouds of the owner who was admitted behind a place of the list, in its order and no more than `limit` of them, those in memory with what
-/// is known of them; and whether they are the last.
+/// The first clouds within a window of the list of the owner who was admitted.
 ///
 /// # Errors
 /// 503 if the store does not answer.
 pub async fn list_clouds(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    after: Option<Listed>,
-    limit: usize,
-) -> Result<(Vec<(Listed, Option<Arc<RegisteredCloud>>)>, bool), Problem> {
-    let owner = admission.owner;
-    let stored = match &app.durable {
-        None => BTreeSet::new(),
-        Some(Durable { objects, .. }) => {
-            // One more says whether they are the last.
-            let stored = objects.list_first(&app.keys.name_of(owner), after, limit + 1).await;
-            stored.map_err(|error| unavailable(&error))?
-        }
-    };
-    let shared = app.clone();
+    window: ListWindow,
+) -> Result<CloudPage, Problem> {
+    let (owner, shared) = (admission.owner, app.clone());
     // Nothing is computed: it only takes longer than an async worker may be held.
-    let job = move |_: &JobObserver| {
-        let mut all: BTreeMap<Listed, Option<Arc<RegisteredCloud>>> =
-            stored.into_iter().map(|listed| (listed, None)).collect();
-        // What is in memory alone is there as well; what was in the store and is no longer is nowhere. One that is behind these in the store is
-        // on another page.
-        let in_store: HashSet<CloudId> = all.keys().map(|listed| listed.id).collect();
-        let is_there = |cloud: &Arc<RegisteredCloud>| !cloud.is_durable() || in_store.contains(&cloud.id);
-        for cloud in shared.clouds.list(owner).into_iter().filter(is_there) {
-            let listed = Listed { created_at: cloud.created_at(), id: cloud.id };
-            if after.is_none_or(|last| listed > last) {
-                all.insert(listed, Some(cloud));
-            }
-        }
-        let is_last = all.len() <= limit;
-        (all.into_iter().take(limit).collect(), is_last)
-    };
-    Ok(app.compute.run(admission, 0.0, job).await?.0)
+    let job = move |_: &JobObserver| shared.clouds.unstored_places(owner);
+    let unstored = app.compute.run(admission, 0.0, job).await?.0;
+    let objects = app.durable.as_ref().map(|durable| &*durable.objects);
+    let page = app.clouds.page(objects, &holder_of(app, owner), window, unstored).await;
+    page.map_err(|error| unavailable(&error))
 }
 
 /// Forgets a cloud wherever it is; says whether it was anywhere.
@@ -318,31 +284,19 @@ pub async fn list_clouds(
 /// # Errors
 /// 503 if the store does not answer: nothing is forgotten then.
 pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
-    let kept = app.clouds.get(owner, id);
-    // First: whoever writes it leaves it, or takes it away again.
-    if let Some(cloud) = &kept {
-        cloud.set_forgotten(true);
-    }
-    let was_stored = match &app.durable {
-        None => Ok(false),
-        Some(Durable { objects, .. }) => objects.delete_cloud(&app.keys.name_of(owner), id).await,
-    };
-    let was_stored = was_stored.map_err(|error| {
-        if let Some(cloud) = &kept {
-            cloud.set_forgotten(false);
-            // Who wrote it meanwhile may have left that.
-            if let Some(durable) = app.durable.as_ref().filter(|_| !cloud.is_durable()) {
-                durable.fell_behind(&error);
-            }
-        }
-        unavailable(&error)
-    })?;
-    forget_in_memory(app, owner, id);
-    Ok(was_stored || kept.is_some())
+    let app = app.clone();
+    to_its_end(async move {
+        let objects = app.durable.as_ref().map(|durable| &*durable.objects);
+        let was_there = app.clouds.forget(objects, &holder_of(&app, owner), id).await;
+        let was_there = was_there.map_err(|error| unavailable(&error))?;
+        forget_results(&app, owner, id);
+        Ok(was_there)
+    })
+    .await
 }
 
-fn forget_in_memory(app: &App, owner: Owner, id: CloudId) {
-    app.clouds.remove(owner, id);
+/// Forgets what was computed from a cloud.
+fn forget_results(app: &App, owner: Owner, id: CloudId) {
     app.prepared.forget_cloud(owner, id);
     app.learned.forget_cloud(owner, id);
 }
@@ -373,7 +327,8 @@ pub async fn retain(app: Arc<App>) {
                 }
                 for (owner, id) in gone {
                     if let Some(owner) = app.keys.owner_named(&owner) {
-                        forget_in_memory(&app, owner, id);
+                        app.clouds.distrust(owner, id);
+                        forget_results(&app, owner, id);
                     }
                 }
             }
@@ -393,17 +348,24 @@ pub async fn catch_up(app: Arc<App>) {
         }
         let n_refused = durable.n_refused.load(Ordering::Acquire);
         for owner in app.keys.owners() {
-            for cloud in app.clouds.list(owner) {
-                // What the store has had is not missing: if it is not there any more, it was deleted.
-                if !cloud.is_durable() && app.clouds.has(owner, &cloud) {
-                    keep_all(&app, owner, &[cloud]).await;
-                }
-            }
+            offer_again(&app, durable, owner).await;
         }
         // What was refused meanwhile has its turn next time.
         durable.n_made_up.store(n_refused, Ordering::Release);
         if durable.is_up_to_date() {
             tracing::info!("the store has taken all clouds");
+        }
+    }
+}
+
+async fn offer_again(app: &Arc<App>, durable: &Durable, owner: Owner) {
+    let holder = holder_of(app, owner);
+    for cloud in app.clouds.unstored(owner) {
+        let encode = || encoded(app, owner, &cloud);
+        match app.clouds.offer(&durable.objects, &holder, &cloud, encode).await {
+            Some(Kept::Written(n_bytes)) => durable.grew_by(n_bytes, app.config.retention()),
+            Some(Kept::Pending(reason) | Kept::Nowhere(reason)) => durable.fell_behind(&reason),
+            Some(Kept::Known | Kept::Deleted) | None => {}
         }
     }
 }

@@ -1,15 +1,16 @@
 //! Clouds as objects: written, found whole, listed and forgotten.
+//!
+//! ONE OBJECT is one cloud: `<owner>/clouds/<cloud id>`. It is there or not, and with it the cloud, in each
+//! answer about it. The list is the objects of that folder in the order in which the store took them, so
+//! there is no second record that could disagree.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
-use futures_util::stream::BoxStream;
 use futures_util::{StreamExt, TryStreamExt};
 use object_store::path::Path;
-use object_store::{
-    Error, GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutMode, PutOptions, PutPayload,
-};
+use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutPayload};
 
 use super::cloud_object::{self, CloudHead};
 use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
@@ -21,11 +22,60 @@ const HEADS_AT_ONCE: usize = 32;
 const FIRST_BYTES: u64 = 1024;
 const MAX_HEAD_BYTES: u64 = 1 << 20;
 
-/// A cloud in a list.
+/// The folder of an owner's clouds.
+pub(super) const FOLDER: &str = "clouds";
+
+/// A place in a list of clouds. Places are ordered by time, ties by id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Listed {
-    pub created_at: SystemTime,
+    /// When the store took the cloud, to the precision of the store. For one that is in memory alone: when it
+    /// was registered.
+    pub since: SystemTime,
     pub id: CloudId,
+}
+
+/// A part of a list: at most `n` places, behind one if that is named.
+#[derive(Debug, Clone, Copy)]
+pub struct ListWindow {
+    pub after: Option<Listed>,
+    pub n: usize,
+}
+
+/// The first places of a window, as they are found in any order. However long the list is, no more than these
+/// are in memory.
+struct FirstPlaces {
+    window: ListWindow,
+    /// One more than the window, which says whether they are the last.
+    first: BTreeSet<Listed>,
+}
+
+impl FirstPlaces {
+    fn add(&mut self, place: Listed) {
+        if self.window.after.is_none_or(|last| place > last) {
+            self.first.insert(place);
+        }
+        if self.first.len() > self.window.n + 1 {
+            self.first.pop_last();
+        }
+    }
+
+    fn into_places(self) -> (Vec<Listed>, bool) {
+        let is_last = self.first.len() <= self.window.n;
+        (self.first.into_iter().take(self.window.n).collect(), is_last)
+    }
+}
+
+impl ListWindow {
+    fn begin(self) -> FirstPlaces {
+        FirstPlaces { window: self, first: BTreeSet::new() }
+    }
+
+    /// The places of this window among some, in their order, and whether they are the last.
+    pub fn first_of(self, places: impl Iterator<Item = Listed>) -> (Vec<Listed>, bool) {
+        let mut first = self.begin();
+        places.for_each(|place| first.add(place));
+        first.into_places()
+    }
 }
 
 /// What came of writing a cloud.
@@ -37,37 +87,30 @@ pub enum Written {
 }
 
 impl Objects {
-    /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it is there, and lists it.
+    /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it is there.
     ///
     /// # Errors
-    /// [`Unavailable`]: then it is not listed, but it may be there.
+    /// [`Unavailable`]: it may be there all the same, where the store took it and did not say so.
     pub async fn put_cloud(
         &self,
         owner: &OwnerName,
-        (id, created_at): (CloudId, SystemTime),
+        id: CloudId,
         pieces: Vec<Bytes>,
     ) -> Result<Written, Unavailable> {
         let name = self.cloud(owner, id);
         let payload: PutPayload = pieces.into_iter().collect();
-        let created = PutOptions::from(PutMode::Create);
-        let written = match self.store.put_opts(&name, payload.clone(), created).await {
-            Ok(_) => Written::Now,
-            Err(Error::AlreadyExists { .. }) => match self.whole_head(owner, id).await? {
-                Some(head) => Written::Before(head.created_at),
-                // It was damaged, or has gone meanwhile.
-                None => {
-                    self.put(&name, payload).await?;
-                    Written::Now
-                }
-            },
-            Err(error) => return Err(self.failed(Verb::Write, &name, error)),
-        };
-        let since = match written {
-            Written::Now => created_at,
-            Written::Before(since) => since,
-        };
-        self.put(&self.listed(owner, Listed { created_at: since, id }), PutPayload::default()).await?;
-        Ok(written)
+        if self.create(&name, payload.clone()).await? {
+            return Ok(Written::Now);
+        }
+        match self.whole_head(owner, id).await? {
+            Some(head) => Ok(Written::Before(head.created_at)),
+            // It was damaged, or has gone meanwhile. If another process writes it again at once, that one
+            // writes the same points.
+            None => {
+                self.put(&name, payload).await?;
+                Ok(Written::Now)
+            }
+        }
     }
 
     /// How many bytes the object of a cloud has, if it is there.
@@ -90,20 +133,17 @@ impl Objects {
         self.counted(Verb::Read, &name, found.await)
     }
 
-    /// What lists say of a cloud, if it is there and whole as far as that.
+    /// What lists say of a cloud, if it is there: its head, or why that cannot be read.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn head(&self, owner: &OwnerName, id: CloudId) -> Result<Option<CloudHead>, Unavailable> {
-        let name = self.cloud(owner, id);
-        let Some(bytes) = self.first_bytes(&name).await? else { return Ok(None) };
-        match CloudHead::decode(&bytes) {
-            Ok(head) => Ok(Some(head)),
-            Err(damaged) => {
-                self.put_aside(owner, id, damaged).await;
-                Ok(None)
-            }
-        }
+    pub async fn head(
+        &self,
+        owner: &OwnerName,
+        id: CloudId,
+    ) -> Result<Option<Result<CloudHead, Damaged>>, Unavailable> {
+        let first = self.first_bytes(&self.cloud(owner, id)).await?;
+        Ok(first.map(|bytes| CloudHead::decode(&bytes)))
     }
 
     /// The head of a cloud that is there and whole, whose points are read for that. One that is not is put aside.
@@ -124,12 +164,12 @@ impl Objects {
         owner: &OwnerName,
         id: CloudId,
     ) -> Result<Option<Result<CloudHead, Damaged>>, Unavailable> {
-        let name = self.cloud(owner, id);
-        let Some(first) = self.first_bytes(&name).await? else { return Ok(None) };
-        let head = match CloudHead::decode(&first) {
-            Ok(head) => head,
-            Err(damaged) => return Ok(Some(Err(damaged))),
+        let head = match self.head(owner, id).await? {
+            None => return Ok(None),
+            Some(Err(damaged)) => return Ok(Some(Err(damaged))),
+            Some(Ok(head)) => head,
         };
+        let name = self.cloud(owner, id);
         let found = self.counted(Verb::Read, &name, self.store.get(&name).await)?;
         let Some(found) = found else { return Ok(None) };
         let mut check = cloud_object::Check::new(&head, found.meta.size);
@@ -142,7 +182,7 @@ impl Objects {
         Ok(Some(check.end().map(|()| head)))
     }
 
-    /// The heads of some clouds, without those that are gone or damaged.
+    /// The heads of some clouds, without those that are gone.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -150,78 +190,83 @@ impl Objects {
         &self,
         owner: &OwnerName,
         ids: Vec<CloudId>,
-    ) -> Result<Vec<(CloudId, CloudHead)>, Unavailable> {
+    ) -> Result<Vec<(CloudId, Result<CloudHead, Damaged>)>, Unavailable> {
         let heads = futures_util::stream::iter(ids)
             .map(|id| async move { Ok(self.head(owner, id).await?.map(|head| (id, head))) })
             .buffered(HEADS_AT_ONCE);
         heads.try_filter_map(|found| async move { Ok(found) }).try_collect().await
     }
 
-    /// The clouds of an owner behind a place of the list, in no order.
-    ///
-    /// # Errors
-    /// [`Unavailable`].
-    pub async fn list(&self, owner: &OwnerName, after: Option<Listed>) -> Result<Vec<Listed>, Unavailable> {
-        let folder = self.path(&[&owner.0, "listed"]);
-        let names = self.names(&folder, owner, after).try_collect::<Vec<_>>().await;
-        let names = self.counted(Verb::List, &folder, names)?.unwrap_or_default();
-        Ok(names.iter().filter_map(|found| Listed::parse(found.location.filename()?)).collect())
-    }
-
-    /// The first `n` clouds of an owner behind a place of the list, in its order: no more than they are in memory, however long the list is.
+    /// The first places of a window, in their order, and whether they are the last: of the objects of an
+    /// owner, and of `unstored` clouds beside them. A cloud has one place, also if it was stored after it was
+    /// taken to be unstored. Not every store lists in an order, so that all names of the folder pass by.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn list_first(
         &self,
         owner: &OwnerName,
-        after: Option<Listed>,
-        n: usize,
-    ) -> Result<BTreeSet<Listed>, Unavailable> {
-        let folder = self.path(&[&owner.0, "listed"]);
-        // Not every store lists in an order.
-        let smallest =
-            self.names(&folder, owner, after).try_fold(BTreeSet::new(), |mut first, found| async move {
-                first.extend(found.location.filename().and_then(Listed::parse));
-                if first.len() > n {
-                    first.pop_last();
-                }
-                Ok(first)
-            });
-        Ok(self.counted(Verb::List, &folder, smallest.await)?.unwrap_or_default())
+        window: ListWindow,
+        mut unstored: HashMap<CloudId, Listed>,
+    ) -> Result<(Vec<Listed>, bool), Unavailable> {
+        let folder = self.path(&[&owner.0, FOLDER]);
+        let (mut first, mut names) = (window.begin(), self.store.list(Some(&folder)));
+        while let Some(object) = self.counted_item(&folder, names.next().await)? {
+            let Some(place) = Listed::of(&object) else { continue };
+            unstored.remove(&place.id);
+            first.add(place);
+        }
+        self.tally.add(Verb::List, true);
+        unstored.into_values().for_each(|place| first.add(place));
+        Ok(first.into_places())
     }
 
-    /// What is in the list of an owner behind a place of it.
-    fn names(
+    /// An item of a list, nothing at its end.
+    fn counted_item(
         &self,
         folder: &Path,
-        owner: &OwnerName,
-        after: Option<Listed>,
-    ) -> BoxStream<'static, object_store::Result<ObjectMeta>> {
-        match after {
-            None => self.store.list(Some(folder)),
-            Some(last) => self.store.list_with_offset(Some(folder), &self.listed(owner, last)),
-        }
+        item: Option<object_store::Result<ObjectMeta>>,
+    ) -> Result<Option<ObjectMeta>, Unavailable> {
+        item.transpose().map_err(|error| self.failed(Verb::List, folder, error))
     }
 
-    /// Forgets a cloud, and what was put aside of it; says whether there was any of it.
+    /// Deletes a cloud, its factors and what was put aside of it; says whether the cloud was there. Of
+    /// several that delete one cloud at once, a directory tells exactly one so. A bucket does not say what it
+    /// deleted, so that processes which delete it at once may all be told so.
+    ///
+    /// # Errors
+    /// [`Unavailable`]: the cloud may be there, or not.
+    pub async fn delete_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<bool, Unavailable> {
+        let is_there = self.cloud_bytes(owner, id).await?.is_some();
+        let was_there = is_there && self.delete(&self.cloud(owner, id)).await?;
+        // The cloud is gone now, whatever becomes of the rest, which a sweep lets go as well.
+        if let Err(error) = self.delete_remains(owner, id).await {
+            tracing::warn!(%error, cloud = %id, "what belonged to a deleted cloud is left to the next sweep");
+        }
+        Ok(was_there)
+    }
+
+    async fn delete_remains(&self, owner: &OwnerName, id: CloudId) -> Result<(), Unavailable> {
+        self.delete_factors(owner, id).await?;
+        let aside = self.aside(owner, id);
+        if self.counted(Verb::Find, &aside, self.store.head(&aside).await)?.is_some() {
+            self.delete(&aside).await?;
+        }
+        Ok(())
+    }
+
+    /// Deletes a cloud that is still the one of this place in the list, and not another one since; says
+    /// whether it did.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn delete_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<bool, Unavailable> {
-        let name = self.cloud(owner, id);
-        let head = self.head(owner, id).await?;
-        if let Some(CloudHead { created_at, .. }) = head {
-            self.delete(&self.listed(owner, Listed { created_at, id })).await?;
-        }
-        self.delete(&name).await?;
-        self.delete_factors(owner, id).await?;
-        let aside = self.aside(owner, id);
-        let was_aside = self.counted(Verb::Find, &aside, self.store.head(&aside).await)?.is_some();
-        if was_aside {
-            self.delete(&aside).await?;
-        }
-        Ok(head.is_some() || was_aside)
+    pub(super) async fn let_go(&self, owner: &OwnerName, place: Listed) -> Result<bool, Unavailable> {
+        let name = self.cloud(owner, place.id);
+        let found = self.counted(Verb::Find, &name, self.store.head(&name).await)?;
+        // Buckets tell the time of one object by the second, and that of objects in a list more precisely.
+        let most = place.since + Duration::from_secs(1);
+        let is_same = found.is_some_and(|found| SystemTime::from(found.last_modified) <= most);
+        Ok(is_same && self.delete_cloud(owner, place.id).await?)
     }
 
     /// Puts aside what is not what was written, unless somebody has written it again meanwhile.
@@ -232,16 +277,7 @@ impl Objects {
         let (name, aside) = (self.cloud(owner, id), self.aside(owner, id));
         self.report(&name, damaged);
         let is_aside = self.store.rename(&name, &aside).await.is_ok();
-        let is_unlisted = self.unlist(owner, id).await.is_ok();
-        tracing::error!(object = %name, %aside, is_aside, is_unlisted, "a cloud is put aside");
-    }
-
-    /// Takes a cloud off the list, since whenever it is on it.
-    async fn unlist(&self, owner: &OwnerName, id: CloudId) -> Result<(), Unavailable> {
-        for listed in self.list(owner, None).await?.into_iter().filter(|listed| listed.id == id) {
-            self.delete(&self.listed(owner, listed)).await?;
-        }
-        Ok(())
+        tracing::error!(object = %name, %aside, is_aside, "a cloud is put aside");
     }
 
     /// As many as a head has.
@@ -265,30 +301,19 @@ impl Objects {
     }
 
     pub(super) fn cloud(&self, owner: &OwnerName, id: CloudId) -> Path {
-        self.path(&[&owner.0, "clouds", &id.to_string()])
+        self.path(&[&owner.0, FOLDER, &id.to_string()])
     }
 
     /// Where a damaged one goes.
     fn aside(&self, owner: &OwnerName, id: CloudId) -> Path {
         self.path(&[&owner.0, "damaged", &id.to_string()])
     }
-
-    pub(super) fn listed(&self, owner: &OwnerName, listed: Listed) -> Path {
-        self.path(&[&owner.0, "listed", &listed.to_string()])
-    }
 }
 
 impl Listed {
-    fn parse(name: &str) -> Option<Self> {
-        let (nanoseconds, id) = name.split_once('-')?;
-        let since_epoch = Duration::from_nanos(nanoseconds.parse().ok()?);
-        Some(Self { created_at: SystemTime::UNIX_EPOCH + since_epoch, id: CloudId::parse(id)? })
-    }
-}
-
-impl std::fmt::Display for Listed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let since_epoch = self.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        write!(f, "{:020}-{}", since_epoch.as_nanos(), self.id)
+    /// The place of an object, if it is a cloud.
+    pub(super) fn of(object: &ObjectMeta) -> Option<Self> {
+        let id = CloudId::parse(object.location.filename()?)?;
+        Some(Self { since: object.last_modified.into(), id })
     }
 }

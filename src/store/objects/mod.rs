@@ -1,10 +1,10 @@
 //! What outlives the process: clouds as objects in a directory or in object storage.
 //!
-//! NAMES. `<owner>/clouds/<cloud id>` is a cloud. `<owner>/listed/<nanoseconds since 1970, 20 digits>-<cloud id>` is empty and says by its
-//! name when the cloud was registered: lists are in that order, and need no object of a cloud but those that they show.
+//! NAMES. `<owner>/clouds/<cloud id>` is a cloud. The names and times of these objects are the list of
+//! clouds: see clouds.rs.
 //!
 //! WRITES are whole or not at all: a file is written beside its name, flushed and then renamed; a bucket has an object when all of it has come. A
-//! cloud is written once: whoever comes second finds it. It is listed after it is there, and gone from the list before it goes.
+//! cloud is written once: whoever comes second finds it.
 //!
 //! LEFT-OVERS of processes that were killed while they wrote a file, of deleted clouds and of jobs go by themselves: see retention.rs.
 //!
@@ -35,11 +35,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use object_store::path::Path;
-use object_store::{Error, ObjectStore, ObjectStoreExt, PutPayload};
+use object_store::{Error, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
 use uuid::Uuid;
 
 use super::key::CloudId;
-pub use clouds::{Listed, Written};
+pub use clouds::{ListWindow, Listed, Written};
 use patience::Patient;
 pub use place::Place;
 pub use retention::{Retention, Swept};
@@ -141,6 +141,18 @@ impl Objects {
         written
             .map(|_| self.tally.add(Verb::Write, true))
             .map_err(|error| self.failed(Verb::Write, name, error))
+    }
+
+    /// Writes an object that is not there; says whether it was not.
+    async fn create(&self, name: &Path, payload: PutPayload) -> Result<bool, Unavailable> {
+        match self.store.put_opts(name, payload, PutOptions::from(PutMode::Create)).await {
+            Ok(_) => {
+                self.tally.add(Verb::Write, true);
+                Ok(true)
+            }
+            Err(Error::AlreadyExists { .. }) => Ok(false),
+            Err(error) => Err(self.failed(Verb::Write, name, error)),
+        }
     }
 
     /// What the store answered, nothing where there is no such object.

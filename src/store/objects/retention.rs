@@ -1,13 +1,14 @@
 //! What goes by itself: clouds beyond an age or a number of bytes, oldest first of whoever has most, and what was damaged.
 
 use std::cmp::Reverse;
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use futures_util::TryStreamExt;
 use object_store::ObjectMeta;
 
+use super::clouds::FOLDER;
 use super::tally::Verb;
 use super::{CloudId, Listed, Objects, OwnerName, Unavailable};
 
@@ -16,6 +17,9 @@ const DAMAGED: Duration = Duration::from_secs(7 * 24 * 3600);
 
 /// How long whoever writes something may be at it.
 pub(super) const AT_WORK: Duration = Duration::from_secs(3600);
+
+/// A folder of drafts of this service before 0.1.0, which listed clouds by empty objects.
+const FORMER_LIST: &str = "listed";
 
 /// How long clouds are kept, and how much of them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -69,7 +73,7 @@ impl Holding {
 /// within an equal share to another.
 fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> Option<(OwnerName, Listed)> {
     let is_too_old = |cloud: &Kept| {
-        let age = now.duration_since(cloud.listed.created_at).unwrap_or_default();
+        let age = now.duration_since(cloud.listed.since).unwrap_or_default();
         limits.age.is_some_and(|most| age > most)
     };
     let old = holdings.iter().position(|holding| holding.clouds.front().is_some_and(is_too_old));
@@ -96,12 +100,13 @@ impl Objects {
         for owner in self.owners().await? {
             let clouds = self.kept(&owner).await?;
             self.forget_damaged(&owner, now).await?;
+            self.forget_former_list(&owner).await?;
             holdings.push(Holding::new(owner, clouds));
         }
         self.remove_half_written(now).await;
         let mut swept = Swept::default();
         while let Some((owner, listed)) = next_to_go(&mut holdings, limits, now) {
-            self.delete_listed(&owner, listed).await?;
+            self.let_go(&owner, listed).await?;
             swept.gone.push((owner, listed.id));
         }
         swept.n_bytes = holdings.iter().map(|holding| holding.n_bytes).sum();
@@ -131,25 +136,18 @@ impl Objects {
         Ok(folders.filter_map(name).filter(|owner| owner.0 != "probe").collect())
     }
 
-    /// The clouds of an owner with their sizes. One that is there and not listed was not acknowledged: its writer may be at it, or has
-    /// ended before it was; its time is that of its object.
+    /// The clouds of an owner with their sizes.
     async fn kept(&self, owner: &OwnerName) -> Result<Vec<Kept>, Unavailable> {
-        let listed: HashMap<CloudId, Listed> =
-            self.list(owner, None).await?.into_iter().map(|listed| (listed.id, listed)).collect();
-        let found = self.objects_in(owner, &["clouds"]).await?;
-        let kept = found.into_iter().filter_map(|object| {
-            let id = CloudId::parse(object.location.filename()?)?;
-            let unlisted = Listed { created_at: object.last_modified.into(), id };
-            let listed = listed.get(&id).copied().unwrap_or(unlisted);
-            Some(Kept { listed, n_bytes: object.size })
-        });
-        let kept: Vec<Kept> = kept.collect();
-        let there: HashSet<CloudId> = kept.iter().map(|cloud| cloud.listed.id).collect();
-        // Somebody was about to delete it, and ended.
-        for listed in listed.into_values().filter(|listed| !there.contains(&listed.id)) {
-            self.delete(&self.listed(owner, listed)).await?;
+        let found = self.objects_in(owner, &[FOLDER]).await?;
+        let kept = |object: &ObjectMeta| Some(Kept { listed: Listed::of(object)?, n_bytes: object.size });
+        Ok(found.iter().filter_map(kept).collect())
+    }
+
+    async fn forget_former_list(&self, owner: &OwnerName) -> Result<(), Unavailable> {
+        for object in self.objects_in(owner, &[FORMER_LIST]).await? {
+            self.delete(&object.location).await?;
         }
-        Ok(kept)
+        Ok(())
     }
 
     async fn forget_damaged(&self, owner: &OwnerName, now: SystemTime) -> Result<(), Unavailable> {
@@ -170,13 +168,6 @@ impl Objects {
         let folder = self.path(&[&[&*owner.0], folder].concat());
         let found = self.store.list(Some(&folder)).try_collect().await;
         Ok(self.counted(Verb::List, &folder, found)?.unwrap_or_default())
-    }
-
-    async fn delete_listed(&self, owner: &OwnerName, listed: Listed) -> Result<(), Unavailable> {
-        self.delete(&self.listed(owner, listed)).await?;
-        self.delete(&self.cloud(owner, listed.id)).await?;
-        self.delete_factors(owner, listed.id).await?;
-        Ok(())
     }
 }
 

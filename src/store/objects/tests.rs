@@ -1,3 +1,4 @@
+use std::collections::HashMap;
 use std::time::SystemTime;
 
 use bytes::Bytes;
@@ -25,7 +26,43 @@ fn registered(first: f64, dimension: usize) -> Arc<RegisteredCloud> {
 
 async fn put(objects: &Objects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>) -> Written {
     let pieces = cloud_object::encode(cloud);
-    objects.put_cloud(owner, (cloud.id, cloud.created_at()), pieces).await.unwrap()
+    objects.put_cloud(owner, cloud.id, pieces).await.unwrap()
+}
+
+/// Ids of a list behind a place of it, `n` of them at most, with the place of the last.
+async fn listed(objects: &Objects, owner: &OwnerName, window: ListWindow) -> (Vec<CloudId>, Option<Listed>) {
+    let (places, _) = objects.list_first(owner, window, HashMap::new()).await.unwrap();
+    (places.iter().map(|place| place.id).collect(), places.last().copied())
+}
+
+async fn all_listed(objects: &Objects, owner: &OwnerName) -> Vec<CloudId> {
+    listed(objects, owner, ListWindow { after: None, n: 99 }).await.0
+}
+
+/// Objects in a directory that goes with the test, whose times can be set.
+struct Dated {
+    directory: PathBuf,
+    objects: Objects,
+}
+
+impl Dated {
+    async fn new(name: &str) -> Self {
+        let directory = std::env::temp_dir().join(format!("gramian-{name}-{}", std::process::id()));
+        let objects = Objects::open(&Place::Directory(directory.clone()), []).await.unwrap();
+        Self { directory, objects }
+    }
+
+    async fn put_at(&self, owner: &OwnerName, cloud: &Arc<RegisteredCloud>, time: SystemTime) {
+        put(&self.objects, owner, cloud).await;
+        let path = self.directory.join(self.objects.cloud(owner, cloud.id).as_ref());
+        std::fs::File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
+    }
+}
+
+impl Drop for Dated {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.directory).ok();
+    }
 }
 
 #[tokio::test]
@@ -38,17 +75,21 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     // The same points at another time are the cloud that is there.
     let again = registered(2.0, 3);
     assert_eq!(put(&objects, &owner, &again).await, Written::Before(clouds[2].created_at()));
-    let mut listed = objects.list(&owner, None).await.unwrap();
-    listed.sort();
-    let of = |cloud: &Arc<RegisteredCloud>| Listed { created_at: cloud.created_at(), id: cloud.id };
-    assert_eq!(listed, clouds.iter().map(of).collect::<Vec<_>>());
-    let mut behind = objects.list(&owner, Some(listed[1])).await.unwrap();
-    behind.sort();
-    assert_eq!(behind, listed[2..]);
-    let first = |after, n| objects.list_first(&owner, after, n);
-    assert!(first(None, 2).await.unwrap().iter().eq(&listed[..2]));
-    assert!(first(Some(listed[1]), 2).await.unwrap().iter().eq(&listed[2..4]));
-    assert!(first(Some(listed[1]), 9).await.unwrap().iter().eq(&listed[2..]));
+    let ids: Vec<_> = clouds.iter().map(|cloud| cloud.id).collect();
+    assert_eq!(all_listed(&objects, &owner).await, ids);
+    let (first, second) = listed(&objects, &owner, ListWindow { after: None, n: 2 }).await;
+    assert_eq!(first, ids[..2]);
+    assert_eq!(listed(&objects, &owner, ListWindow { after: second, n: 2 }).await.0, ids[2..4]);
+    assert_eq!(listed(&objects, &owner, ListWindow { after: second, n: 9 }).await.0, ids[2..]);
+    // One that was taken to be in memory alone is where the store has it, and one that is has a place of its
+    // own.
+    let alone = registered(9.0, 3).id;
+    let since = SystemTime::UNIX_EPOCH;
+    let unstored = [ids[4], alone].map(|id| (id, Listed { since, id }));
+    let window = ListWindow { after: None, n: 9 };
+    let (places, is_last) = objects.list_first(&owner, window, HashMap::from(unstored)).await.unwrap();
+    let found: Vec<_> = places.iter().map(|place| place.id).collect();
+    assert_eq!((found, is_last), ([&[alone], &ids[..]].concat(), true));
     let bytes = objects.get_cloud(&owner, clouds[3].id).await.unwrap().unwrap();
     assert_eq!(objects.cloud_bytes(&owner, clouds[3].id).await.unwrap(), Some(bytes.len() as u64));
     let read = cloud_object::decode(clouds[3].id, &bytes).unwrap();
@@ -56,8 +97,7 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     assert!(objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
     assert!(!objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
     assert_eq!(objects.get_cloud(&owner, clouds[3].id).await.unwrap(), None);
-    assert_eq!(objects.list(&owner, None).await.unwrap().len(), 4);
-    let ids = clouds.iter().map(|cloud| cloud.id).collect();
+    assert_eq!(all_listed(&objects, &owner).await.len(), 4);
     assert_eq!(objects.heads(&owner, ids).await.unwrap().len(), 4);
     assert_eq!(objects.n_damaged(), 0);
     assert!(Verb::ALL.into_iter().all(|verb| objects.tally().of(verb)[1] == 0));
@@ -72,9 +112,9 @@ async fn owners_see_nothing_of_each_other() {
     put(&objects, &owner("one"), &cloud).await;
     let other = owner("two");
     assert_eq!(objects.get_cloud(&other, cloud.id).await.unwrap(), None);
-    assert!(objects.list(&other, None).await.unwrap().is_empty());
+    assert!(all_listed(&objects, &other).await.is_empty());
     assert!(!objects.delete_cloud(&other, cloud.id).await.unwrap());
-    assert!(objects.head(&owner("one"), cloud.id).await.unwrap().is_some());
+    assert!(objects.head(&owner("one"), cloud.id).await.unwrap().unwrap().is_ok());
 }
 
 #[tokio::test]
@@ -82,7 +122,7 @@ async fn heads_of_many_coordinates_are_read_whole() {
     let (objects, owner) = (objects(), owner("one"));
     let cloud = registered(0.5, 300);
     put(&objects, &owner, &cloud).await;
-    let head = objects.head(&owner, cloud.id).await.unwrap().unwrap();
+    let head = objects.head(&owner, cloud.id).await.unwrap().unwrap().unwrap();
     assert_eq!((head.dimension, head.n_points), (300, 2));
     assert_eq!(head.bounding_box, cloud.bounding_box);
 }
@@ -94,7 +134,8 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     put(&objects, &owner, &cloud).await;
     let name = objects.cloud(&owner, cloud.id);
     objects.store.put(&name, PutPayload::from_static(b"gramian cloud 1\nand nothing else")).await.unwrap();
-    assert_eq!(objects.head(&owner, cloud.id).await.unwrap(), None);
+    let damaged = objects.head(&owner, cloud.id).await.unwrap().unwrap().unwrap_err();
+    objects.put_aside(&owner, cloud.id, damaged).await;
     assert_eq!((objects.n_damaged(), objects.get_cloud(&owner, cloud.id).await.unwrap()), (1, None));
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     // Also where it is found on writing.
@@ -103,16 +144,12 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
     assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
     // Also where nothing is left of it: no store gives a range of that.
-    for find in [true, false] {
-        objects.store.put(&name, PutPayload::new()).await.unwrap();
-        if find {
-            assert!(objects.heads(&owner, vec![cloud.id]).await.unwrap().is_empty());
-        }
-        assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
-    }
+    objects.store.put(&name, PutPayload::new()).await.unwrap();
+    assert!(objects.heads(&owner, vec![cloud.id]).await.unwrap()[0].1.is_err());
+    assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     objects.store.put(&name, PutPayload::new()).await.unwrap();
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
-    assert_eq!((put(&objects, &owner, &cloud).await, objects.n_damaged()), (Written::Now, 5));
+    assert_eq!((put(&objects, &owner, &cloud).await, objects.n_damaged()), (Written::Now, 3));
     // Also where it is in the points alone, or behind them.
     for at in [bytes.len() - 1, bytes.len() - 40] {
         let mut other = bytes.to_vec();
@@ -121,10 +158,10 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
         assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     }
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
-    assert_eq!((objects.n_damaged(), objects.list(&owner, None).await.unwrap().len()), (7, 1));
+    assert_eq!((objects.n_damaged(), all_listed(&objects, &owner).await.len()), (5, 1));
     // One that is whole again is left where it is, and what was put aside goes with it.
     objects.put_aside(&owner, cloud.id, CUT).await;
-    assert_eq!(objects.n_damaged(), 7);
+    assert_eq!(objects.n_damaged(), 5);
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
     let left = objects.objects_in(&owner, &[]).await.unwrap();
     assert!(left.is_empty(), "{left:?}");
@@ -176,17 +213,15 @@ async fn files_that_were_never_whole_go_after_an_hour() {
 
 #[tokio::test]
 async fn the_oldest_clouds_go_by_age_and_by_bytes() {
-    let (objects, one, two) = (objects(), owner("one"), owner("two"));
-    let now = SystemTime::now();
+    let (dated, one, two) = (Dated::new("oldest").await, owner("one"), owner("two"));
+    let (objects, now) = (&dated.objects, SystemTime::now());
     let clouds: Vec<_> = (0..6).map(|k| registered(f64::from(k), 3)).collect();
     let mut n_bytes = 0;
     for (k, cloud) in clouds.iter().enumerate() {
         // A day between two of them, of two owners in turn; the last one is of today.
         let since = now - Duration::from_secs(86400 * (5 - k as u64));
-        cloud.set_durable(Some(since));
-        let pieces = cloud_object::encode(cloud);
-        n_bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
-        objects.put_cloud([&one, &two][k % 2], (cloud.id, since), pieces).await.unwrap();
+        n_bytes = cloud_object::encode(cloud).iter().map(|piece| piece.len() as u64).sum();
+        dated.put_at([&one, &two][k % 2], cloud, since).await;
     }
     let none = Retention::default();
     let all = objects.sweep(none, now).await.unwrap();
@@ -200,20 +235,19 @@ async fn the_oldest_clouds_go_by_age_and_by_bytes() {
     assert_eq!(swept.gone, [(two.clone(), clouds[1].id), (one.clone(), clouds[2].id)]);
     assert_eq!((swept.n_clouds, swept.n_bytes), (3, 3 * n_bytes));
     assert!(objects.get_cloud(&one, clouds[2].id).await.unwrap().is_none());
-    assert_eq!(objects.list(&one, None).await.unwrap().len(), 1);
-    assert_eq!(objects.list(&two, None).await.unwrap().len(), 2);
+    assert_eq!(all_listed(objects, &one).await.len(), 1);
+    assert_eq!(all_listed(objects, &two).await.len(), 2);
 }
 
 #[tokio::test]
 async fn who_has_most_makes_room() {
-    let (objects, modest, greedy) = (objects(), owner("modest"), owner("greedy"));
+    let (dated, modest, greedy) = (Dated::new("most").await, owner("modest"), owner("greedy"));
+    let objects = &dated.objects;
     let clouds: Vec<_> = (0..5).map(|k| registered(f64::from(k), 3)).collect();
     let now = SystemTime::now();
     for (k, cloud) in clouds.iter().enumerate() {
         let since = now - Duration::from_secs(60 * (10 - k as u64));
-        cloud.set_durable(Some(since));
-        let of = if k == 0 { &modest } else { &greedy };
-        objects.put_cloud(of, (cloud.id, since), cloud_object::encode(cloud)).await.unwrap();
+        dated.put_at(if k == 0 { &modest } else { &greedy }, cloud, since).await;
     }
     let n_bytes = objects.cloud_bytes(&modest, clouds[0].id).await.unwrap().unwrap();
     let limits = Retention { age: None, n_bytes: Some(2 * n_bytes), n_factor_bytes: 0 };
@@ -225,26 +259,41 @@ async fn who_has_most_makes_room() {
 }
 
 #[tokio::test]
-async fn what_is_half_written_or_half_deleted_is_put_in_order() {
+async fn a_cloud_that_was_posted_again_during_a_sweep_stays() {
+    let (dated, owner) = (Dated::new("again").await, owner("one"));
+    let cloud = registered(0.0, 2);
+    let hour_ago = SystemTime::now() - Duration::from_secs(3600);
+    dated.put_at(&owner, &cloud, hour_ago).await;
+    let window = ListWindow { after: None, n: 1 };
+    let place = listed(&dated.objects, &owner, window).await.1.unwrap();
+    assert!(dated.objects.delete_cloud(&owner, cloud.id).await.unwrap());
+    put(&dated.objects, &owner, &cloud).await;
+    assert!(!dated.objects.let_go(&owner, place).await.unwrap());
+    let place = listed(&dated.objects, &owner, window).await.1.unwrap();
+    assert!(dated.objects.let_go(&owner, place).await.unwrap());
+}
+
+/// Drafts before 0.1.0 listed clouds by empty objects.
+#[tokio::test]
+async fn lists_of_former_drafts_go_and_their_clouds_stay() {
     let (objects, owner) = (objects(), owner("one"));
-    let (unlisted, gone) = (registered(0.0, 2), registered(1.0, 2));
-    for cloud in [&unlisted, &gone] {
-        put(&objects, &owner, cloud).await;
+    let cloud = registered(0.0, 2);
+    put(&objects, &owner, &cloud).await;
+    let since = "01700000000000000000";
+    for id in [cloud.id, registered(1.0, 2).id] {
+        let name = objects.path(&["one", "listed", &format!("{since}-{id}")]);
+        objects.put(&name, PutPayload::default()).await.unwrap();
     }
-    let listed = |cloud: &RegisteredCloud| {
-        objects.listed(&owner, Listed { created_at: cloud.created_at(), id: cloud.id })
-    };
-    objects.store.delete(&listed(&unlisted)).await.unwrap();
-    objects.store.delete(&objects.cloud(&owner, gone.id)).await.unwrap();
-    let now = SystemTime::now();
-    assert_eq!(objects.sweep(Retention::default(), now).await.unwrap().n_clouds, 1);
-    assert!(objects.list(&owner, None).await.unwrap().is_empty());
-    // What nobody lists is as old as its object.
-    let hour = Retention { age: Some(Duration::from_secs(3600)), n_bytes: None, n_factor_bytes: 0 };
-    assert!(objects.sweep(hour, now).await.unwrap().gone.is_empty());
-    let later = now + Duration::from_secs(7200);
-    assert_eq!(objects.sweep(hour, later).await.unwrap().gone, [(owner.clone(), unlisted.id)]);
-    // What was damaged goes after a week.
+    assert_eq!(all_listed(&objects, &owner).await, [cloud.id]);
+    objects.sweep(Retention::default(), SystemTime::now()).await.unwrap();
+    assert_eq!(objects.objects_in(&owner, &[]).await.unwrap().len(), 1);
+    assert_eq!(all_listed(&objects, &owner).await, [cloud.id]);
+}
+
+#[tokio::test]
+async fn what_was_damaged_goes_after_a_week() {
+    let (objects, owner, now) = (objects(), owner("one"), SystemTime::now());
+    let gone = registered(1.0, 2);
     objects.put(&objects.cloud(&owner, gone.id), PutPayload::from_static(b"else")).await.unwrap();
     objects.put_aside(&owner, gone.id, CUT).await;
     let aside = objects.path(&["one", "damaged", &gone.id.to_string()]);

@@ -118,7 +118,7 @@ impl Planner<'_> {
             Some(normals) => Some(check_normals(normals, &cloud, &format!("{pointer}/normals"))?),
         };
         let (stored, is_new) = self.app.clouds.register(self.owner, cloud, normals);
-        let is_there = stored.is_durable() && stored.is_trusted(TRUST);
+        let is_there = stored.is_stored() && stored.is_trusted(TRUST);
         if self.app.durable.is_some() && !is_there {
             self.fresh.borrow_mut().push(stored.clone());
         }

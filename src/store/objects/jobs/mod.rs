@@ -16,12 +16,12 @@ mod tests;
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
+use object_store::ObjectMeta;
 use object_store::path::Path;
-use object_store::{Error, ObjectMeta, PutMode, PutOptions, PutPayload};
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::{Objects, OwnerName, Unavailable, Verb};
+use super::{Objects, OwnerName, Unavailable};
 pub use asked::{FoundRequest, JobRequest};
 pub use leases::Lease;
 pub use results::{FoundResult, JobResult, Outcome};
@@ -144,18 +144,6 @@ impl Objects {
             }
         }
         Ok(n_bytes)
-    }
-
-    /// Writes an object that is not there; says whether it was not.
-    async fn create(&self, name: &Path, payload: PutPayload) -> Result<bool, Unavailable> {
-        match self.store.put_opts(name, payload, PutOptions::from(PutMode::Create)).await {
-            Ok(_) => {
-                self.tally.add(Verb::Write, true);
-                Ok(true)
-            }
-            Err(Error::AlreadyExists { .. }) => Ok(false),
-            Err(error) => Err(self.failed(Verb::Write, name, error)),
-        }
     }
 
     fn answer(&self, owner: &OwnerName, id: JobId, attempt: u32) -> Path {

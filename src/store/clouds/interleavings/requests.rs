@@ -1,0 +1,136 @@
+//! Requests as handlers make them of a process, without memory and compute threads to wait for.
+
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use super::stepped::Stepped;
+use super::{cloud, id};
+use crate::store::Owner;
+use crate::store::clouds::{CloudStore, Holder, Kept, Recalled, RegisteredCloud};
+use crate::store::key::CloudId;
+use crate::store::objects::cloud_object::{decode, encode};
+use crate::store::objects::{ListWindow, Objects, OwnerName, Retention, Unavailable};
+use bytes::Bytes;
+use futures_util::TryStreamExt;
+use object_store::ObjectStore;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    Post,
+    Delete,
+    Get,
+    List,
+    Sweep,
+    /// Offers what the store did not take again, as the service does every few seconds.
+    Offer,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Answer {
+    /// Whether the cloud was new.
+    Posted(bool),
+    /// Whether it was there.
+    Deleted(bool),
+    Found(bool),
+    Listed(Vec<CloudId>),
+    Done,
+    Unavailable,
+}
+
+#[derive(Clone)]
+pub struct Process {
+    pub clouds: Arc<CloudStore<String>>,
+    pub objects: Arc<Objects>,
+}
+
+fn holder() -> Holder {
+    Holder { owner: Owner(0), name: OwnerName("o".to_owned()) }
+}
+
+async fn encoded(cloud: Arc<RegisteredCloud>) -> Result<Vec<Bytes>, String> {
+    Ok(encode(&cloud))
+}
+
+impl Request {
+    /// One of ten, of which those that change something are the more frequent.
+    pub fn some(n: usize) -> Self {
+        match n {
+            0..4 => Self::Post,
+            4..7 => Self::Delete,
+            7 => Self::Get,
+            8 => Self::List,
+            _ => Self::Sweep,
+        }
+    }
+}
+
+impl Process {
+    pub async fn run(self, request: Request) -> Answer {
+        let answer = match request {
+            Request::Post => Ok(self.post().await),
+            Request::Delete => {
+                self.clouds.forget(Some(&self.objects), &holder(), id()).await.map(Answer::Deleted)
+            }
+            Request::Get => Ok(self.get().await),
+            Request::List => self.list().await,
+            Request::Sweep => {
+                let swept = self.objects.sweep(Retention::default(), SystemTime::now()).await;
+                swept.map(|_| Answer::Done)
+            }
+            Request::Offer => Ok(self.offer().await),
+        };
+        answer.unwrap_or(Answer::Unavailable)
+    }
+
+    async fn post(&self) -> Answer {
+        let (registered, _) = self.clouds.register(Owner(0), cloud(), None);
+        let encode = || encoded(registered.clone());
+        match self.clouds.keep(&self.objects, &holder(), &registered, encode).await {
+            Kept::Known => Answer::Posted(false),
+            Kept::Written(_) | Kept::Pending(_) | Kept::Deleted => Answer::Posted(true),
+            Kept::Nowhere(_) => Answer::Unavailable,
+        }
+    }
+
+    async fn get(&self) -> Answer {
+        match self.clouds.recall(&self.objects, &holder(), id(), Duration::ZERO).await {
+            Recalled::Here(_) => return Answer::Found(true),
+            Recalled::Gone => return Answer::Found(false),
+            Recalled::Unknown => {}
+        }
+        let read = || self.clone().read();
+        let found = self.clouds.get_or_read(Owner(0), id(), read).await;
+        found.map_or(Answer::Unavailable, |found| Answer::Found(found.is_some()))
+    }
+
+    async fn read(self) -> Result<Option<Arc<RegisteredCloud>>, String> {
+        let refused = |error: Unavailable| error.to_string();
+        let Some(bytes) = self.objects.get_cloud(&holder().name, id()).await.map_err(refused)? else {
+            return Ok(None);
+        };
+        let read = decode(id(), &bytes);
+        self.clouds.take_in(&self.objects, &holder(), id(), read).await.map_err(refused)
+    }
+
+    async fn list(&self) -> Result<Answer, Unavailable> {
+        let unstored = self.clouds.unstored_places(Owner(0));
+        let window = ListWindow { after: None, n: 9 };
+        let page = self.clouds.page(Some(&self.objects), &holder(), window, unstored).await?;
+        Ok(Answer::Listed(page.clouds.iter().map(|cloud| cloud.id()).collect()))
+    }
+
+    async fn offer(&self) -> Answer {
+        for cloud in self.clouds.unstored(Owner(0)) {
+            self.clouds.offer(&self.objects, &holder(), &cloud, || encoded(cloud.clone())).await;
+        }
+        Answer::Done
+    }
+}
+
+impl Stepped {
+    /// The names of all objects, without a stop.
+    pub async fn names(&self) -> Vec<String> {
+        let found: Vec<_> = self.objects().list(None).try_collect().await.unwrap();
+        found.into_iter().map(|object| object.location.to_string()).collect()
+    }
+}

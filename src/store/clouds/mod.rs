@@ -1,0 +1,240 @@
+//! Registered clouds, named by their content: the memory of them, and what becomes of each where there is a
+//! store (durable.rs, page.rs).
+
+mod durable;
+#[cfg(test)]
+mod interleavings;
+mod page;
+mod registered;
+mod turns;
+
+use std::sync::{Arc, OnceLock};
+
+use super::Owner;
+use super::fair_cache::{Counts, FairCache};
+use super::key::CloudId;
+use super::single_flight::{Boarding, SingleFlight};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::sampling::Sampling;
+pub use durable::{Holder, Kept, Recalled};
+pub use page::{CloudPage, ListedCloud};
+pub use registered::RegisteredCloud;
+use turns::Turns;
+
+/// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
+pub struct CloudStore<E> {
+    clouds: FairCache<CloudId, Arc<RegisteredCloud>>,
+    samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
+    noise: SingleFlight<(Owner, CloudId), f64, E>,
+    reads: SingleFlight<(Owner, CloudId), Option<Arc<RegisteredCloud>>, E>,
+    turns: Turns<(Owner, CloudId)>,
+}
+
+impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
+    pub fn new(max_bytes: usize) -> Self {
+        Self {
+            clouds: FairCache::sparing(max_bytes, |cloud| cloud.is_pending()),
+            samplings: SingleFlight::new(),
+            noise: SingleFlight::new(),
+            reads: SingleFlight::new(),
+            turns: Turns::default(),
+        }
+    }
+
+    /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered,
+    /// not kept.
+    pub fn register(
+        &self,
+        owner: Owner,
+        cloud: Cloud,
+        normals: Option<Cloud>,
+    ) -> (Arc<RegisteredCloud>, bool) {
+        let id = CloudId::of(&cloud, normals.as_ref());
+        if let Some(found) = self.clouds.get(owner, &id) {
+            return (found, false);
+        }
+        let stored = Arc::new(RegisteredCloud::new(id, cloud, normals));
+        self.clouds.get_or_insert(owner, id, stored, |stored| stored.n_bytes())
+    }
+
+    /// The cloud in memory, or what `read` finds, which is made once for all who ask at the same time.
+    ///
+    /// # Errors
+    /// Those of `read`; they are not kept.
+    pub async fn get_or_read<F>(
+        &self,
+        owner: Owner,
+        id: CloudId,
+        read: impl Fn() -> F,
+    ) -> Result<Option<Arc<RegisteredCloud>>, E>
+    where
+        F: Future<Output = Result<Option<Arc<RegisteredCloud>>, E>> + Send + 'static,
+    {
+        let find = async || match self.clouds.get(owner, &id) {
+            Some(found) => (Boarding::Began, Ok(Some(found))),
+            None => self.reads.join((owner, id), &read).await,
+        };
+        match find().await {
+            // The flight may have looked before this request came, and the cloud may have been posted
+            // between. A second flight began later.
+            (Boarding::Joined, Ok(None)) => find().await.1,
+            (_, found) => found,
+        }
+    }
+
+    /// Whether memory has this cloud, and not another one of the same points.
+    pub fn has(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
+        self.clouds.peek(owner, &cloud.id).is_some_and(|kept| Arc::ptr_eq(&kept, cloud))
+    }
+
+    pub fn get(&self, owner: Owner, id: CloudId) -> Option<Arc<RegisteredCloud>> {
+        self.clouds.get(owner, &id)
+    }
+
+    /// How the cloud is sampled, which `compute` finds at most once however many ask.
+    ///
+    /// # Errors
+    /// Those of `compute`; they are not kept.
+    pub async fn sampling<F>(
+        &self,
+        owner: Owner,
+        stored: &RegisteredCloud,
+        compute: impl FnOnce() -> F,
+    ) -> Result<Arc<Sampling>, E>
+    where
+        F: Future<Output = Result<Sampling, E>> + Send + 'static,
+    {
+        let begin = || {
+            let found = compute();
+            async move { found.await.map(Arc::new) }
+        };
+        let (sampling, is_new) = fill(&stored.sampling, &self.samplings, (owner, stored.id), begin).await?;
+        if is_new {
+            // A cloud that was kept stays, with the weight that it had where its sampling has no room beside
+            // it.
+            self.clouds.reweigh(owner, stored.id, stored.n_bytes());
+        }
+        Ok(sampling)
+    }
+
+    /// Sees to it that the noise of the cloud is known, as [`CloudStore::sampling`] does.
+    ///
+    /// # Errors
+    /// Those of `compute`; they are not kept.
+    pub async fn noise<F>(
+        &self,
+        owner: Owner,
+        stored: &RegisteredCloud,
+        compute: impl FnOnce() -> F,
+    ) -> Result<(), E>
+    where
+        F: Future<Output = Result<f64, E>> + Send + 'static,
+    {
+        fill(&stored.noise, &self.noise, (owner, stored.id), compute).await?;
+        Ok(())
+    }
+
+    /// Bytes of all clouds that are kept.
+    pub fn n_bytes(&self) -> usize {
+        self.clouds.n_bytes()
+    }
+
+    /// How many are kept, and how many made room for others.
+    pub fn counts(&self) -> Counts {
+        self.clouds.counts()
+    }
+
+    /// Clouds of an owner that memory has and the store does not, as far as this process knows. Without a
+    /// store these are all.
+    pub fn unstored(&self, owner: Owner) -> Vec<Arc<RegisteredCloud>> {
+        let mut clouds = self.clouds.values(owner);
+        clouds.retain(|cloud| !cloud.is_stored());
+        clouds
+    }
+}
+
+/// What is in a cell, or what a flight brings, which is put in; and whether this one put it in.
+async fn fill<T, E, F>(
+    cell: &OnceLock<T>,
+    flights: &SingleFlight<(Owner, CloudId), T, E>,
+    key: (Owner, CloudId),
+    compute: impl FnOnce() -> F,
+) -> Result<(T, bool), E>
+where
+    T: Clone + Send + Sync + 'static,
+    E: Clone + Send + Sync + 'static,
+    F: Future<Output = Result<T, E>> + Send + 'static,
+{
+    if let Some(known) = cell.get() {
+        return Ok((known.clone(), false));
+    }
+    let found = flights.join(key, compute).await.1?;
+    // Of many who bring the same, the first one puts it in.
+    let is_new = cell.set(found.clone()).is_ok();
+    Ok((found, is_new))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::error::NumericsError;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::sampling::Scales;
+
+    fn line(n: usize, offset: f64) -> Cloud {
+        Cloud::new((0..n).map(|i| i as f64 + offset).collect(), 1).unwrap()
+    }
+
+    #[test]
+    fn a_cloud_is_registered_once_and_belongs_to_its_owner() {
+        let store = CloudStore::<()>::new(1 << 20);
+        let (first, is_new) = store.register(Owner(0), line(4, 0.0), None);
+        assert!(is_new);
+        let (again, is_new) = store.register(Owner(0), line(4, 0.0), None);
+        assert!(!is_new && Arc::ptr_eq(&first, &again));
+        assert!(store.get(Owner(1), first.id).is_none());
+        assert!(store.clouds.remove(Owner(1), &first.id).is_none());
+        assert!(store.clouds.remove(Owner(0), &first.id).is_some());
+        assert!(store.get(Owner(0), first.id).is_none());
+    }
+
+    #[test]
+    fn the_least_recently_used_clouds_make_room() {
+        // 1,000 points weigh 8 KB and less than one beside; the budget holds four of them.
+        let store = CloudStore::<()>::new(40 << 10);
+        let ids: Vec<_> =
+            (0..10).map(|k| store.register(Owner(0), line(1000, f64::from(k) / 16.0), None).0.id).collect();
+        let kept = store.unstored(Owner(0)).len();
+        assert_eq!(kept, 4);
+        assert!(store.get(Owner(0), ids[0]).is_none() && store.get(Owner(0), ids[9]).is_some());
+    }
+
+    #[tokio::test]
+    async fn spacings_and_duplicates_are_counted() {
+        let cloud = Cloud::new(vec![0.0, 1.0, 1.0, 5.0], 1).unwrap();
+        let store = CloudStore::<NumericsError>::new(1 << 20);
+        let (stored, _) = store.register(Owner(0), cloud, None);
+        assert!(stored.n_duplicates == 1 && stored.scales().is_none());
+        let cloud = stored.cloud.clone();
+        let compute = || async move { Sampling::of(&cloud, &Unobserved) };
+        store.sampling(Owner(0), &stored, compute).await.unwrap();
+        let range = stored.scales().and_then(Scales::nearest_range).unwrap();
+        assert_eq!((range.min, range.median, range.max), (1.0, 1.0, 4.0));
+        // What is known is not computed again.
+        let before = store.n_bytes();
+        let again = store.sampling(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
+        assert!(again.is_ok() && store.n_bytes() == before && before >= stored.n_bytes());
+    }
+
+    #[tokio::test]
+    async fn a_cloud_stays_that_fills_the_budget_with_its_sampling() {
+        // 8 KB of points, and 18 KB of sampling.
+        let store = CloudStore::<NumericsError>::new(12_000);
+        let (stored, _) = store.register(Owner(0), line(1000, 0.0), None);
+        let cloud = stored.cloud.clone();
+        let compute = || async move { Sampling::of(&cloud, &Unobserved) };
+        store.sampling(Owner(0), &stored, compute).await.unwrap();
+        assert!(stored.n_bytes() > 12_000 && store.get(Owner(0), stored.id).is_some());
+        assert!(store.n_bytes() <= 12_000);
+    }
+}

@@ -1,0 +1,179 @@
+//! A registered cloud: its points, what was learned from their positions, and where it is kept.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::duplicates::count_duplicates;
+use crate::numerics::points::sampling::{Sampling, Scales};
+use crate::store::key::CloudId;
+use crate::store::objects::cloud_object::CloudHead;
+
+/// A cloud with what its positions say, once that was asked for.
+///
+/// The cells are only ever read and set: what they hold is computed elsewhere, by `CloudStore::sampling` and
+/// `CloudStore::noise`.
+pub struct RegisteredCloud {
+    pub id: CloudId,
+    pub cloud: Arc<Cloud>,
+    /// The client's normals, `[n, d]`, not normalised.
+    pub normals: Option<Cloud>,
+    /// Points that coincide with an earlier one.
+    pub n_duplicates: usize,
+    /// The least and the greatest value of each coordinate.
+    pub bounding_box: (Vec<f64>, Vec<f64>),
+    record: Mutex<Record>,
+    pub(super) sampling: OnceLock<Arc<Sampling>>,
+    pub(super) noise: OnceLock<f64>,
+}
+
+/// When a cloud was registered, and where it is kept.
+#[derive(Clone, Copy)]
+struct Record {
+    created_at: SystemTime,
+    standing: Standing,
+}
+
+/// Where a cloud is kept: durable.rs has the transitions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// In memory alone: there is no store, or the request that brought the cloud has not written it yet.
+    Unwritten,
+    /// In memory alone although it was acknowledged: the store failed to take it, and is offered it again.
+    Pending,
+    /// In the store, and seen there last at this moment. `None`: to be looked for before it is used.
+    Stored { seen_at: Option<Instant> },
+    /// Deleted before it was written, so that it is not written any more.
+    Deleted,
+}
+
+impl RegisteredCloud {
+    pub(super) fn new(id: CloudId, cloud: Cloud, normals: Option<Cloud>) -> Self {
+        let record = Record { created_at: SystemTime::now(), standing: Standing::Unwritten };
+        // The points come first, what is needed for a moment behind them: less stays on the heap between
+        // blocks.
+        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
+        Self {
+            id,
+            n_duplicates: count_duplicates(&cloud),
+            bounding_box: cloud.bounding_box(),
+            cloud,
+            normals,
+            record: Mutex::new(record),
+            sampling: OnceLock::new(),
+            noise: OnceLock::new(),
+        }
+    }
+
+    /// A cloud that was read from the store.
+    pub fn restored(id: CloudId, cloud: Cloud, normals: Option<Cloud>, head: CloudHead) -> Self {
+        let standing = Standing::Stored { seen_at: Some(Instant::now()) };
+        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
+        Self {
+            id,
+            n_duplicates: head.n_duplicates,
+            bounding_box: head.bounding_box,
+            cloud,
+            normals,
+            record: Mutex::new(Record { created_at: head.created_at, standing }),
+            sampling: OnceLock::new(),
+            noise: OnceLock::new(),
+        }
+    }
+
+    /// When it was registered.
+    pub fn created_at(&self) -> SystemTime {
+        self.record().created_at
+    }
+
+    /// Whether the store has it, as far as this process knows.
+    pub fn is_stored(&self) -> bool {
+        matches!(self.standing(), Standing::Stored { .. })
+    }
+
+    /// Whether it is in memory alone, or was seen in the store less than `most` ago.
+    pub fn is_trusted(&self, most: Duration) -> bool {
+        match self.standing() {
+            Standing::Unwritten | Standing::Pending | Standing::Deleted => true,
+            Standing::Stored { seen_at } => seen_at.is_some_and(|seen_at| seen_at.elapsed() < most),
+        }
+    }
+
+    /// Whether it was acknowledged, and only memory has it.
+    pub(super) fn is_pending(&self) -> bool {
+        self.standing() == Standing::Pending
+    }
+
+    pub(super) fn standing(&self) -> Standing {
+        self.record().standing
+    }
+
+    /// Notes that it was deleted; says whether it was there, in memory alone.
+    pub(super) fn set_deleted(&self) -> bool {
+        let mut record = self.record();
+        match record.standing {
+            Standing::Unwritten => record.standing = Standing::Deleted,
+            Standing::Pending => {}
+            // One that memory only believed to be in the store was deleted by another process.
+            Standing::Stored { .. } | Standing::Deleted => return false,
+        }
+        true
+    }
+
+    /// Notes that the store has lost it: it is registered again, now.
+    pub(super) fn set_unwritten(&self) {
+        *self.record() = Record { created_at: SystemTime::now(), standing: Standing::Unwritten };
+    }
+
+    /// Notes that the store failed to take it.
+    pub(super) fn set_pending(&self) {
+        self.record().standing = Standing::Pending;
+    }
+
+    /// Notes that the store has it, as a cloud that was registered at `since`.
+    pub(super) fn set_stored(&self, since: SystemTime) {
+        *self.record() =
+            Record { created_at: since, standing: Standing::Stored { seen_at: Some(Instant::now()) } };
+    }
+
+    /// Notes whether it was just seen in the store, or has to be looked for there before it is used.
+    pub(super) fn set_seen(&self, is_seen: bool) {
+        let mut record = self.record();
+        if let Standing::Stored { seen_at } = &mut record.standing {
+            *seen_at = is_seen.then(Instant::now);
+        }
+    }
+
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "two words are read or written, and nothing else meanwhile"
+    )]
+    fn record(&self) -> MutexGuard<'_, Record> {
+        self.record.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How it is sampled, once that was asked for.
+    pub fn sampling(&self) -> Option<&Arc<Sampling>> {
+        self.sampling.get()
+    }
+
+    /// The lengths that kernels are chosen by, once its sampling was asked for.
+    pub fn scales(&self) -> Option<&Scales> {
+        self.sampling().map(|sampling| sampling.scales())
+    }
+
+    /// Standard deviation of the points across the surface that they sample, unit L, once it was asked for.
+    pub fn noise(&self) -> Option<f64> {
+        self.noise.get().copied()
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Cloud>());
+        let (min, max) = &self.bounding_box;
+        let bounding_box = vec_bytes(min) + vec_bytes(max);
+        let sampling = self.sampling().map_or(0, |s| block_bytes(arc_payload::<Sampling>()) + s.n_bytes());
+        own + bounding_box + sampling + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
+    }
+}
