@@ -99,6 +99,11 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_JOB_RESULT_SECONDS", default_value_t = 3600.0, value_parser = positive_seconds)]
     pub job_result_seconds: f64,
 
+    /// Jobs that are kept with their results, of one key of several half of them; the next one is answered
+    /// 503.
+    #[arg(long, env = "GRAMIAN_MAX_JOBS", default_value_t = 10_000, value_parser = whole::<1, MAX_COUNT>)]
+    pub max_jobs: usize,
+
     /// A certificate with the authorities up to a root, in PEM: with it TLS is spoken and nothing else. Read again when it changes.
     #[arg(long, env = "GRAMIAN_TLS_CERTIFICATE", requires = "tls_key")]
     pub tls_certificate: Option<PathBuf>,
@@ -138,6 +143,11 @@ pub struct Config {
     /// Bytes that the store may have of factorizations; beyond them the oldest go. 0 keeps none.
     #[arg(long, env = "GRAMIAN_STORE_FACTOR_BYTES", default_value_t = 16 << 30)]
     pub store_factor_bytes: u64,
+
+    /// Bytes that the store may have of jobs and their results, of one key of several half of them; results
+    /// beyond them are refused.
+    #[arg(long, env = "GRAMIAN_STORE_JOB_BYTES", default_value_t = 16 << 30, value_parser = whole::<1, MAX_BYTES>)]
+    pub store_job_bytes: usize,
 
     /// Origins that browsers may call from, separated by commas, or `*`.
     #[arg(long, env = "GRAMIAN_CORS_ORIGINS")]

@@ -143,6 +143,7 @@ fn cors(origins: &Origins) -> CorsLayer {
             HeaderName::from_static("x-request-id"),
             HeaderName::from_static("gramian-cloud"),
             HeaderName::from_static("prefer"),
+            jobs::IDEMPOTENCY_KEY,
             HeaderName::from_static("traceparent"),
         ])
         .expose_headers(exposed.map(HeaderName::from_static));

@@ -85,6 +85,12 @@ impl Budget {
         self.ledger.has_room(&state, owner, n_bytes).then(|| self.take(&mut state, owner, n_bytes))
     }
 
+    /// Reserves `n_bytes` that are in use already, even beyond the budget. New reservations fail until they
+    /// fit again.
+    pub fn reserve_beyond(&self, owner: Owner, n_bytes: usize) -> Reservation {
+        self.take(&mut self.ledger.state(), owner, n_bytes)
+    }
+
     /// Takes so many bytes when it is their turn. Whenever they are not to be had `look` is called with what is missing
     /// apart from the turn, to let go of what can be done without, and to say whether they are still wanted: `None` if not.
     ///
@@ -139,7 +145,7 @@ impl Budget {
     pub fn shortage(&self, owner: Owner, n_bytes: usize) -> Option<Shortage> {
         let state = self.ledger.state();
         let of_owner = state.of(owner).saturating_add(n_bytes).saturating_sub(self.ledger.share);
-        let free = self.ledger.total - state.held;
+        let free = self.ledger.total.saturating_sub(state.held);
         let of_all = (n_bytes + self.ledger.closed_to(n_bytes)).saturating_sub(free);
         (of_owner > 0 || of_all > 0).then_some(Shortage { owner, of_owner, of_all })
     }
@@ -195,7 +201,7 @@ impl Ledger {
     }
 
     fn has_room(&self, state: &State, owner: Owner, n_bytes: usize) -> bool {
-        let free = self.total - state.held;
+        let free = self.total.saturating_sub(state.held);
         self.may_hold(state, owner, n_bytes) && n_bytes.saturating_add(self.closed_to(n_bytes)) <= free
     }
 
@@ -267,6 +273,11 @@ impl Reservation {
     /// Gives back what is beyond so many bytes.
     pub fn shrink_to(&mut self, n_bytes: usize) {
         drop(self.split(self.n_bytes.saturating_sub(n_bytes)));
+    }
+
+    /// Adds the bytes of another reservation of the same budget and owner.
+    pub fn merge(&mut self, mut other: Reservation) {
+        self.n_bytes += std::mem::take(&mut other.n_bytes);
     }
 
     /// Takes more if it is to be had now; says whether it was.

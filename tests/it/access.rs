@@ -154,7 +154,9 @@ async fn configured_origins_may_call_and_others_may_not() {
         assert_eq!((answer.status, answer.header("access-control-allow-origin")), (200, origin));
         assert!(answer.header("access-control-allow-methods").contains("POST"));
         let allowed = answer.header("access-control-allow-headers").to_ascii_lowercase();
-        assert!(allowed.contains("authorization") && allowed.contains("content-type"), "{allowed}");
+        for name in ["authorization", "content-type", "prefer", "idempotency-key"] {
+            assert!(allowed.contains(name), "{allowed}");
+        }
         // Problems are read by browsers as well.
         for (headers, status) in [
             (&[("origin", origin)][..], 401),

@@ -156,7 +156,7 @@ async fn a_connection_of_http_2_that_only_answers_pings_is_ended() {
     drop(client);
 }
 
-async fn http_2(
+pub async fn http_2(
     address: SocketAddr,
 ) -> (h2::client::SendRequest<bytes::Bytes>, tokio::task::JoinHandle<Result<(), h2::Error>>) {
     let stream = TcpStream::connect(address).await.unwrap();

@@ -9,7 +9,7 @@ use crate::routes::{ROUTES, route_of};
 use crate::support::{Answer, Server, fibonacci_sphere, receive};
 
 /// Asks for a job; answers with its path. The document knows no 202: which status there is depends on a header of the request.
-async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
+pub async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
     let mut request = reqwest::Client::new().post(url).header("prefer", "wait=5, respond-async").json(body);
     for (name, value) in headers {
         request = request.header(*name, *value);
@@ -24,11 +24,11 @@ async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
     path
 }
 
-async fn result(server: &Server, path: &str) -> Answer {
+pub async fn result(server: &Server, path: &str) -> Answer {
     server.get(&format!("{path}/result")).await
 }
 
-async fn delete(server: &Server, path: &str) -> u16 {
+pub async fn delete(server: &Server, path: &str) -> u16 {
     server.send(server.client.delete(server.url(path))).await.status
 }
 

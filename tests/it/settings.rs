@@ -77,6 +77,8 @@ fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
         "MAX_BODY_BYTES",
         "MAX_RESPONSE_BYTES",
         "MAX_CONNECTIONS",
+        "MAX_JOBS",
+        "STORE_JOB_BYTES",
     ];
     let counts = counts.iter().flat_map(|name| ["0", "-1", "many", "1e30"].map(|value| (*name, value)));
     let seconds = ["DEADLINE_SECONDS", "BODY_SECONDS", "IDLE_SECONDS", "SEND_SECONDS", "DRAIN_SECONDS"];

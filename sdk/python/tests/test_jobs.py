@@ -52,6 +52,7 @@ class Service:
         self.answers = list(answers)
         self.deleted = deleted or httpx.Response(204)
         self.asked: list[str] = []
+        self.keys: list[str | None] = []
         self.timeouts: list[dict[str, float]] = []
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
@@ -59,6 +60,8 @@ class Service:
         if path == "/v1/clouds":
             return httpx.Response(201, json=CLOUD)
         self.asked.append(f"{request.method} {path}")
+        if request.method == "POST":
+            self.keys.append(request.headers.get("Idempotency-Key"))
         self.timeouts.append(request.extensions["timeout"])
         answer = self.deleted
         if request.method != "DELETE":
@@ -128,6 +131,27 @@ def test_a_job_is_followed_to_its_end_over_as_many_connections_as_it_takes(clock
     followed = [f"GET {PLACE}/events", f"GET {PLACE}", f"GET {PLACE}/events"]
     assert service.asked == ["POST /v1/normals", *followed, *FINISHED]
     assert clock.waits == [0.5]
+
+
+def test_a_request_that_is_repeated_has_the_same_key_and_another_one_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gramian.transport.BACKOFF_SECONDS", 0.0)
+    told = [events(job("succeeded", 1.0)), refusal(422, "invalid-cloud")]
+    lost: list[Answer] = [
+        httpx.ReadError("gone"),
+        httpx.RemoteProtocolError("cut"),
+        refusal(503, "overloaded", **{"Retry-After": "0"}),
+    ]
+    service = Service(*lost, ACCEPTED, *told, ACCEPTED, *told)
+    cloud = service.cloud(lambda _: None)
+    for _ in range(2):
+        with pytest.raises(gramian.Problem, match="none"):
+            cloud.normals()
+    first, *repeated, second = service.keys
+    assert first is not None
+    assert second is not None
+    assert repeated == [first] * 3
+    assert second != first
+    assert len(first) <= 255
 
 
 AWAY: dict[str, Callable[[], Answer]] = {

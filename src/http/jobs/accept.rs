@@ -6,8 +6,11 @@ use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
 
-use super::look::view_of_here;
+use super::idempotency::{Known, fingerprint, key_of, known};
+use super::kept::SECONDS_UNTIL_COUNTED;
+use super::look::{JobView, view_of_here};
 use super::{Here, Runner};
 use crate::http::around::middleware::CLOUD_HEADER;
 use crate::http::around::trace::TraceParent;
@@ -15,7 +18,7 @@ use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
 use crate::store::Owner;
-use crate::store::objects::jobs::{JobId, JobRequest};
+use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest};
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
@@ -23,6 +26,11 @@ const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-appli
 /// What a job takes over of the head of its request: nothing that is secret.
 static KEPT_HEADERS: [HeaderName; 5] =
     [header::ACCEPT, header::ACCEPT_ENCODING, header::CONTENT_TYPE, header::CONTENT_ENCODING, CLOUD_HEADER];
+
+/// Headers that belong to the fingerprint of a request. The cloud is not one of them: the header only repeats
+/// it for proxies.
+static MEANT_HEADERS: [HeaderName; 4] =
+    [header::ACCEPT, header::ACCEPT_ENCODING, header::CONTENT_TYPE, header::CONTENT_ENCODING];
 
 /// The trace that its work belongs to.
 const TRACE: &str = "traceparent";
@@ -57,7 +65,8 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     let app = runner.app.clone();
     let (parts, body) = request.into_parts();
     let owner = parts.extensions.get::<Owner>().copied().ok_or_else(Problem::internal)?;
-    let (bytes, memory) = read_bytes(&app, owner, &parts.headers, body).await?;
+    let key = key_of(&parts.headers)?;
+    let (bytes, _memory) = read_bytes(&app, owner, &parts.headers, body).await?;
     let path = parts.uri.path().to_owned();
     let kept = KEPT_HEADERS.iter().filter_map(|name| {
         let text = parts.headers.get(name)?.to_str().ok()?;
@@ -65,37 +74,107 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     });
     let trace = parts.extensions.get::<TraceParent>().map(|parent| (TRACE.to_owned(), parent.to_string()));
     let request = JobRequest { path, headers: kept.chain(trace).collect() };
-    let id = JobId::new();
-    let Some(here) = app.jobs.add(id, owner, None) else { return Err(app.compute.out_of_memory()) };
-    // It is not here any more, unless it is taken up below.
-    let mut entered = Entered { runner: &runner, here: Some(here) };
-    if !app.jobs.hold(id, owner, bytes.len()) {
-        return Err(app.compute.out_of_memory());
+    let asked = Asked { owner, request, body: bytes.into() };
+    let Some(key) = key else {
+        let entered = asked.write(&runner).await?;
+        return Ok(accepted(&entered.begin()?));
+    };
+    let fingerprint = fingerprint(&asked.request, &MEANT_HEADERS, &asked.body).await;
+    // Of equal requests at once one claims the key. The others find its job in the next turn, unless it was
+    // deleted meanwhile.
+    for _ in 0..ATTEMPTS {
+        let claim = match known(&app, owner, &key, &fingerprint).await? {
+            Known::Job(view) => return Ok(accepted(&view)),
+            Known::Free(claim) => claim,
+        };
+        let entered = asked.write(&runner).await?;
+        match entered.claim(&claim, &fingerprint).await {
+            Ok(true) => return Ok(accepted(&entered.begin()?)),
+            Ok(false) => entered.withdraw().await?,
+            Err(problem) => {
+                entered.withdraw().await.ok();
+                return Err(problem);
+            }
+        }
     }
-    let written = app.jobs.objects.put_job(&app.keys.name_of(owner), id, &request, bytes.into()).await;
-    written.map_err(|error| unavailable(&error))?;
-    drop(memory);
-    let Some(here) = entered.here.take() else { return Err(Problem::internal()) };
-    let view = view_of_here(&here);
-    tokio::spawn(runner.clone().run(here));
-    let location = format!("/v1/jobs/{id}");
-    let applied = HeaderValue::from_static("respond-async");
-    let mut response =
-        (StatusCode::ACCEPTED, [(header::LOCATION, location)], axum::Json(view)).into_response();
-    response.headers_mut().insert(PREFERENCE_APPLIED, applied);
-    Ok(response)
+    Err(Problem::unavailable("jobs with this Idempotency-Key come and go", SECONDS_UNTIL_COUNTED))
 }
 
-/// A job that is here only until something fails, or its client leaves.
+/// Attempts to find or claim the job of a key.
+const ATTEMPTS: usize = 4;
+
+/// 202 with the location of the job.
+fn accepted(view: &JobView) -> Response {
+    let location = [(header::LOCATION, format!("/v1/jobs/{}", view.id()))];
+    let mut response = (StatusCode::ACCEPTED, location, axum::Json(view)).into_response();
+    response.headers_mut().insert(PREFERENCE_APPLIED, HeaderValue::from_static("respond-async"));
+    response
+}
+
+/// A request that is to become a job.
+struct Asked {
+    owner: Owner,
+    request: JobRequest,
+    body: Bytes,
+}
+
+impl Asked {
+    /// Writes the job. It waits until [`Entered::begin`].
+    async fn write<'a>(&self, runner: &'a Runner) -> Result<Entered<'a>, Problem> {
+        let (app, owner, id) = (&runner.app, self.owner, JobId::new());
+        let Some(here) = app.jobs.add(id, owner, None) else { return Err(app.compute.out_of_memory()) };
+        // On failure the guard takes the job out of this process.
+        let entered = Entered { runner, here: Some(here) };
+        app.jobs.kept.add(id, owner)?;
+        let Some(mut room) = app.jobs.room(owner, self.body.len()) else {
+            let reason = "the jobs that are kept leave no room for this request";
+            return Err(app.jobs.kept.refused(owner, reason));
+        };
+        let name = app.keys.name_of(owner);
+        let written = app.jobs.objects.put_job((&name, id), &self.request, self.body.clone(), &mut room);
+        written.await.map_err(|error| unavailable(&error))?;
+        app.jobs.kept.pay(id, room.into_reservation());
+        Ok(entered)
+    }
+}
+
+/// A guard that takes a job out of this process, unless it is begun.
 struct Entered<'a> {
     runner: &'a Runner,
     here: Option<Arc<Here>>,
 }
 
+impl Entered<'_> {
+    /// Claims a key for the job. Returns false if another job has it.
+    async fn claim(&self, claim: &ClaimName, fingerprint: &str) -> Result<bool, Problem> {
+        let Some(here) = &self.here else { return Err(Problem::internal()) };
+        let app = &self.runner.app;
+        let meant = Claim::new(here.id, fingerprint.to_owned());
+        let claimed = app.jobs.objects.claim_key(&app.keys.name_of(here.owner), claim, &meant).await;
+        claimed.map_err(|error| unavailable(&error))
+    }
+
+    /// Begins the job.
+    fn begin(mut self) -> Result<JobView, Problem> {
+        let Some(here) = self.here.take() else { return Err(Problem::internal()) };
+        let view = view_of_here(&here);
+        tokio::spawn(self.runner.clone().run(here));
+        Ok(view)
+    }
+
+    /// Deletes the job.
+    async fn withdraw(self) -> Result<(), Problem> {
+        let Some(here) = &self.here else { return Ok(()) };
+        let app = &self.runner.app;
+        let forgotten = app.jobs.forget(&app.keys.name_of(here.owner), here.id).await;
+        forgotten.map(|_| ()).map_err(|error| unavailable(&error))
+    }
+}
+
 impl Drop for Entered<'_> {
     fn drop(&mut self) {
         if let Some(here) = self.here.take() {
-            self.runner.app.jobs.held().remove(&here.id);
+            self.runner.app.jobs.kept.remove(here.id);
             self.runner.app.jobs.remove(&here);
         }
     }

@@ -7,7 +7,7 @@ use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use futures_util::{StreamExt, TryStreamExt};
+use futures_util::TryStreamExt;
 use tower::ServiceExt;
 
 use super::run::Attempt;
@@ -16,8 +16,9 @@ use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::store::objects::jobs::{FoundRequest, JobResult, Outcome};
+use crate::store::objects::jobs::{Answer, FoundRequest, JobResult, Outcome};
 use crate::store::objects::pieces::BrokenOff;
+use crate::store::objects::room::Room;
 use crate::store::objects::{OwnerName, Unavailable};
 
 /// Attempts that may end with their process: a request that ends a process is not given to all of them, one after the other.
@@ -125,39 +126,51 @@ impl Runner {
         response: Response,
     ) -> Result<(), Unavailable> {
         let jobs = &self.app.jobs;
-        let response = with_problem_document(response, &here.id.to_string());
-        let (head, body) = (head_of(&response), response.into_body().into_data_stream());
-        let mut n_bytes = 0;
-        let mut has_room = true;
-        let body = body.map(|piece| {
-            let piece = piece.map_err(|error| error.to_string())?;
-            n_bytes += piece.len();
-            // Where it is in memory, it is copied once all of it is there.
-            has_room = jobs.hold(here.id, here.owner, 2 * piece.len());
-            if has_room { Ok(piece) } else { Err("there is no memory for the result".to_owned()) }
-        });
-        let (job, outcome) = ((name, here.id), head.outcome);
-        let written = jobs.objects.put_result(job, attempt.number, head, body).await;
-        if has_room {
-            if written? {
-                self.app.metrics.job_ended(outcome);
-            }
-            jobs.shrink(here.id, n_bytes);
-            return Ok(());
+        let Some(mut room) = jobs.room(here.owner, 0) else {
+            return self.write_refusal(here, name, attempt).await;
+        };
+        let written = self.write_in(&mut room, here, (name, attempt), response).await;
+        if room.is_exceeded() {
+            return self.write_refusal(here, name, attempt).await;
         }
-        jobs.shrink(here.id, 0);
-        let problem = Problem::too_large(
-            Slug::ProblemTooLarge,
-            "bytes of results are kept in memory: fetch and delete those that are there, or ask for less; the result has more, beyond",
-            jobs.memory.as_ref().map_or(0, |memory| memory.largest()),
-            None,
-        );
-        let response = with_problem_document(problem.into_response(), &here.id.to_string());
-        let (head, body) = (head_of(&response), response.into_body().into_data_stream());
-        if jobs.objects.put_result(job, attempt.number, head, body).await? {
-            self.app.metrics.job_ended(Outcome::Failed);
+        if let Some(outcome) = written? {
+            self.app.metrics.job_ended(outcome);
+            jobs.kept.end(here.id, here.owner, room.into_reservation());
         }
         Ok(())
+    }
+
+    /// Makes a refusal the result of a job whose answer found no room. The refusal is small, and is not
+    /// counted.
+    async fn write_refusal(
+        &self,
+        here: &Here,
+        name: &OwnerName,
+        attempt: &Attempt,
+    ) -> Result<(), Unavailable> {
+        let response = self.app.jobs.too_large().into_response();
+        let written = self.write_in(&mut Room::unlimited(), here, (name, attempt), response).await?;
+        if let Some(outcome) = written {
+            self.app.metrics.job_ended(outcome);
+            self.app.jobs.kept.end(here.id, here.owner, None);
+        }
+        Ok(())
+    }
+
+    /// Writes an answer within its room. Returns the outcome if it became the result of the job.
+    async fn write_in(
+        &self,
+        room: &mut Room,
+        here: &Here,
+        (name, attempt): (&OwnerName, &Attempt),
+        response: Response,
+    ) -> Result<Option<Outcome>, Unavailable> {
+        let response = with_problem_document(response, &here.id.to_string());
+        let (head, body) = (head_of(&response), response.into_body().into_data_stream());
+        let outcome = head.outcome;
+        let answer = Answer { attempt: attempt.number, head, body };
+        let is_result = self.app.jobs.objects.put_result((name, here.id), answer, room).await?;
+        Ok(is_result.then_some(outcome))
     }
 }
 

@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use super::kept::is_older;
 use super::{Here, unknown_job};
 use crate::http::compute::Snapshot;
 use crate::http::problem::Problem;
@@ -15,7 +16,8 @@ use crate::http::serve::app::App;
 use crate::http::serve::durable::unavailable;
 use crate::numerics::observer::Stage;
 use crate::store::Owner;
-use crate::store::objects::jobs::{FoundResult, JobId, JobResult, Lease, Outcome};
+use crate::store::objects::OwnerName;
+use crate::store::objects::jobs::{FoundResult, JobId, JobObjects, JobResult, Lease, Outcome};
 
 /// Bytes that the document of a problem may have.
 const MAX_PROBLEM_BYTES: u64 = 1 << 20;
@@ -104,14 +106,14 @@ pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem
     }
     let (objects, name) = (&app.jobs.objects, app.keys.name_of(owner));
     let refused = |error| unavailable(&error);
-    let found = objects.find_job(&name, id).await.map_err(refused)?;
-    let found = found.filter(|job| job.has_request || job.ended_at.is_some());
-    let Some(job) = found else { return Err(unknown_job(&id.to_string())) };
-    // One that was damaged is let go: the job has not ended then.
-    if job.ended_at.is_some()
-        && let Some(result) = objects.get_result(&name, id).await.map_err(refused)?
-    {
-        return view_of_result(app, id, result).await;
+    let mut job = find_known(app, &name, id).await?;
+    if job.ended_at.is_some() {
+        if let Some(result) = objects.get_result(&name, id).await.map_err(refused)? {
+            return view_of_result(app, id, result).await;
+        }
+        // The job was deleted meanwhile, or its result was damaged and dropped. In that case it is open
+        // again.
+        job = find_known(app, &name, id).await?;
     }
     let lease = match job.lease {
         Some((attempt, _)) => objects.get_lease(&name, id, attempt).await.map_err(refused)?,
@@ -121,6 +123,16 @@ pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem
         Some(lease) => view(id, Status::Running, of_lease(lease)),
         None => view(id, Status::Queued, at("queued", 0.0)),
     })
+}
+
+/// The objects of a job, unless it was deleted or its result is older than results are kept.
+///
+/// # Errors
+/// 404 `unknown-job`; 503 if the store does not answer.
+pub async fn find_known(app: &App, owner: &OwnerName, id: JobId) -> Result<JobObjects, Problem> {
+    let found = app.jobs.objects.find_job(owner, id).await.map_err(|error| unavailable(&error))?;
+    let is_old = |job: &JobObjects| is_older(job.ended_at, app.config.job_result(), SystemTime::now());
+    found.filter(|job| job.is_known() && !is_old(job)).ok_or_else(|| unknown_job(&id.to_string()))
 }
 
 /// A job of this process, if it is the owner's.
@@ -155,6 +167,10 @@ pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobV
 pub const LOOKING: Duration = Duration::from_secs(1);
 
 impl JobView {
+    pub fn id(&self) -> &str {
+        &self.job_id
+    }
+
     pub fn has_ended(&self) -> bool {
         !matches!(self.status, Status::Queued | Status::Running)
     }

@@ -7,11 +7,21 @@
 //! and half of them at most of one owner of several.
 //! A job that nobody works on, or whose process has ended, is anybody's (rounds.rs).
 //!
+//! BOUNDS (kept.rs). The number of kept jobs is bounded, and so are the bytes of their requests and results.
+//! When there are several owners, one may have half of each. An owner at its bound is refused. No kept result
+//! is dropped to make room, so no owner can push out the results of another, and no result is lost before it
+//! is fetched.
+//!
+//! REPEATED REQUESTS (idempotency.rs). A request that is sent again with its `Idempotency-Key` is answered
+//! with the job that it began.
+//!
 //! HOW. The request goes through the routes as any other (answer.rs), without a deadline. An answer that asks to come back later is not
 //! one: the job comes back.
 
 mod accept;
 mod answer;
+mod idempotency;
+mod kept;
 mod look;
 mod rounds;
 mod run;
@@ -30,21 +40,21 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::store::Owner;
 use crate::store::budget::{Budget, Reservation};
-use crate::store::objects::jobs::{JobId, JobObjects};
+use crate::store::objects::jobs::JobId;
+use crate::store::objects::room::Room;
 use crate::store::objects::{Objects, OwnerName, Unavailable};
 pub use accept::respond_async;
-pub use look::{JobView, Status, look, look_until_ended, problem_of};
-
-/// The memory that a job takes beside its request and its result.
-const LEAST_BYTES: usize = 4096;
+pub use idempotency::IDEMPOTENCY_KEY;
+use kept::Kept;
+pub use look::{JobView, Status, find_known, look, look_until_ended, problem_of};
 
 /// The jobs of this process, and where all of them are.
 pub struct Jobs {
     pub objects: Arc<Objects>,
     here: Mutex<HashMap<JobId, Arc<Here>>>,
-    /// What jobs hold where they are in memory.
-    memory: Option<Budget>,
-    held: Mutex<HashMap<JobId, Reservation>>,
+    /// Bytes of kept requests and results. Without a store these are bytes of memory.
+    bytes: Budget,
+    kept: Kept,
     turns: Arc<Turns>,
     /// Jobs that may wait or run here, of all owners and of one.
     most: usize,
@@ -80,26 +90,31 @@ pub struct Load {
     pub n_running: usize,
 }
 
+/// How many jobs there may be, and of how many owners.
+pub struct JobLimits {
+    /// Bytes of kept requests and results, in the store or, without one, in memory.
+    pub n_bytes: usize,
+    pub max_kept: usize,
+    pub n_owners: usize,
+    pub n_threads: usize,
+    pub max_queue: usize,
+    pub max_followers: usize,
+}
+
 impl Jobs {
-    /// Jobs in the store, or, where there is none, in so much memory.
-    pub fn new(
-        store: Option<Arc<Objects>>,
-        n_bytes: usize,
-        n_owners: usize,
-        n_threads: usize,
-        max_queue: usize,
-        max_followers: usize,
-    ) -> Self {
-        let most = n_threads.saturating_add(max_queue);
+    /// Jobs in the store, or, where there is none, in memory.
+    pub fn new(store: Option<Arc<Objects>>, limits: &JobLimits) -> Self {
+        let &JobLimits { n_owners, n_threads, .. } = limits;
+        let most = n_threads.saturating_add(limits.max_queue);
         Self {
-            memory: store.is_none().then(|| Budget::new(n_bytes, n_owners)),
             objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
             here: Mutex::default(),
-            held: Mutex::default(),
+            bytes: Budget::new(limits.n_bytes, n_owners),
+            kept: Kept::new(limits.max_kept, n_owners),
             turns: Turns::of_owners(n_threads, n_owners),
             most,
             most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
-            followers: Budget::new(max_followers, n_owners),
+            followers: Budget::new(limits.max_followers, n_owners),
         }
     }
 
@@ -111,8 +126,13 @@ impl Jobs {
     }
 
     /// Bytes of jobs in memory.
-    pub fn n_bytes(&self) -> usize {
-        self.memory.as_ref().map_or(0, Budget::n_held)
+    pub fn n_bytes_in_memory(&self) -> usize {
+        if self.objects.in_memory_alone() { self.bytes.n_held() } else { 0 }
+    }
+
+    /// Bytes of jobs in the store, as far as this process knows.
+    pub fn n_bytes_in_store(&self) -> usize {
+        if self.objects.in_memory_alone() { 0 } else { self.bytes.n_held() }
     }
 
     /// Counts one more who is told about a job while it goes on, until what is returned is dropped; nothing if there are too many, of all
@@ -153,6 +173,13 @@ impl Jobs {
         Some(job)
     }
 
+    /// Jobs of an owner that wait for a turn in this process.
+    fn waiting_of(&self, owner: Owner) -> Vec<JobId> {
+        let here = self.here();
+        let waiting = here.values().filter(|job| job.owner == owner && !job.is_running());
+        waiting.map(|job| job.id).collect()
+    }
+
     /// A job is not here any more.
     fn remove(&self, job: &Here) {
         self.here().remove(&job.id);
@@ -164,32 +191,31 @@ impl Jobs {
         self.turns.has_one_for(owner)
     }
 
-    /// Takes memory for a job, where jobs are in memory; says whether there is any.
-    fn hold(&self, job: JobId, owner: Owner, n_bytes: usize) -> bool {
-        let Some(memory) = &self.memory else { return true };
-        let mut held = self.held();
-        match held.get_mut(&job) {
-            Some(reservation) => reservation.try_grow(n_bytes),
-            None => match memory.try_reserve(owner, n_bytes + LEAST_BYTES) {
-                Some(reservation) => held.insert(job, reservation).is_none(),
-                None => false,
-            },
-        }
+    /// Room for `n_bytes` of a job, if its owner may have as many.
+    fn room(&self, owner: Owner, n_bytes: usize) -> Option<Room> {
+        Room::of(&self.bytes, owner, n_bytes)
     }
 
-    /// Says what a job holds in the end.
-    fn shrink(&self, job: JobId, n_bytes: usize) {
-        if let Some(reservation) = self.held().get_mut(&job) {
-            reservation.shrink_to(n_bytes + LEAST_BYTES);
-        }
+    /// 413 for a result that there is no room for.
+    fn too_large(&self) -> Problem {
+        let limit = self.bytes.largest();
+        let detail = format!(
+            "at most {limit} bytes of jobs and their results are kept for a key, and this result does not fit beside those that are kept"
+        );
+        Problem::beyond(Slug::ProblemTooLarge, limit, detail)
+            .with_remedy("fetch results and delete their jobs, or ask for less")
     }
 
-    /// Ends a job without a result, unless it has one; says whether it had none. Who works on it elsewhere finds out when it next says so.
+    /// Ends a job without a result, unless it has one or is unknown. Returns whether it was ended. Another
+    /// process that works on the job finds out when it renews its lease.
     ///
     /// # Errors
     /// If the store does not answer.
-    pub async fn cancel(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
-        let is_cancelled = self.objects.cancel_job(owner, id).await?;
+    pub async fn cancel(&self, owner: Owner, name: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        let is_cancelled = self.objects.cancel_job(name, id).await?;
+        if is_cancelled {
+            self.kept.end(id, owner, None);
+        }
         if let Some(here) = self.find(id).filter(|_| is_cancelled) {
             here.cancelled.cancel();
         }
@@ -204,24 +230,19 @@ impl Jobs {
         }
     }
 
-    /// Forgets a job wherever it is.
+    /// Deletes a job wherever it is. Returns whether it was known.
     ///
     /// # Errors
     /// If the store does not answer.
-    pub async fn forget(&self, job: &JobObjects) -> Result<(), Unavailable> {
-        self.objects.delete_job(job).await?;
-        self.held().remove(&job.id);
-        Ok(())
+    pub async fn forget(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        let was_known = self.objects.delete_job(owner, id).await?;
+        self.kept.remove(id);
+        Ok(was_known)
     }
 
     #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
     fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<Here>>> {
         self.here.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
-    fn held(&self) -> MutexGuard<'_, HashMap<JobId, Reservation>> {
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

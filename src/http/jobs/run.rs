@@ -79,7 +79,7 @@ impl Runner {
         let objects = &self.app.jobs.objects;
         let found = objects.find_job(name, here.id).await?;
         // While it waited here, another process may have begun it: that one has it, and if it leaves it, the rounds find it.
-        let is_to_do = |job: &JobObjects| job.has_request && job.ended_at.is_none() && job.lease == here.last;
+        let is_to_do = |job: &JobObjects| job.is_open() && job.lease == here.last;
         let Some(job) = found.filter(is_to_do) else { return Ok(None) };
         let attempt = match job.lease {
             None => Attempt { number: 0, lease: Lease::default() },

@@ -113,7 +113,7 @@ impl Gauges {
             ("cache", app.prepared.n_bytes(), app.memory.cache),
             ("work", app.prepared.n_reserved(), app.memory.work),
             ("intake", app.intake.n_held(), app.memory.intake),
-            ("jobs", app.jobs.n_bytes(), app.memory.jobs),
+            ("jobs", app.jobs.n_bytes_in_memory(), app.memory.jobs),
         ] {
             self.memory_used.with_label_values(&[part]).set(used as i64);
             self.memory_limit.with_label_values(&[part]).set(limit as i64);
@@ -134,8 +134,7 @@ impl Gauges {
         self.store_bytes.set(n_bytes as i64);
         let n_factor_bytes = app.durable.as_ref().map_or(0, |durable| durable.factor_bytes());
         self.store_factor_bytes.set(n_factor_bytes as i64);
-        let n_job_bytes = app.durable.as_ref().map_or(0, |durable| durable.job_bytes());
-        self.store_job_bytes.set(n_job_bytes as i64);
+        self.store_job_bytes.set(app.jobs.n_bytes_in_store() as i64);
         let tally = app.durable.as_ref().map(|durable| durable.objects.tally());
         for verb in Verb::ALL {
             let [n_answered, n_failed] = tally.map_or([0; 2], |tally| tally.of(verb));

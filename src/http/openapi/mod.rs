@@ -28,7 +28,8 @@ use super::problem::ProblemDocument;
                        lengths are in the client's unit, a null marks an entry without a meaningful value, and every error \
                        is an RFC 9457 problem document. Request bodies may be compressed, by Content-Encoding gzip or zstd, and so \
                        are computed answers in JSON if Accept-Encoding asks for it. Every request that computes is answered \
-                       202 at once, with a job and its Location, if it is sent with `Prefer: respond-async`.",
+                       202 at once, with a job and its Location, if it is sent with `Prefer: respond-async`; with an `Idempotency-Key` \
+                       of 1 to 255 visible ASCII characters beside it, sending it again is the same job.",
         contact(name = "The gramian developers"),
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),

@@ -139,11 +139,17 @@ impl Problem {
         Self::of_field(Slug::DimensionMismatch, pointer, detail)
     }
 
+    /// A problem with the limit that was exceeded.
+    pub fn beyond(slug: Slug, limit: usize, detail: impl Into<String>) -> Self {
+        let mut problem = Self::new(slug, detail);
+        problem.members.limit = Some(limit as u64);
+        problem
+    }
+
     /// 413 for a request whose size in `what` is over a limit.
     pub fn too_large(slug: Slug, what: &str, limit: usize, required: Option<usize>) -> Self {
         let needed = required.map(|n| format!(", this request has {n}")).unwrap_or_default();
-        let mut problem = Self::new(slug, format!("at most {limit} {what} are served{needed}"));
-        problem.members.limit = Some(limit as u64);
+        let mut problem = Self::beyond(slug, limit, format!("at most {limit} {what} are served{needed}"));
         problem.members.required = required.map(|n| n as u64);
         problem
     }

@@ -14,12 +14,13 @@ use futures_util::Stream;
 
 use crate::http::around::middleware::Documented;
 use crate::http::fields::schemas::JobIdSchema;
-use crate::http::jobs::{JobView, look, look_until_ended, problem_of, unknown_job};
+use crate::http::jobs::{JobView, find_known, look, look_until_ended, problem_of, unknown_job};
 use crate::http::openapi::responses::{AnyJobProblems, JobProblems, JobResultProblems};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::serve::durable::{SECONDS_UNTIL_BACK, unavailable};
+use crate::http::wire::write::encode::holding;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::objects::jobs::{JobId, Outcome};
@@ -29,6 +30,10 @@ const TELLING: Duration = Duration::from_millis(500);
 
 /// How much sooner than the deadline of its request a wait for a result ends.
 const MARGIN: Duration = Duration::from_secs(1);
+
+/// Bytes of a result that one reader may hold: pieces in the buffers of hyper, and one on its way from the
+/// store. They are reserved until the answer is sent.
+const BYTES_UNDER_WAY: usize = 256 << 10;
 
 /// Look at a job
 ///
@@ -69,15 +74,14 @@ pub async fn delete_job(
 ) -> Result<StatusCode, Problem> {
     let (id, name) = (parse(&job_id)?, app.keys.name_of(owner));
     let refused = |error| unavailable(&error);
-    let found = app.jobs.objects.find_job(&name, id).await.map_err(refused)?;
-    let Some(job) = found.filter(|job| job.has_request || job.ended_at.is_some()) else {
-        return Err(unknown_job(&job_id));
-    };
-    let is_cancelled = job.ended_at.is_none() && app.jobs.cancel(&name, id).await.map_err(refused)?;
-    if !is_cancelled {
-        app.jobs.forget(&job).await.map_err(refused)?;
+    let job = find_known(&app, &name, id).await?;
+    let is_cancelled = job.ended_at.is_none() && app.jobs.cancel(owner, &name, id).await.map_err(refused)?;
+    // Another request may have deleted the job meanwhile.
+    if is_cancelled || app.jobs.forget(&name, id).await.map_err(refused)? {
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(unknown_job(&job_id))
     }
-    Ok(StatusCode::NO_CONTENT)
 }
 
 /// Follow a job
@@ -181,9 +185,13 @@ pub async fn get_job_result(
         }
     };
     drop(waiting);
-    let found = app.jobs.objects.get_result(&app.keys.name_of(owner), id).await;
-    let again = || Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK);
-    let found = found.map_err(|error| unavailable(&error))?.ok_or_else(again)?;
+    let name = app.keys.name_of(owner);
+    let found = app.jobs.objects.get_result(&name, id).await.map_err(|error| unavailable(&error))?;
+    let Some(found) = found else {
+        // The job was deleted meanwhile, or its result was damaged.
+        find_known(&app, &name, id).await?;
+        return Err(Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK));
+    };
     if found.head.outcome == Outcome::Cancelled {
         return Err(Problem::new(Slug::UnknownJob, "the job was cancelled: there is no result"));
     }
@@ -192,7 +200,9 @@ pub async fn get_job_result(
         let document = problem_of(found).await?;
         return Ok((status, Extension(Documented(document))).into_response());
     }
-    let mut response = Body::from_stream(found.body).into_response();
+    let n_bytes = usize::try_from(found.n_body_bytes).unwrap_or(usize::MAX).min(BYTES_UNDER_WAY);
+    let memory = app.prepared.try_reserve(owner, n_bytes).ok_or_else(|| app.compute.out_of_memory())?;
+    let mut response = Body::from_stream(holding(found.body, memory)).into_response();
     for (name, value) in &found.head.headers {
         if let (Ok(name), Ok(value)) = (HeaderName::from_bytes(name.as_bytes()), HeaderValue::from_str(value))
         {

@@ -10,7 +10,7 @@ use super::plan::FitFailure;
 use crate::config::Config;
 use crate::http::access::Keys;
 use crate::http::compute::Compute;
-use crate::http::jobs::Jobs;
+use crate::http::jobs::{JobLimits, Jobs};
 use crate::http::metrics::Metrics;
 use crate::http::problem::Problem;
 use crate::memory::Memory;
@@ -69,15 +69,16 @@ impl App {
             PreparedBytes { kept: memory.cache, spare: memory.spare, budget: memory.work, n_owners };
         let in_store = durable.as_ref().map(|durable| durable.objects.clone());
         let (n_threads, max_queue) = (config.n_threads(), config.max_queue);
+        let of_jobs = JobLimits {
+            n_bytes: if in_store.is_some() { config.store_job_bytes } else { memory.jobs },
+            max_kept: config.max_jobs,
+            n_owners,
+            n_threads,
+            max_queue,
+            max_followers: config.max_connections / 2,
+        };
         Ok(Arc::new(Self {
-            jobs: Jobs::new(
-                in_store,
-                memory.jobs,
-                n_owners,
-                n_threads,
-                max_queue,
-                config.max_connections / 2,
-            ),
+            jobs: Jobs::new(in_store, &of_jobs),
             intake: Budget::new(memory.intake, n_owners),
             clouds: CloudStore::new(memory.clouds),
             durable,

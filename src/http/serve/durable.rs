@@ -51,7 +51,6 @@ pub struct Durable {
     n_clouds: AtomicU64,
     n_bytes: AtomicU64,
     pub(super) n_factor_bytes: AtomicU64,
-    n_job_bytes: AtomicU64,
     pub(super) is_full: Notify,
     /// Held while a factor is written.
     pub(super) writing_factor: tokio::sync::Mutex<()>,
@@ -72,7 +71,6 @@ impl Durable {
             n_clouds: AtomicU64::new(0),
             n_bytes: AtomicU64::new(0),
             n_factor_bytes: AtomicU64::new(0),
-            n_job_bytes: AtomicU64::new(0),
             is_full: Notify::new(),
             writing_factor: tokio::sync::Mutex::default(),
         })
@@ -86,11 +84,6 @@ impl Durable {
     /// Bytes of factors in the store, about.
     pub fn factor_bytes(&self) -> u64 {
         self.n_factor_bytes.load(Ordering::Relaxed)
-    }
-
-    /// Bytes of jobs in the store, about.
-    pub fn job_bytes(&self) -> u64 {
-        self.n_job_bytes.load(Ordering::Relaxed)
     }
 
     /// How many clouds the store has, and bytes of them, about.
@@ -312,9 +305,8 @@ pub async fn retain(app: Arc<App>) {
         }
         let now = SystemTime::now();
         let knows = |name: &OwnerName| app.keys.owner_named(name).is_some();
-        match durable.objects.sweep_jobs(knows, app.config.job_retention(), now).await {
-            Err(error) => tracing::error!(%error, "jobs of keys that are gone are not let go"),
-            Ok(n_bytes) => durable.n_job_bytes.store(n_bytes, Ordering::Relaxed),
+        if let Err(error) = durable.objects.sweep_jobs(knows, app.config.job_retention(), now).await {
+            tracing::error!(%error, "jobs of keys that are gone are not let go");
         }
         match durable.objects.sweep(app.config.retention(), now).await {
             Err(error) => tracing::error!(%error, "clouds are not let go"),

@@ -13,6 +13,7 @@ use object_store::{ObjectMeta, ObjectStoreExt};
 use serde::{Deserialize, Serialize};
 
 use super::retention::AT_WORK;
+use super::room::Room;
 use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "factors";
@@ -78,7 +79,8 @@ impl Objects {
     ) -> Result<u64, Unavailable> {
         let mut line = serde_json::to_vec(head).unwrap_or_default();
         line.push(b'\n');
-        self.put_pieces(&self.factor(name), line.into(), futures_util::stream::iter(pieces.map(Ok))).await
+        let pieces = futures_util::stream::iter(pieces.map(Ok));
+        self.put_pieces(&self.factor(name), line.into(), pieces, &mut Room::unlimited()).await
     }
 
     /// A factor, if it is there and of this version.

@@ -10,7 +10,7 @@
 //!
 //! FACTORS are under `<owner>/factors/`, see factors.rs, and go with their clouds.
 //!
-//! JOBS are under `<owner>/jobs/`: see jobs/.
+//! JOBS are under `<owner>/jobs/`, `<owner>/open/` and `<owner>/claims/`: see jobs/.
 //!
 //! READS are of what was written, or of nothing: see cloud_object.rs. What is damaged is put aside, under `damaged/`, and reported; it is not there
 //! any more then, and can be posted again.
@@ -25,6 +25,7 @@ mod patience;
 pub mod pieces;
 mod place;
 mod retention;
+pub mod room;
 mod tally;
 #[cfg(test)]
 mod tests;
@@ -68,6 +69,8 @@ pub struct Objects {
     root: Path,
     /// Where files are, if it is a directory.
     directory: Option<PathBuf>,
+    /// Whether objects are kept in the memory of this process.
+    in_memory: bool,
     tally: Tally,
     n_damaged: AtomicU64,
 }
@@ -106,13 +109,20 @@ impl Objects {
 
     /// A store in memory, as large as memory.
     pub fn in_memory() -> Self {
-        Self::over(Arc::new(object_store::memory::InMemory::new()), Path::default())
+        let memory = Arc::new(object_store::memory::InMemory::new());
+        Self { in_memory: true, ..Self::over(memory, Path::default()) }
     }
 
     /// A store of any kind, with what stands before all names.
     pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
         let store = Arc::new(Patient::new(store));
-        Self { store, root, directory: None, tally: Tally::default(), n_damaged: AtomicU64::new(0) }
+        let (tally, n_damaged) = (Tally::default(), AtomicU64::new(0));
+        Self { store, root, directory: None, in_memory: false, tally, n_damaged }
+    }
+
+    /// Whether objects are kept in the memory of this process alone.
+    pub fn in_memory_alone(&self) -> bool {
+        self.in_memory
     }
 
     /// What was asked of the store since the start.

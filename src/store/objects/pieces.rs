@@ -1,7 +1,12 @@
 //! Objects that are written and read piece by piece: a line of JSON, a body, and the BLAKE3 of both, 32 bytes.
 //!
 //! WRITES are whole or not at all. READS end with the hash: who reads a body that is not what was written finds it broken off, and never whole.
+//!
+//! READERS get slices of what the store hands out, without copies. In memory these are slices of the object
+//! itself, which hold its [`Room`]. So a result is in memory once, however many clients read it, and stays
+//! paid for while it is read, even after its deletion.
 
+use std::collections::VecDeque;
 use std::time::SystemTime;
 
 use bytes::{Bytes, BytesMut};
@@ -10,6 +15,7 @@ use futures_util::{Stream, StreamExt, TryStreamExt};
 use object_store::path::Path;
 use object_store::{Error, ObjectStoreExt, PutPayload, WriteMultipart};
 
+use super::room::Room;
 use super::{Damaged, Objects, Unavailable, Verb};
 
 /// Bytes of the hash behind everything.
@@ -23,6 +29,9 @@ const AT_ONCE: usize = 8 << 20;
 
 /// Parts that are on their way at once.
 const PARTS_UNDER_WAY: usize = 4;
+
+/// Bytes that a reader is given at a time: some 50 µs of hashing.
+const PIECE: usize = 64 << 10;
 
 /// An object that is there, as far as its first line.
 pub struct Found {
@@ -42,22 +51,26 @@ pub enum BrokenOff {
 }
 
 impl Objects {
-    /// Writes an object; says how many bytes it has. If the process ends meanwhile, a directory keeps what there is under another name until the
-    /// next sweep, and a bucket as parts of an upload that was not completed.
+    /// Writes an object within its room. Returns the number of its bytes. If the process ends meanwhile, a
+    /// directory keeps what was written under another name until the next sweep, and a bucket as parts of an
+    /// upload that was not completed.
     ///
     /// # Errors
-    /// [`Unavailable`], also if the pieces break off.
+    /// [`Unavailable`], also if the pieces break off or exceed the room. [`Room::is_exceeded`] tells the
+    /// latter.
     pub(super) async fn put_pieces(
         &self,
         name: &Path,
         line: Bytes,
         pieces: impl Stream<Item = Result<Bytes, String>>,
+        room: &mut Room,
     ) -> Result<u64, Unavailable> {
         let mut parts = None;
-        let sent = self.send(name, line, pieces, &mut parts).await;
+        let sent = self.send(name, line, Pieces { pieces, room }, &mut parts).await;
         let written = match (sent, parts) {
             (Ok((n_bytes, held)), None) => {
-                let written = self.store.put(name, held.into_iter().collect()).await;
+                let payload = if self.in_memory { room.sealed(held) } else { held.into_iter().collect() };
+                let written = self.store.put(name, payload).await;
                 written.map(|_| n_bytes).map_err(|error| error.to_string())
             }
             (Ok((n_bytes, _)), Some(parts)) => {
@@ -71,7 +84,9 @@ impl Objects {
                 Err(reason)
             }
         };
-        self.tally.add(Verb::Write, written.is_ok());
+        if !room.is_exceeded() {
+            self.tally.add(Verb::Write, written.is_ok());
+        }
         written.map_err(|reason| Unavailable { verb: Verb::Write, name: name.to_string(), reason })
     }
 
@@ -80,11 +95,12 @@ impl Objects {
         &self,
         name: &Path,
         line: Bytes,
-        pieces: impl Stream<Item = Result<Bytes, String>>,
+        Pieces { pieces, room }: Pieces<'_, impl Stream<Item = Result<Bytes, String>>>,
         parts: &mut Option<WriteMultipart>,
     ) -> Result<(u64, Vec<Bytes>), String> {
         let failed = |error: Error| error.to_string();
         let (mut hasher, mut held, mut n_bytes) = (blake3::Hasher::new(), Vec::new(), 0);
+        let at_once = if self.in_memory { usize::MAX } else { AT_ONCE };
         let line = futures_util::stream::once(std::future::ready(Ok(line)));
         let mut pieces = std::pin::pin!(line.chain(pieces));
         loop {
@@ -92,10 +108,14 @@ impl Objects {
                 Some(piece) => (piece?, false),
                 None => (Bytes::copy_from_slice(hasher.finalize().as_bytes()), true),
             };
+            // In memory the pieces exist beside the object that they are joined to.
+            if !room.try_grow(if self.in_memory { 2 * piece.len() } else { piece.len() }) {
+                return Err("it has no room".to_owned());
+            }
             hasher.update(&piece);
             n_bytes += piece.len();
             held.push(piece);
-            if n_bytes > AT_ONCE && parts.is_none() {
+            if n_bytes > at_once && parts.is_none() {
                 *parts = Some(WriteMultipart::new(self.store.put_multipart(name).await.map_err(failed)?));
             }
             if let Some(parts) = parts {
@@ -124,24 +144,37 @@ impl Objects {
         let Some(found) = found else { return Ok(None) };
         let (n_bytes, written_at) = (found.meta.size, SystemTime::from(found.meta.last_modified));
         let mut bytes = found.into_stream();
-        let mut first = BytesMut::new();
-        let end = loop {
-            if let Some(end) = first.iter().position(|&byte| byte == b'\n') {
-                break end + 1;
-            }
-            match bytes.try_next().await.map_err(|error| self.failed(Verb::Read, name, error))? {
-                Some(more) if first.len() <= MAX_LINE => first.extend_from_slice(&more),
-                _ => return Ok(Some(Err(Damaged("it has no first line")))),
+        let mut line = BytesMut::new();
+        let first = loop {
+            let next = bytes.try_next().await.map_err(|error| self.failed(Verb::Read, name, error))?;
+            let Some(mut piece) = next.filter(|_| line.len() <= MAX_LINE) else {
+                return Ok(Some(Err(Damaged("it has no first line"))));
+            };
+            let searched = &piece[..piece.len().min(MAX_LINE)];
+            match memchr::memchr(b'\n', searched) {
+                Some(end) => {
+                    line.extend_from_slice(&piece.split_to(end + 1));
+                    break piece;
+                }
+                None => line.extend_from_slice(searched),
             }
         };
-        let line = first.split_to(end).freeze();
+        let line = line.freeze();
         let n_body_bytes = n_bytes.saturating_sub((line.len() + HASH_BYTES) as u64);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&line);
         let rest = bytes.map_err(|error| BrokenOff::Store(error.to_string())).boxed();
-        let body = checked(hasher, first.freeze(), rest).boxed();
+        let mut unread = Unread::default();
+        unread.push(first);
+        let body = checked(Checked { hasher, unread, rest }).boxed();
         Ok(Some(Ok(Found { line, written_at, n_body_bytes, body })))
     }
+}
+
+/// Pieces of an object that is being written, and its room.
+struct Pieces<'a, S> {
+    pieces: S,
+    room: &'a mut Room,
 }
 
 /// A short object as it is written: a line and its hash.
@@ -161,35 +194,65 @@ pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], Damaged> {
     if is_whole { Ok(line) } else { Err(Damaged("its bytes are not those that were written")) }
 }
 
-/// The body in front of the hash behind it. Its last bytes come only once the hash is right.
-fn checked(
+/// Received bytes that were not handed on.
+#[derive(Default)]
+struct Unread {
+    pieces: VecDeque<Bytes>,
+    n_bytes: usize,
+}
+
+impl Unread {
+    fn push(&mut self, piece: Bytes) {
+        self.n_bytes += piece.len();
+        self.pieces.push_back(piece);
+    }
+
+    /// Takes a piece from the front, and leaves the last `n_last` bytes.
+    fn pop_before_last(&mut self, n_last: usize) -> Option<Bytes> {
+        let n_free = self.n_bytes.saturating_sub(n_last).min(PIECE);
+        let front = self.pieces.front_mut().filter(|_| n_free > 0)?;
+        let piece = front.split_to(n_free.min(front.len()));
+        if front.is_empty() {
+            self.pieces.pop_front();
+        }
+        self.n_bytes -= piece.len();
+        Some(piece)
+    }
+}
+
+/// The state of a reader: a body with its hash behind it.
+struct Checked {
     hasher: blake3::Hasher,
-    first: Bytes,
+    unread: Unread,
     rest: BoxStream<'static, Result<Bytes, BrokenOff>>,
-) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
-    let first = futures_util::stream::once(std::future::ready(Ok(first)));
-    let state = Some((hasher, BytesMut::new(), first.chain(rest).boxed()));
-    futures_util::stream::unfold(state, |state| async move {
-        let (mut hasher, mut held, mut bytes) = state?;
+}
+
+impl Checked {
+    /// Returns the last bytes of the body if the hash is right.
+    fn end(mut self) -> Result<Bytes, BrokenOff> {
+        let mut body = self.unread.pieces.iter().flatten().copied().collect::<Vec<u8>>();
+        let hash = body.split_off(body.len().saturating_sub(HASH_BYTES));
+        self.hasher.update(&body);
+        let is_whole = self.hasher.finalize().as_bytes()[..] == hash[..];
+        if is_whole { Ok(body.into()) } else { Err(BrokenOff::Damaged) }
+    }
+}
+
+/// Streams the body. Its last byte is held back until the hash is checked, so that a damaged body breaks off.
+fn checked(state: Checked) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
+    futures_util::stream::unfold(Some(state), |state| async move {
+        let mut state = state?;
         loop {
-            match bytes.next().await {
+            while let Some(piece) = state.unread.pop_before_last(HASH_BYTES + 1) {
+                if !piece.is_empty() {
+                    state.hasher.update(&piece);
+                    return Some((Ok(piece), Some(state)));
+                }
+            }
+            match state.rest.next().await {
                 Some(Err(error)) => return Some((Err(error), None)),
-                Some(Ok(more)) => {
-                    held.extend_from_slice(&more);
-                    // A byte of the body is held back as well, so that there is something to break off.
-                    let n_free = held.len().saturating_sub(HASH_BYTES + 1);
-                    if n_free > 0 {
-                        let free = held.split_to(n_free).freeze();
-                        hasher.update(&free);
-                        return Some((Ok(free), Some((hasher, held, bytes))));
-                    }
-                }
-                None => {
-                    let body = held.split_to(held.len().saturating_sub(HASH_BYTES)).freeze();
-                    hasher.update(&body);
-                    let is_whole = hasher.finalize().as_bytes()[..] == held[..];
-                    return Some((if is_whole { Ok(body) } else { Err(BrokenOff::Damaged) }, None));
-                }
+                Some(Ok(more)) => state.unread.push(more),
+                None => return Some((state.end(), None)),
             }
         }
     })

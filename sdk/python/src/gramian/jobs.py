@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Protocol
 
@@ -110,7 +111,9 @@ def answer(
     httpx.TransportError
         If the service is away for too long.
     """
-    response = connection.send("POST", path, content=content, headers=headers | PREFERENCE)
+    # A repetition, after a lost connection or by a proxy, is the same job.
+    key = {"Idempotency-Key": str(uuid.uuid4())}
+    response = connection.send("POST", path, content=content, headers=headers | PREFERENCE | key)
     if response.status_code != httpx.codes.ACCEPTED:
         return response
     # Proxies send all that is about a job to the replica that has it, which is that of its cloud.

@@ -25,8 +25,8 @@ BACKOFF_SECONDS = 0.1
 CLOUD_HEADER = "Gramian-Cloud"
 """Names the cloud that a request is about to proxies: the replica that it is always sent to has what was computed."""
 
-# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes. A job
-# whose 202 was lost is begun once more; the first one ends by itself, at the deadline of jobs at the latest.
+# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes, and
+# requests for jobs have a key by which the service knows them again.
 # Reading past the timeout is not among these, since the service is then busy with the first request still.
 _LOST_CONNECTION = (
     httpx.ConnectError,

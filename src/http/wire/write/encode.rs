@@ -120,7 +120,7 @@ impl Encoded {
 }
 
 /// A stream that holds something for as long as it is there.
-fn holding<S: Stream>(stream: S, held: Reservation) -> impl Stream<Item = S::Item> {
+pub fn holding<S: Stream>(stream: S, held: Reservation) -> impl Stream<Item = S::Item> {
     stream.map(move |item| {
         let _ = &held;
         item

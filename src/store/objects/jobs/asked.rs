@@ -2,10 +2,10 @@
 
 use bytes::Bytes;
 use futures_util::stream::BoxStream;
-use object_store::PutPayload;
 use serde::{Deserialize, Serialize};
 
 use super::super::pieces::{BrokenOff, Found};
+use super::super::room::Room;
 use super::super::{Damaged, Objects, OwnerName, Unavailable};
 use super::{JobId, REQUEST, line_of};
 
@@ -24,24 +24,25 @@ pub struct FoundRequest {
 }
 
 impl Objects {
-    /// Writes what is asked.
+    /// Writes a request within its room, and marks its job as open.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn put_job(
         &self,
-        owner: &OwnerName,
-        id: JobId,
+        (owner, id): (&OwnerName, JobId),
         request: &JobRequest,
         body: Bytes,
+        room: &mut Room,
     ) -> Result<(), Unavailable> {
         let line = line_of(request);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&line);
         hasher.update(&body);
-        let hash = Bytes::copy_from_slice(hasher.finalize().as_bytes());
-        let payload: PutPayload = [line, body, hash].into_iter().collect();
-        self.put(&self.job(owner, id, REQUEST), payload).await
+        let pieces = vec![line, body, Bytes::copy_from_slice(hasher.finalize().as_bytes())];
+        let payload = if self.in_memory { room.sealed(pieces) } else { pieces.into_iter().collect() };
+        self.put(&self.job(owner, id, REQUEST), payload).await?;
+        self.mark_open(owner, id).await
     }
 
     /// What was asked, if it is there, and as it was written as far as its first line.

@@ -5,9 +5,19 @@
 //! written any more is anybody's: who makes the next lease has it. Making a lease is exclusive, so one attempt has one process; so is making the
 //! result, so that a job ends once, whoever was only asleep.
 //!
+//! OPEN JOBS have a mark, the empty object `<owner>/open/<id>`, so that they are found without a list of all
+//! jobs. The mark is written behind the request and removed behind the result. So a job that has ended may
+//! still have one, which the next round removes.
+//!
+//! DELETION begins with the object `deleted`. Making it is exclusive, so one of several who delete a job at
+//! once does it. From then on the job is unknown, whatever is left of it.
+//!
+//! KEYS of requests that may be repeated are under `<owner>/claims/`, see claims.rs.
+//!
 //! OBJECTS are a line of JSON, a body if they have one, and the BLAKE3 of both (pieces.rs), but for leases, which are a line.
 
 mod asked;
+mod claims;
 mod leases;
 mod results;
 #[cfg(test)]
@@ -23,12 +33,15 @@ use uuid::Uuid;
 
 use super::{Objects, OwnerName, Unavailable};
 pub use asked::{FoundRequest, JobRequest};
+pub use claims::{Claim, ClaimName, KeyHash};
 pub use leases::Lease;
-pub use results::{FoundResult, JobResult, Outcome};
+pub use results::{Answer, FoundResult, JobResult, Outcome};
 
 const FOLDER: &str = "jobs";
+const OPEN: &str = "open";
 const REQUEST: &str = "request";
 const RESULT: &str = "result";
+const DELETED: &str = "deleted";
 const LEASE: &str = "lease-";
 const ANSWER: &str = "answer-";
 
@@ -70,19 +83,33 @@ impl std::fmt::Display for JobId {
 /// What there is of a job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobObjects {
-    pub owner: OwnerName,
     pub id: JobId,
     pub has_request: bool,
+    /// Whether its deletion has begun.
+    is_deleted: bool,
     /// When there was a result.
     pub ended_at: Option<SystemTime>,
     /// The last attempt, and when its lease was written.
     pub lease: Option<(u32, SystemTime)>,
+    /// The claim to the `Idempotency-Key` of its request.
+    claim: Option<ClaimName>,
+    pub n_bytes: u64,
 }
 
 impl JobObjects {
+    /// Whether the job exists: it was written, and is not being deleted.
+    pub fn is_known(&self) -> bool {
+        self.has_request && !self.is_deleted
+    }
+
+    /// Whether the job exists and has not ended.
+    pub fn is_open(&self) -> bool {
+        self.is_known() && self.ended_at.is_none()
+    }
+
     /// Whether this attempt is the last one, of a job that is still to be done.
     pub fn is_that_of(&self, attempt: u32) -> bool {
-        self.has_request && self.ended_at.is_none() && self.lease.is_none_or(|(last, _)| last <= attempt)
+        self.is_open() && self.lease.is_none_or(|(last, _)| last <= attempt)
     }
 }
 
@@ -93,32 +120,75 @@ impl Objects {
     /// [`Unavailable`].
     pub async fn find_job(&self, owner: &OwnerName, id: JobId) -> Result<Option<JobObjects>, Unavailable> {
         let found = self.objects_in(owner, &[FOLDER, &id.to_string()]).await?;
-        Ok(collected(owner, found).pop())
+        Ok(collected(found).pop())
     }
 
-    /// What there is of the jobs of an owner.
+    /// What there is of all jobs of an owner. The list is as long as there are jobs, so it is asked for
+    /// rarely.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn jobs(&self, owner: &OwnerName) -> Result<Vec<JobObjects>, Unavailable> {
-        Ok(collected(owner, self.objects_in(owner, &[FOLDER]).await?))
+        Ok(collected(self.objects_in(owner, &[FOLDER]).await?))
     }
 
-    /// Forgets a job: what was asked first, so that nobody begins it again.
+    /// Jobs of an owner that are marked as open. Some may have ended or be gone.
     ///
     /// # Errors
     /// [`Unavailable`].
-    pub async fn delete_job(&self, job: &JobObjects) -> Result<(), Unavailable> {
-        let JobObjects { owner, id, .. } = job;
-        self.delete(&self.job(owner, *id, REQUEST)).await?;
-        for object in self.objects_in(owner, &[FOLDER, &id.to_string()]).await? {
-            self.delete(&object.location).await?;
-        }
-        Ok(())
+    pub async fn open_jobs(&self, owner: &OwnerName) -> Result<Vec<JobId>, Unavailable> {
+        let found = self.objects_in(owner, &[OPEN]).await?;
+        Ok(found.iter().filter_map(|object| JobId::parse(object.location.filename()?)).collect())
     }
 
-    /// Bytes of all jobs. Those of owners that nobody `knows` any more, a key of theirs having been taken away, are forgotten once they ended
-    /// longer than `kept` ago, or nobody has worked on them for `longest`.
+    /// Marks a job as open.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn mark_open(&self, owner: &OwnerName, id: JobId) -> Result<(), Unavailable> {
+        self.put(&self.open_mark(owner, id), PutPayload::default()).await
+    }
+
+    /// Removes the mark of an open job.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn unmark_open(&self, owner: &OwnerName, id: JobId) -> Result<(), Unavailable> {
+        self.delete(&self.open_mark(owner, id)).await.map(|_| ())
+    }
+
+    /// Deletes a job. Returns whether it was known and this call deleted it.
+    ///
+    /// # Errors
+    /// [`Unavailable`]. The job is unknown then, or as it was.
+    pub async fn delete_job(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        if !self.create(&self.job(owner, id, DELETED), PutPayload::default()).await? {
+            return Ok(false);
+        }
+        self.clear_job(owner, id).await
+    }
+
+    /// Removes what is left of a job. Returns whether its request was among it.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub async fn clear_job(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
+        let found = self.objects_in(owner, &[FOLDER, &id.to_string()]).await?;
+        let deleted = self.job(owner, id, DELETED);
+        for object in found.iter().filter(|object| object.location != deleted) {
+            self.delete(&object.location).await?;
+        }
+        self.unmark_open(owner, id).await?;
+        let Some(job) = collected(found).pop() else { return Ok(false) };
+        if let Some(claim) = &job.claim {
+            self.drop_claim(owner, claim, id).await?;
+        }
+        self.delete(&deleted).await?;
+        Ok(job.has_request)
+    }
+
+    /// Forgets jobs of owners that nobody `knows` any more, a key of theirs having been taken away, once they
+    /// ended longer than `kept` ago, or nobody has worked on them for `longest`.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -127,23 +197,17 @@ impl Objects {
         knows: impl Fn(&OwnerName) -> bool,
         (kept, longest): (Duration, Duration),
         now: SystemTime,
-    ) -> Result<u64, Unavailable> {
-        let mut n_bytes = 0;
-        for owner in self.owners().await? {
-            let found = self.objects_in(&owner, &[FOLDER]).await?;
-            n_bytes += found.iter().map(|object| object.size).sum::<u64>();
-            if knows(&owner) {
-                continue;
-            }
-            for job in collected(&owner, found) {
+    ) -> Result<(), Unavailable> {
+        for owner in self.owners().await?.into_iter().filter(|owner| !knows(owner)) {
+            for job in self.jobs(&owner).await? {
                 let written_at = job.lease.map_or(job.id.created_at(), |(_, written_at)| written_at);
                 let (since, most) = job.ended_at.map_or((written_at, longest), |ended_at| (ended_at, kept));
                 if now.duration_since(since).is_ok_and(|age| age > most) {
-                    self.delete_job(&job).await?;
+                    self.clear_job(&owner, job.id).await?;
                 }
             }
         }
-        Ok(n_bytes)
+        Ok(())
     }
 
     fn answer(&self, owner: &OwnerName, id: JobId, attempt: u32) -> Path {
@@ -152,6 +216,10 @@ impl Objects {
 
     fn job(&self, owner: &OwnerName, id: JobId, part: &str) -> Path {
         self.path(&[&owner.0, FOLDER, &id.to_string(), part])
+    }
+
+    fn open_mark(&self, owner: &OwnerName, id: JobId) -> Path {
+        self.path(&[&owner.0, OPEN, &id.to_string()])
     }
 
     fn lease(&self, owner: &OwnerName, id: JobId, attempt: u32) -> Path {
@@ -167,24 +235,29 @@ fn line_of(head: &impl Serialize) -> Bytes {
 }
 
 /// Objects by their jobs.
-fn collected(owner: &OwnerName, found: Vec<ObjectMeta>) -> Vec<JobObjects> {
+fn collected(found: Vec<ObjectMeta>) -> Vec<JobObjects> {
     let mut jobs = std::collections::BTreeMap::new();
     for object in found {
         let mut parts: Vec<_> = object.location.parts().collect();
         let (Some(part), Some(id)) = (parts.pop(), parts.pop()) else { continue };
         let Some(id) = JobId::parse(id.as_ref()) else { continue };
         let job = jobs.entry(id).or_insert_with(|| JobObjects {
-            owner: owner.clone(),
             id,
             has_request: false,
+            is_deleted: false,
             ended_at: None,
             lease: None,
+            claim: None,
+            n_bytes: 0,
         });
+        job.n_bytes += object.size;
         let written_at = SystemTime::from(object.last_modified);
         match part.as_ref() {
             REQUEST => job.has_request = true,
             RESULT => job.ended_at = Some(written_at),
+            DELETED => job.is_deleted = true,
             other => {
+                job.claim = job.claim.take().or_else(|| ClaimName::parse(other));
                 if let Some(attempt) = other.strip_prefix(LEASE).and_then(|text| text.parse().ok()) {
                     job.lease = job.lease.max(Some((attempt, written_at)));
                 }

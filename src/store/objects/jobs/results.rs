@@ -10,6 +10,7 @@ use object_store::ObjectStoreExt;
 use serde::{Deserialize, Serialize};
 
 use super::super::pieces::{BrokenOff, sealed, unsealed};
+use super::super::room::Room;
 use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
 use super::{JobId, RESULT, line_of};
 
@@ -45,36 +46,38 @@ pub struct FoundResult {
     pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
 }
 
+/// The answer of an attempt at a job, with its body as a stream.
+pub struct Answer<S> {
+    pub attempt: u32,
+    pub head: JobResult,
+    pub body: S,
+}
+
 impl Objects {
-    /// Writes what an attempt came to, as its body comes, and makes it the result of the job unless it has one, or nobody wants it any more; says
-    /// whether it is. Nothing is there until all of it is.
+    /// Writes the answer of an attempt within its room, and makes it the result of the job, unless the job
+    /// has one or is unknown. Returns whether it is the result. Nothing is published before all of it is
+    /// written.
     ///
     /// # Errors
-    /// [`Unavailable`], also if the body breaks off.
+    /// [`Unavailable`], also if the body breaks off or exceeds its room.
     pub async fn put_result<E: std::fmt::Display>(
         &self,
         (owner, id): (&OwnerName, JobId),
-        attempt: u32,
-        head: JobResult,
-        body: impl Stream<Item = Result<Bytes, E>>,
+        Answer { attempt, head, body }: Answer<impl Stream<Item = Result<Bytes, E>>>,
+        room: &mut Room,
     ) -> Result<bool, Unavailable> {
         let answer = self.answer(owner, id, attempt);
         let body = body.map(|piece| piece.map_err(|error| error.to_string()));
-        self.put_pieces(&answer, line_of(&head), body).await?;
-        let is_wanted = self.find_job(owner, id).await?.is_some_and(|job| job.has_request);
+        self.put_pieces(&answer, line_of(&head), body, room).await?;
+        let is_wanted = self.find_job(owner, id).await?.is_some_and(|job| job.is_known());
         let is_result = is_wanted && self.publish(owner, id, head, Some(attempt)).await?;
         if !is_result {
             self.delete(&answer).await?;
-            return Ok(false);
         }
-        // Forgotten meanwhile: it must not come back.
-        match self.find_job(owner, id).await?.filter(|job| !job.has_request) {
-            Some(forgotten) => self.delete_job(&forgotten).await.map(|()| false),
-            None => Ok(true),
-        }
+        Ok(is_result)
     }
 
-    /// Ends a job without an answer, unless it has a result; says whether it had none.
+    /// Ends a job without an answer, unless it has a result or is unknown. Returns whether it was ended.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -83,7 +86,7 @@ impl Objects {
         self.publish(owner, id, head, None).await
     }
 
-    /// Makes the result of a job, unless it has one.
+    /// Publishes the result of a job, unless it has one. A job that was deleted meanwhile does not come back.
     async fn publish(
         &self,
         owner: &OwnerName,
@@ -92,10 +95,19 @@ impl Objects {
         attempt: Option<u32>,
     ) -> Result<bool, Unavailable> {
         let result = sealed(line_of(&Published { head, attempt }));
-        self.create(&self.job(owner, id, RESULT), result).await
+        if !self.create(&self.job(owner, id, RESULT), result).await? {
+            return Ok(false);
+        }
+        if !self.find_job(owner, id).await?.is_some_and(|job| job.is_known()) {
+            self.clear_job(owner, id).await?;
+            return Ok(false);
+        }
+        self.unmark_open(owner, id).await?;
+        Ok(true)
     }
 
-    /// What came of a job, if it has ended. A result that is not what was written is let go, and reported: the job is anybody's then.
+    /// The result of a job that is known and has ended. A result that is not what was written is dropped and
+    /// reported, and the job is open again.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -135,7 +147,10 @@ impl Objects {
             }
             Err(damaged) => damaged,
         };
-        self.drop_result(owner, id, damaged).await;
+        // Objects of a job that is being deleted are missing without being damaged.
+        if self.find_job(owner, id).await?.is_some_and(|job| job.is_known()) {
+            self.drop_result(owner, id, damaged).await;
+        }
         Ok(None)
     }
 
@@ -164,7 +179,7 @@ impl Objects {
     async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: Damaged) {
         let name = self.job(owner, id, RESULT);
         self.report(&name, damaged);
-        let is_gone = self.delete(&name).await.is_ok();
+        let is_gone = self.delete(&name).await.is_ok() && self.mark_open(owner, id).await.is_ok();
         tracing::error!(job = %id, is_gone, "the result of a job is damaged, and made again");
     }
 }

@@ -4,6 +4,7 @@ use futures_util::{Stream, TryStreamExt};
 use object_store::ObjectStoreExt;
 
 use super::super::pieces::BrokenOff;
+use super::super::room::Room;
 use super::*;
 
 fn owner() -> OwnerName {
@@ -20,6 +21,16 @@ fn head() -> JobResult {
     JobResult { outcome: Outcome::Succeeded, status: 200, headers }
 }
 
+async fn put(
+    objects: &Objects,
+    id: JobId,
+    attempt: u32,
+    body: impl Stream<Item = Result<Bytes, String>>,
+) -> Result<bool, Unavailable> {
+    let answer = Answer { attempt, head: head(), body };
+    objects.put_result((&owner(), id), answer, &mut Room::unlimited()).await
+}
+
 async fn read(objects: &Arc<Objects>, id: JobId) -> Option<Result<Vec<u8>, BrokenOff>> {
     let found = objects.get_result(&owner(), id).await.unwrap()?;
     let n_bytes = found.n_body_bytes;
@@ -34,7 +45,8 @@ async fn read(objects: &Arc<Objects>, id: JobId) -> Option<Result<Vec<u8>, Broke
 async fn asked(objects: &Objects, body: &'static [u8]) -> JobId {
     let id = JobId::new();
     let request = JobRequest { path: "/v1/normals".to_owned(), headers: Vec::new() };
-    objects.put_job(&owner(), id, &request, Bytes::from_static(body)).await.unwrap();
+    let room = &mut Room::unlimited();
+    objects.put_job((&owner(), id), &request, Bytes::from_static(body), room).await.unwrap();
     id
 }
 
@@ -51,7 +63,8 @@ async fn what_is_asked_and_what_comes_of_it_is_read_as_it_was_written() {
     let headers = vec![("accept".to_owned(), "*/*".to_owned())];
     let request = JobRequest { path: "/v1/normals".to_owned(), headers };
     let points = Bytes::from_static(b"{}\n");
-    objects.put_job(&owner(), id, &request, points.clone()).await.unwrap();
+    let room = &mut Room::unlimited();
+    objects.put_job((&owner(), id), &request, points.clone(), room).await.unwrap();
     let found = objects.open_job(&owner(), id).await.unwrap().unwrap().unwrap();
     assert_eq!((found.request, found.n_body_bytes), (request, 3));
     assert_eq!(found.body.try_collect::<Vec<_>>().await.unwrap().concat(), points);
@@ -63,14 +76,14 @@ async fn what_is_asked_and_what_comes_of_it_is_read_as_it_was_written() {
     ];
     for pieces in bodies {
         let id = asked(&objects, b"").await;
-        assert!(objects.put_result((&owner(), id), 0, head(), body(pieces)).await.unwrap());
+        assert!(put(&objects, id, 0, body(pieces)).await.unwrap());
         assert_eq!(read(&objects, id).await.unwrap().unwrap(), pieces.concat());
     }
-    assert!(objects.put_result((&owner(), id), 0, head(), body(&[])).await.unwrap());
+    assert!(put(&objects, id, 0, body(&[])).await.unwrap());
     let found = objects.find_job(&owner(), id).await.unwrap().unwrap();
     assert!(found.has_request && found.ended_at.is_some() && found.lease.is_none());
     assert!(!objects.cancel_job(&owner(), id).await.unwrap(), "it has ended");
-    objects.delete_job(&found).await.unwrap();
+    assert!(objects.delete_job(&owner(), id).await.unwrap());
     assert_eq!(objects.find_job(&owner(), id).await.unwrap(), None);
 }
 
@@ -78,19 +91,19 @@ async fn what_is_asked_and_what_comes_of_it_is_read_as_it_was_written() {
 async fn a_job_ends_once() {
     let objects = Arc::new(Objects::in_memory());
     let id = asked(&objects, b"").await;
-    assert!(objects.put_result((&owner(), id), 1, head(), body(&[b"first"])).await.unwrap());
-    assert!(!objects.put_result((&owner(), id), 0, head(), body(&[b"late"])).await.unwrap());
+    assert!(put(&objects, id, 1, body(&[b"first"])).await.unwrap());
+    assert!(!put(&objects, id, 0, body(&[b"late"])).await.unwrap());
     assert_eq!(read(&objects, id).await.unwrap().unwrap(), b"first");
     let cancelled = asked(&objects, b"").await;
     assert!(objects.cancel_job(&owner(), cancelled).await.unwrap());
-    assert!(!objects.put_result((&owner(), cancelled), 0, head(), body(&[b"late"])).await.unwrap());
+    assert!(!put(&objects, cancelled, 0, body(&[b"late"])).await.unwrap());
     let found = objects.get_result(&owner(), cancelled).await.unwrap().unwrap();
     assert_eq!((found.head.outcome, found.n_body_bytes), (Outcome::Cancelled, 0));
     // Nor does one come back that was forgotten.
     for id in [id, cancelled] {
-        let job = objects.find_job(&owner(), id).await.unwrap().unwrap();
-        objects.delete_job(&job).await.unwrap();
-        assert!(!objects.put_result((&owner(), id), 2, head(), body(&[b"late"])).await.unwrap());
+        assert!(objects.delete_job(&owner(), id).await.unwrap());
+        assert!(!objects.delete_job(&owner(), id).await.unwrap());
+        assert!(!put(&objects, id, 2, body(&[b"late"])).await.unwrap());
     }
     assert_eq!(objects.jobs(&owner()).await.unwrap(), []);
 }
@@ -102,7 +115,7 @@ async fn a_result_that_breaks_off_is_none() {
     for n_pieces in [1, 12] {
         let piece = Bytes::from(vec![1; 1 << 20]);
         let pieces = std::iter::repeat_n(Ok(piece), n_pieces).chain([Err("gone".to_owned())]);
-        let put = objects.put_result((&owner(), id), 0, head(), futures_util::stream::iter(pieces)).await;
+        let put = put(&objects, id, 0, futures_util::stream::iter(pieces)).await;
         assert!(put.is_err() && read(&objects, id).await.is_none());
     }
 }
@@ -122,7 +135,7 @@ async fn one_attempt_has_one_process() {
     }
     let found = objects.find_job(&owner(), id).await.unwrap().unwrap();
     assert_eq!(found.lease.map(|(attempt, _)| attempt), Some(11));
-    objects.delete_job(&found).await.unwrap();
+    assert!(!objects.delete_job(&owner(), id).await.unwrap(), "it has no request");
     assert_eq!(objects.jobs(&owner()).await.unwrap(), []);
 }
 
@@ -130,7 +143,7 @@ async fn one_attempt_has_one_process() {
 async fn a_result_that_is_not_what_was_written_is_never_whole_and_made_again() {
     let objects = Arc::new(Objects::in_memory());
     let id = asked(&objects, b"").await;
-    objects.put_result((&owner(), id), 0, head(), body(&[b"0123456789"])).await.unwrap();
+    put(&objects, id, 0, body(&[b"0123456789"])).await.unwrap();
     let (answer, result) = (objects.answer(&owner(), id, 0), objects.job(&owner(), id, RESULT));
     let (of_answer, of_result) = (bytes_of(&objects, &answer).await, bytes_of(&objects, &result).await);
     for (name, bytes, first) in [(&answer, &of_answer, 0), (&result, &of_result, 0)] {
@@ -174,21 +187,110 @@ async fn a_request_that_is_not_what_was_written_is_refused() {
 async fn jobs_of_owners_that_are_gone_go_with_their_time() {
     let objects = Arc::new(Objects::in_memory());
     let (ended, open) = (asked(&objects, b"body").await, asked(&objects, b"body").await);
-    assert!(objects.put_result((&owner(), ended), 0, head(), body(&[b"text"])).await.unwrap());
+    assert!(put(&objects, ended, 0, body(&[b"text"])).await.unwrap());
     let times = (Duration::from_secs(60), Duration::from_secs(600));
     let sweep = async |knows: bool, seconds| {
         let now = SystemTime::now() + Duration::from_secs(seconds);
-        let n_bytes = objects.sweep_jobs(|name| knows && *name == owner(), times, now).await.unwrap();
+        objects.sweep_jobs(|name| knows && *name == owner(), times, now).await.unwrap();
         let there = objects.jobs(&owner()).await.unwrap();
-        (n_bytes, there.into_iter().map(|job| job.id).collect::<Vec<_>>())
+        there.into_iter().map(|job| job.id).collect::<Vec<_>>()
     };
-    let (n_bytes, there) = sweep(true, 86400).await;
-    assert!(n_bytes > 12 && there == [ended, open]);
-    assert_eq!(sweep(false, 30).await, (n_bytes, vec![ended, open]));
-    assert_eq!(sweep(false, 90).await, (n_bytes, vec![open]));
+    assert_eq!(sweep(true, 86400).await, [ended, open]);
+    assert_eq!(sweep(false, 30).await, [ended, open]);
+    assert_eq!(sweep(false, 90).await, [open]);
     // Somebody is at it.
     assert!(objects.claim_job(&owner(), open, 0, &super::Lease::default()).await.unwrap());
-    assert_eq!(sweep(false, 500).await.1, [open]);
-    assert_eq!(sweep(false, 700).await.1, []);
-    assert_eq!(sweep(false, 0).await.0, 0);
+    assert_eq!(sweep(false, 500).await, [open]);
+    assert_eq!(sweep(false, 700).await, []);
+}
+
+#[tokio::test]
+async fn of_all_who_delete_a_job_at_once_one_does() {
+    let objects = Arc::new(Objects::in_memory());
+    for _ in 0..20 {
+        let id = asked(&objects, b"body").await;
+        assert!(put(&objects, id, 0, body(&[b"text"])).await.unwrap());
+        let deleting = futures_util::future::join_all((0..8).map(|_| {
+            let objects = objects.clone();
+            async move { objects.delete_job(&owner(), id).await.unwrap() }
+        }));
+        assert_eq!(deleting.await.into_iter().filter(|&is_deleted| is_deleted).count(), 1);
+        assert!(objects.get_result(&owner(), id).await.unwrap().is_none());
+    }
+    // Whoever deletes a job may end meanwhile: it is unknown, and what is left is no damage.
+    let id = asked(&objects, b"body").await;
+    assert!(put(&objects, id, 0, body(&[b"text"])).await.unwrap());
+    objects.put(&objects.job(&owner(), id, DELETED), PutPayload::default()).await.unwrap();
+    objects.delete(&objects.answer(&owner(), id, 0)).await.unwrap();
+    assert!(objects.get_result(&owner(), id).await.unwrap().is_none());
+    assert!(!objects.find_job(&owner(), id).await.unwrap().unwrap().is_known());
+    assert!(!objects.delete_job(&owner(), id).await.unwrap());
+    assert_eq!(objects.n_damaged(), 0);
+    objects.clear_job(&owner(), id).await.unwrap();
+    assert_eq!(objects.jobs(&owner()).await.unwrap(), []);
+}
+
+#[tokio::test]
+async fn a_key_is_that_of_one_job_and_goes_with_it() {
+    let objects = Objects::in_memory();
+    let (key, name) = (KeyHash::of(b"key"), owner());
+    let claim_of = |id| Claim::new(id, "print".to_owned());
+    let generation = |generation| ClaimName { key: key.clone(), generation };
+    let (first, late) = (asked(&objects, b"").await, asked(&objects, b"").await);
+    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
+    assert!(objects.claim_key(&name, &generation(0), &claim_of(first)).await.unwrap());
+    assert!(!objects.claim_key(&name, &generation(0), &claim_of(late)).await.unwrap());
+    // Whoever is late takes nothing with it.
+    assert!(objects.delete_job(&name, late).await.unwrap());
+    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), Some((0, Some(claim_of(first)))));
+    assert!(objects.delete_job(&name, first).await.unwrap());
+    assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
+    // The claim of a job that is gone is followed by another; one that nobody has goes after an hour.
+    let id = asked(&objects, b"").await;
+    assert!(objects.claim_key(&name, &generation(7), &claim_of(id)).await.unwrap());
+    let left = objects.claim(&name, &generation(6));
+    objects.put(&left, Bytes::from_static(b"{}").into()).await.unwrap();
+    let jobs = objects.jobs(&name).await.unwrap();
+    let later = SystemTime::now() + Duration::from_secs(4000);
+    for (now, is_left) in [(SystemTime::now(), true), (later, false)] {
+        objects.sweep_claims(&name, &jobs, now).await.unwrap();
+        assert_eq!(objects.store.head(&left).await.is_ok(), is_left);
+        assert_eq!(objects.find_claim(&name, &key).await.unwrap(), Some((7, Some(claim_of(id)))));
+    }
+}
+
+#[tokio::test]
+async fn what_is_read_in_memory_is_there_once_and_paid_for_until_it_is_read() {
+    use crate::store::Owner;
+    use crate::store::budget::Budget;
+
+    const N_BYTES: usize = 1 << 20;
+    let (objects, budget) = (Arc::new(Objects::in_memory()), Budget::new(16 << 20, 1));
+    let id = asked(&objects, b"").await;
+    let mut room = Room::of(&budget, Owner(0), 0).unwrap();
+    let piece = || Ok::<_, String>(Bytes::from(vec![7; N_BYTES]));
+    let answer = Answer { attempt: 0, head: head(), body: futures_util::stream::iter([piece(), piece()]) };
+    assert!(objects.put_result((&owner(), id), answer, &mut room).await.unwrap());
+    assert!(!room.is_exceeded() && room.into_reservation().is_none());
+    let held = budget.n_held();
+    assert!((2 * N_BYTES..2 * N_BYTES + 8192).contains(&held), "{held}");
+    let reading = (0..50).map(|_| async {
+        let found = objects.get_result(&owner(), id).await.unwrap().unwrap();
+        found.body.try_collect::<Vec<_>>().await.unwrap()
+    });
+    let pieces = futures_util::future::join_all(reading).await;
+    let places = |pieces: &[Bytes]| pieces.iter().map(|piece| piece.as_ptr()).collect::<Vec<_>>();
+    // But for the byte that is held back until the hash is right.
+    let n = pieces[0].len() - 1;
+    assert!(pieces.iter().all(|other| places(&other[..n]) == places(&pieces[0][..n])), "they are copies");
+    assert!(objects.delete_job(&owner(), id).await.unwrap());
+    assert_eq!(budget.n_held(), held, "they are held still");
+    drop(pieces);
+    assert_eq!(budget.n_held(), 0);
+    // What has no room is not there.
+    let mut room = Room::of(&Budget::new(3 * N_BYTES, 1), Owner(0), 0).unwrap();
+    let id = asked(&objects, b"").await;
+    let answer = Answer { attempt: 0, head: head(), body: futures_util::stream::iter([piece(), piece()]) };
+    assert!(objects.put_result((&owner(), id), answer, &mut room).await.is_err() && room.is_exceeded());
+    assert!(objects.get_result(&owner(), id).await.unwrap().is_none());
 }
