@@ -26,7 +26,7 @@ mod tests;
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
-use object_store::ObjectMeta;
+use object_store::{ObjectMeta, PutPayload};
 use object_store::path::Path;
 use serde::Serialize;
 use uuid::Uuid;

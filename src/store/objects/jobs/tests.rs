@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use futures_util::{Stream, TryStreamExt};
-use object_store::ObjectStoreExt;
+use object_store::{ObjectStoreExt, PutPayload};
 
 use super::super::pieces::BrokenOff;
 use super::super::room::Room;
