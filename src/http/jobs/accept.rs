@@ -14,6 +14,7 @@ use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
+use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use crate::store::objects::jobs::{JobId, JobRequest};
 
@@ -80,8 +81,7 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
     tokio::spawn(runner.clone().run(here));
     let location = format!("/v1/jobs/{id}");
     let applied = HeaderValue::from_static("respond-async");
-    let mut response =
-        (StatusCode::ACCEPTED, [(header::LOCATION, location)], axum::Json(view)).into_response();
+    let mut response = (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(view)).into_response();
     response.headers_mut().insert(PREFERENCE_APPLIED, applied);
     Ok(response)
 }

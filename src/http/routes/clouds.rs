@@ -25,6 +25,7 @@ use crate::http::serve::sampling::find_sampling;
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
+use crate::http::wire::write::json::Json;
 use crate::numerics::points::sampling::{NearestRange, Scales};
 use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
@@ -188,7 +189,7 @@ pub async fn create_cloud(
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let named = [(header::LOCATION, location), (CLOUD_HEADER, cloud.cloud_id.clone())];
-    Ok((status, named, axum::Json(cloud)).into_response())
+    Ok((status, named, Json(cloud)).into_response())
 }
 
 /// Describe a cloud
@@ -221,7 +222,7 @@ pub async fn get_cloud(
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
     let cloud = describe(&app, &admission, &stored).await?;
-    Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
+    Ok(([(header::ETAG, etag)], Json(cloud)).into_response())
 }
 
 /// Describes a cloud, with what its positions say.
@@ -308,7 +309,7 @@ pub async fn list_clouds(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     RawQuery(query): RawQuery,
-) -> Result<axum::Json<CloudList>, Problem> {
+) -> Result<Json<CloudList>, Problem> {
     let page = Page::parse(query.as_deref().unwrap_or(""))?;
     let admission = app.compute.admit(owner)?;
     let (shown, is_last) = list_of(&app, &admission, page.after.map(|cursor| cursor.0), page.limit).await?;
@@ -321,7 +322,7 @@ pub async fn list_clouds(
         // Those that were deleted meanwhile have none.
         None => heads.remove(&listed.id).map(|head| Cloud::of_head(listed.id, head)),
     };
-    Ok(axum::Json(CloudList { clouds: shown.into_iter().filter_map(describe).collect(), next }))
+    Ok(Json(CloudList { clouds: shown.into_iter().filter_map(describe).collect(), next }))
 }
 
 async fn heads(app: &App, owner: Owner, ids: Vec<CloudId>) -> Result<HashMap<CloudId, CloudHead>, Problem> {
