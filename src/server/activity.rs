@@ -3,15 +3,22 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
+use futures_util::task::AtomicWaker;
 use tokio::sync::Notify;
 
 use super::pace::Pace;
 use crate::http::around::transport::HeadFault;
 
-/// Time for a client to read a refusal that came before it had sent its body.
+/// Silence after which a client has read a refusal that came before it had sent its body.
 const LINGERING: Duration = Duration::from_secs(2);
+
+/// How long the work for a client that has ended its side of the connection goes on without a byte of answer
+/// for it. A client that has left and one that only sends no more look the same until something is written to
+/// them.
+const HALF_CLOSED: Duration = Duration::from_secs(1);
 
 /// Time for half a head to become a request, once the server drains.
 const DRAINING_IDLE: Duration = Duration::from_millis(500);
@@ -22,8 +29,15 @@ pub struct Activity {
     n_in_flight: AtomicUsize,
     /// Milliseconds after `began`: when it last had a request or sent a byte that was waited for.
     idle_since: AtomicU64,
-    /// Milliseconds after `began`, plus one; 0 unless its last answer is sent and only the client's end is waited for.
+    /// Milliseconds after `began`, plus one; 0 unless its last answer is sent and only the client's end is
+    /// waited for: since when, and when it last sent something.
     lingering_since: AtomicU64,
+    lingering_heard: AtomicU64,
+    /// Milliseconds after `began`, plus one; 0 unless the client has ended its side while it waits for an
+    /// answer: since when, or since it last took a byte.
+    half_closed_since: AtomicU64,
+    /// Wakes the connection when a request is over, to see the end that was kept from it.
+    ended: AtomicWaker,
     /// The client as a reader of its socket.
     pub pace: Pace,
     /// Streams of HTTP/2 that have something for the client to take, and the client as a reader while there is nothing else.
@@ -65,6 +79,9 @@ impl Activity {
             n_in_flight: 0.into(),
             idle_since: 0.into(),
             lingering_since: 0.into(),
+            lingering_heard: 0.into(),
+            half_closed_since: 0.into(),
+            ended: AtomicWaker::new(),
             pace: Pace::new(),
             n_unread: 0.into(),
             streams: Pace::new(),
@@ -141,7 +158,43 @@ impl Activity {
 
     /// From now on only the client's end is waited for.
     pub fn linger(&self) {
-        let _ = self.lingering_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed);
+        if self.lingering_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed).is_ok() {
+            self.hear_out();
+        }
+    }
+
+    /// The client still sends what was refused.
+    pub fn hear_out(&self) {
+        self.lingering_heard.store(self.now() + 1, Relaxed);
+    }
+
+    /// How long a client that has sent all that it will may still wait for an answer, unless it takes some of
+    /// it; `None` if no request is under way, or it has waited so long in vain that it may as well have left.
+    /// One that makes no room for more is there: its socket would have said otherwise. `waker` is woken when
+    /// a request is over.
+    pub fn half_close(&self, waker: &Waker) -> Option<Duration> {
+        self.ended.register(waker);
+        if self.n_in_flight.load(Relaxed) == 0 {
+            return None;
+        }
+        let _ = self.half_closed_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed);
+        if self.pace.is_waiting() {
+            return Some(HALF_CLOSED);
+        }
+        let waited = self.since(self.half_closed_since.load(Relaxed));
+        HALF_CLOSED.checked_sub(waited).filter(|left| !left.is_zero())
+    }
+
+    /// The client took bytes of an answer.
+    pub fn take(&self) {
+        if self.half_closed_since.load(Relaxed) > 0 {
+            self.half_closed_since.store(self.now() + 1, Relaxed);
+        }
+    }
+
+    /// Time since a moment in milliseconds after `began`, plus one.
+    fn since(&self, moment: u64) -> Duration {
+        Duration::from_millis((self.now() + 1).saturating_sub(moment))
     }
 
     /// A head on this connection cannot be trusted, so none that follows can.
@@ -191,7 +244,8 @@ impl Activity {
             let idle = if self.is_draining.load(Relaxed) { idle.min(DRAINING_IDLE) } else { idle };
             let lingering_since = self.lingering_since.load(Relaxed);
             let has_lingered = lingering_since > 0
-                && Duration::from_millis((self.now() + 1).saturating_sub(lingering_since)) > LINGERING;
+                && (self.since(self.lingering_heard.load(Relaxed)) > LINGERING
+                    || self.since(lingering_since) > idle.max(LINGERING));
             if has_lingered || lingering_since == 0 && self.idle_for().is_some_and(|time| time >= idle) {
                 return Expiry::Idle;
             }
@@ -213,5 +267,6 @@ impl Drop for InFlight {
         self.0.stir();
         self.0.n_in_flight.fetch_sub(1, Relaxed);
         self.0.wait_if_all_are_unread();
+        self.0.ended.wake();
     }
 }

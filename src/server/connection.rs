@@ -16,7 +16,7 @@ use socket2::SockRef;
 use tokio::net::TcpStream;
 use tower::ServiceExt;
 
-use super::activity::{Activity, Expiry, Notice};
+use super::activity::{Activity, Expiry, InFlight, Notice};
 use super::body::{Receiving, Sending};
 use super::pace::Pace;
 use super::socket::{Socket, Wire};
@@ -85,7 +85,8 @@ pub async fn serve(
     let _ = SockRef::from(&socket).set_send_buffer_size(SOCKET_BUFFER);
     let Some(socket) = shaken(socket, tls, patience, &activity).await else { return };
     let exchanges = activity.clone();
-    let service = service_fn(move |request| exchange(request, router.clone(), exchanges.clone()));
+    // Under way from here on, before the connection is read any further.
+    let service = service_fn(move |request| exchange(request, router.clone(), exchanges.enter()));
     let io = TokioIo::new(Socket::new(socket, activity.clone()));
     let builder = builder(patience.sending);
     let mut connection = std::pin::pin!(builder.serve_connection(io, service));
@@ -158,10 +159,9 @@ fn builder(sending: Duration) -> auto::Builder<Streams> {
 async fn exchange(
     request: Request<Incoming>,
     router: Router,
-    activity: Arc<Activity>,
+    in_flight: InFlight,
 ) -> Result<Response<Sending<Body>>, Infallible> {
-    let in_flight = activity.enter();
-    let arrival = Arrival::new(activity.fault());
+    let arrival = Arrival::new(in_flight.activity().fault());
     if request.body().is_end_stream() {
         arrival.set_read();
     }
@@ -172,7 +172,7 @@ async fn exchange(
     let response = router.oneshot(request).await?;
     let pace = STREAM.try_with(Arc::clone).ok();
     if pace.is_none() && !arrival.is_read() {
-        activity.answer_early();
+        in_flight.activity().answer_early();
     }
     let length = response.headers().get(hyper::header::CONTENT_LENGTH);
     let n_announced = length.and_then(|length| length.to_str().ok()?.parse().ok());

@@ -60,6 +60,11 @@ impl HeadScanner {
         }
     }
 
+    /// Whether all requests so far are whole; false in HTTP/2 and after a fault, where nobody counts.
+    pub fn is_between_requests(&self) -> bool {
+        self.state == State::Line(Line::Request) && self.n == 0
+    }
+
     /// Looks at what was received next, in any portions.
     ///
     /// # Errors

@@ -4,9 +4,11 @@ use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
+use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
+use tokio::time::{Instant, Sleep, sleep};
 use tokio_rustls::server::TlsStream;
 
 use super::activity::Activity;
@@ -43,11 +45,28 @@ pub struct Socket {
     scanner: HeadScanner,
     /// The last answer is sent and the client knows that none follows.
     is_shut_down: bool,
+    /// Once the client has ended its side: when it is looked at whether it may have left.
+    half_closed: Option<Pin<Box<Sleep>>>,
 }
 
 impl Socket {
+    /// The end of what the client sends. hyper takes it for the end of the client, so it learns of it only
+    /// when no answer is waited for: see [`Activity::half_close`].
+    fn poll_end(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let timer = self.half_closed.get_or_insert_with(|| Box::pin(sleep(Duration::ZERO)));
+        while self.scanner.is_between_requests()
+            && let Some(left) = self.activity.half_close(cx.waker())
+        {
+            timer.as_mut().reset(Instant::now() + left);
+            if timer.as_mut().poll(cx).is_pending() {
+                return Poll::Pending;
+            }
+        }
+        Poll::Ready(Ok(()))
+    }
+
     pub fn new(inner: Wire, activity: Arc<Activity>) -> Self {
-        Self { inner, activity, scanner: HeadScanner::new(), is_shut_down: false }
+        Self { inner, activity, scanner: HeadScanner::new(), is_shut_down: false, half_closed: None }
     }
 
     /// Counts the time in which the client does not take what is written.
@@ -58,7 +77,11 @@ impl Socket {
                 if self.activity.pace.is_waiting() {
                     self.activity.stir();
                 }
-                self.activity.pace.took(*written.as_ref().unwrap_or(&0));
+                let n_taken = *written.as_ref().unwrap_or(&0);
+                self.activity.pace.took(n_taken);
+                if n_taken > 0 {
+                    self.activity.take();
+                }
             }
         }
         outcome
@@ -71,9 +94,17 @@ impl AsyncRead for Socket {
         cx: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
+        if self.half_closed.is_some() {
+            return self.poll_end(cx);
+        }
         let n_before = buffer.filled().len();
+        let has_room = buffer.remaining() > 0;
         let outcome = of_either!(self, stream => Pin::new(stream).poll_read(cx, buffer));
-        if let Err(fault) = self.scanner.scan(&buffer.filled()[n_before..]) {
+        let received = &buffer.filled()[n_before..];
+        if has_room && received.is_empty() && matches!(outcome, Poll::Ready(Ok(()))) {
+            return self.poll_end(cx);
+        }
+        if let Err(fault) = self.scanner.scan(received) {
             self.activity.distrust(fault);
         }
         outcome
@@ -132,6 +163,7 @@ impl AsyncWrite for Socket {
             if outcome.is_err() || buffer.filled().is_empty() {
                 return Poll::Ready(Ok(()));
             }
+            self.activity.hear_out();
         }
         cx.waker().wake_by_ref();
         Poll::Pending

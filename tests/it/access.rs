@@ -189,3 +189,17 @@ async fn no_origin_may_call_unless_configured_and_a_star_lets_all() {
     let server = Server::with_flags(&["--cors-origins", "*"]).await;
     assert_eq!(preflight(&server, origin[0].1).await.header("access-control-allow-origin"), "*");
 }
+
+#[tokio::test]
+async fn options_of_unknown_paths_are_not_found_with_origins_and_without() {
+    for flags in [&[][..], &["--cors-origins", "*"]] {
+        let server = Server::with_flags(flags).await;
+        let headers = [("origin", "https://one.example"), ("access-control-request-method", "POST")];
+        for path in ["/v1/nothing", "/nothing", "/v1/clouds/a/b", "/v1"] {
+            let answer = send(&server, Method::OPTIONS, path, &headers, &json!({})).await;
+            answer.expect_problem(404, "not-found");
+        }
+        let known = send(&server, Method::OPTIONS, "/v1/normals", &headers, &json!({})).await;
+        assert_eq!(known.status, if flags.is_empty() { 405 } else { 200 });
+    }
+}

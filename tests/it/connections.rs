@@ -278,6 +278,13 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
         ("GET", "/health/live", "\r\n".to_owned()),
         ("GET", "/health/live", "Host: x\r\nHost: x\r\n\r\n".to_owned()),
         ("GET", "/health/live", "Host: x y\r\n\r\n".to_owned()),
+        ("GET", "/health/live", "Host: me:pw@x\r\n\r\n".to_owned()),
+        ("GET", "/health/live", "Host: x\r\nExpect: 200-ok\r\n\r\n".to_owned()),
+        (
+            "GET",
+            "/v1/kernels",
+            "Host: x\r\nAuthorization: Bearer a\r\nAuthorization: Bearer a\r\n\r\n".to_owned(),
+        ),
     ] {
         let request = format!("{method} {path} HTTP/1.1\r\n{rest}");
         // Also behind requests that are as they should be, with bodies of every framing, at once and one by one.
@@ -302,9 +309,19 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
             same(&closing_problem(method, path, &text), MALFORMED, &request);
         }
     }
-    let absolute = format!("GET http://{}/health/live HTTP/1.1\r\nHost: other\r\n\r\n", server.address);
-    let text = rest_of(&mut sent(&server, &absolute).await).await;
-    same(&closing_problem("GET", "/health/live", &text), MALFORMED, &absolute);
+    for (user, host) in [("", "other".to_owned()), ("me:pw@", server.address.to_string())] {
+        let address = server.address;
+        let absolute = format!("GET http://{user}{address}/health/live HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        let text = rest_of(&mut sent(&server, &absolute).await).await;
+        same(&closing_problem("GET", "/health/live", &text), MALFORMED, &absolute);
+    }
+    // In HTTP/2 the target names the host, and a fault ends its stream alone.
+    let (client, connection) = http_2(server.address).await;
+    let mut client = client.ready().await.unwrap();
+    let request = axum::http::Request::get(format!("http://me:pw@{}/health/live", server.address));
+    let refused = client.send_request(request.body(()).unwrap(), true).unwrap().0.await.unwrap();
+    assert_eq!(refused.status(), 400);
+    connection.abort();
     // HTTP/1.0 knows no Host.
     let text = rest_of(&mut sent(&server, "GET /health/live HTTP/1.0\r\n\r\n").await).await;
     assert!(text.contains(" 200 "), "{text}");
@@ -360,6 +377,93 @@ async fn an_answer_that_comes_before_the_request_has_ended_arrives() {
     }
     let text = rest_of(&mut stream).await;
     assert!(text.starts_with("HTTP/1.1 401 "), "{text}");
+}
+
+#[tokio::test]
+async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
+    let server = Server::with_flags(&["--max-body-bytes", "100000", "--body-seconds", "3600"]).await;
+    for expectation in ["", "Expect: 100-continue\r\n"] {
+        for path in ["/v1/clouds", "/v1/normals", "/v1/estimate"] {
+            let head = format!(
+                "POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n{expectation}Content-Length: 1000000000\r\n\r\n"
+            );
+            // Nothing follows for now, and this client waits for the answer.
+            let mut stream = sent(&server, head).await;
+            let refused = answer(&mut stream).await;
+            assert_eq!(refused.status, 413, "{path}");
+            contract::check("POST", path, &refused);
+        }
+    }
+    // One that reads only once it has sent everything, slowly, is heard out.
+    let (n_bytes, chunk) = (4 << 20, vec![b' '; 1 << 16]);
+    let head = format!(
+        "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {n_bytes}\r\n\r\n"
+    );
+    let mut stream = sent(&server, head).await;
+    for _ in 0..n_bytes / chunk.len() {
+        stream.write_all(&chunk).await.expect("the connection was reset before the answer could be read");
+        tokio::task::yield_now().await;
+    }
+    let text = rest_of(&mut stream).await;
+    assert!(text.starts_with("HTTP/1.1 413 "), "{text}");
+}
+
+/// A request with the end of what its client sends right behind it.
+async fn half_closed(server: &Server, request: &str) -> TcpStream {
+    let mut stream = sent(server, request).await;
+    stream.shutdown().await.unwrap();
+    stream
+}
+
+#[tokio::test]
+async fn a_client_that_only_sends_no_more_gets_its_answers() {
+    let server = Server::start().await;
+    let body = route_of("/v1/normals").request().to_string();
+    let normals = format!(
+        "POST /v1/normals HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    );
+    for (request, n_answers) in
+        [(LIVE.to_owned(), 1), (LIVE.repeat(3), 3), (normals.clone(), 1), (format!("{normals}{LIVE}"), 2)]
+    {
+        for _ in 0..20 {
+            let text = rest_of(&mut half_closed(&server, &request).await).await;
+            assert_eq!(text.matches("HTTP/1.1 200 OK\r\n").count(), n_answers, "{request}: {text}");
+        }
+    }
+    // An answer of megabytes goes on for as long as it is taken.
+    let text = rest_of(&mut half_closed(&server, &large_request()).await).await;
+    assert!(text.starts_with("HTTP/1.1 200 ") && text.len() > 1 << 20, "{} bytes", text.len());
+    // Half a body is none.
+    let half = &normals[..normals.len() - 10];
+    let text = rest_of(&mut half_closed(&server, half).await).await;
+    assert!(!text.contains(" 200 "), "{text}");
+}
+
+/// The end of what a client sends may be its end: work for nobody is not gone on with.
+#[tokio::test]
+async fn long_work_ends_with_a_client_that_may_have_left() {
+    let server = Server::start().await;
+    let points: Vec<_> =
+        (0..9000).map(|i| [f64::from(i).sin(), f64::from(i).cos(), f64::from(i) * 1e-3]).collect();
+    let kernel = json!({"family": "matern", "length_scale": 0.3});
+    let body = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-3}).to_string();
+    let request = format!(
+        "POST /v1/normals HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    );
+    let is_busy = async || {
+        let text = server.get("/metrics").await.text;
+        text.lines().any(|line| line.starts_with("gramian_http_requests_in_flight") && !line.ends_with(" 1"))
+    };
+    let mut stream = half_closed(&server, &request).await;
+    let began = Instant::now();
+    let text = rest_of(&mut stream).await;
+    assert!(text.is_empty(), "{text}");
+    while is_busy().await {
+        assert!(began.elapsed() < PATIENCE, "the work goes on");
+        tokio::task::yield_now().await;
+    }
 }
 
 #[tokio::test]

@@ -69,8 +69,8 @@ async fn requests_are_counted_by_route_and_never_by_what_clients_send() {
 #[tokio::test]
 async fn who_leaves_is_counted_as_well() {
     let server = Server::start().await;
-    let points: Vec<_> = crate::support::fibonacci_sphere(4000);
-    let body = json!({"cloud": {"points": points}, "values": vec![1.0; 4000], "kernel": {"family": "gauss", "length_scale": 0.1}});
+    let points: Vec<_> = crate::support::fibonacci_sphere(8000);
+    let body = json!({"cloud": {"points": points}, "values": vec![1.0; 8000], "kernel": {"family": "gauss", "length_scale": 0.1}});
     let request = server.client.post(server.url("/v1/interpolation")).json(&body).send();
     let mut request = Box::pin(request);
     let in_flight = "gramian_http_requests_in_flight";

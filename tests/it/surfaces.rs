@@ -388,3 +388,34 @@ async fn merged_points_average_their_normals() {
         assert_eq!(answer["normals"][9], answer["normals"][101]);
     }
 }
+
+/// Far from the cloud a narrow kernel underflows: ∇u loses its digits before it vanishes, and with them its
+/// direction.
+#[tokio::test]
+async fn gradients_below_the_least_normal_number_are_no_normals() {
+    let server = Server::start().await;
+    let queries: Vec<_> = (0..40).map(|i| [1.0 + 0.6 * (f64::from(i) / 20.0 + 43.0), 0.3, -0.2]).collect();
+    let mut body = json!({
+        "cloud": {"points": fibonacci_sphere(40)},
+        "kernel": {"family": "gauss", "length_scale": 1.0},
+        "alpha": 1e-3,
+        "surface": "signature",
+        "queries": queries,
+    });
+    let mut n_subnormal = 0;
+    for length_scale in [0.9, 1.0, 1.1] {
+        body["kernel"]["length_scale"] = json!(length_scale);
+        let answer = server.post("/v1/normals", &body).await.expect_ok();
+        let norms = numbers(&answer["gradient_norms"]);
+        for (query, norm) in norms.iter().enumerate() {
+            if *norm < f64::MIN_POSITIVE {
+                n_subnormal += usize::from(*norm > 0.0);
+                assert!(answer["normals"][query].is_null(), "{norm:e}");
+                let mut entries = answer["degenerate"].as_array().unwrap().iter();
+                let entry = entries.find(|entry| entry["query"] == query).unwrap();
+                assert_eq!(entry["reason"], "vanishing_gradient");
+            }
+        }
+    }
+    assert!(n_subnormal > 0, "no gradient was subnormal");
+}

@@ -141,6 +141,46 @@ async fn extreme_numbers_are_answered_or_refused_but_are_no_internal_error() {
     }
 }
 
+/// Answers about values, at every magnitude up to the end of float64: whatever has no number is a refusal
+/// with its remedy, alone and in lists.
+#[tokio::test]
+async fn what_has_no_number_is_refused_and_is_never_null() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(N_POINTS);
+    let values = |size: f64| (0..N_POINTS).map(|i| size * (i as f64).sin()).collect::<Vec<_>>();
+    let likelihood = json!(["variance", "log_marginal_likelihood"]);
+    let (mut n_refused, mut n_answered) = (0, 0);
+    for size in [1.0, 1e100, 1e150, 1e155, 1e160, 1e200, 1e300] {
+        for (path, extra) in [
+            ("/v1/interpolation", json!({"derivatives": 2, "include": ["deviations"]})),
+            ("/v1/interpolation/batch", json!({"derivatives": 2, "include": ["deviations"]})),
+            ("/v1/posterior", json!({"include": likelihood, "mean": "linear", "quantiles": [0.1]})),
+            ("/v1/posterior/batch", json!({"include": likelihood, "mean": "linear", "quantiles": [0.1]})),
+        ] {
+            let mut body = json!({
+                "cloud": {"points": points},
+                "kernel": {"family": "matern", "length_scale": 1.0},
+                "alpha": 1e-8,
+                "values": values(size),
+            });
+            if path.ends_with("/batch") {
+                body["values"] = json!([values(1.0), values(size)]);
+            }
+            body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+            let answer = server.post(path, &body).await;
+            if answer.status == 200 {
+                n_answered += 1;
+                assert!(!answer.text.contains("null"), "{path} {size:e}: {}", answer.text);
+                continue;
+            }
+            n_refused += 1;
+            let problem = answer.expect_problem(422, "invalid-request");
+            assert!(problem["detail"].as_str().unwrap().contains("scale the"), "{path} {size:e}: {problem}");
+        }
+    }
+    assert!(n_answered >= 8 && n_refused >= 8, "{n_answered} answered, {n_refused} refused");
+}
+
 #[tokio::test]
 async fn a_fit_beyond_cholesky_says_so() {
     let server = Server::start().await;

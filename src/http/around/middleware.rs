@@ -185,7 +185,7 @@ fn written_before(status: StatusCode, document: &serde_json::Value, request_id: 
 fn foreign(status: StatusCode) -> Problem {
     match status {
         // axum's own 400 is about a path that is not UTF-8 once decoded.
-        StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST => not_found_problem(),
+        StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST => Problem::not_found(),
         StatusCode::METHOD_NOT_ALLOWED => Problem::new(Slug::MethodNotAllowed, "see the Allow header"),
         StatusCode::UNSUPPORTED_MEDIA_TYPE => {
             Problem::new(Slug::UnsupportedMediaType, "send application/json")
@@ -196,11 +196,7 @@ fn foreign(status: StatusCode) -> Problem {
 }
 
 pub async fn not_found() -> Problem {
-    not_found_problem()
-}
-
-fn not_found_problem() -> Problem {
-    Problem::new(Slug::NotFound, "no such path; /openapi.json lists every path")
+    Problem::not_found()
 }
 
 pub async fn method_not_allowed() -> Problem {

@@ -4,9 +4,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use axum::extract::Request;
+use axum::extract::{MatchedPath, Request};
 use axum::http::uri::Authority;
-use axum::http::{HeaderValue, Version, header};
+use axum::http::{HeaderMap, HeaderValue, Method, Version, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
@@ -88,9 +88,13 @@ pub async fn answer(app: &App, request: Request, next: Next) -> Response {
     let version = request.version();
     let arrival = request.extensions().get::<Arrival>();
     let fault = arrival.and_then(|arrival| arrival.fault).map(HeadFault::detail);
-    if let Some(detail) = fault.or_else(|| host_fault(&request)) {
+    if let Some(detail) = fault.or_else(|| host_fault(&request)).or_else(|| field_fault(request.headers())) {
         // What follows on this connection may be a request that somebody else has smuggled in.
         return close(version, Problem::new(Slug::MalformedRequest, detail).into_response());
+    }
+    // The layer for browsers answers OPTIONS of any path.
+    if request.method() == Method::OPTIONS && request.extensions().get::<MatchedPath>().is_none() {
+        return Problem::not_found().into_response();
     }
     // Probes and metrics are there for whoever waits for the end.
     if request.uri().path().starts_with("/health/") || request.uri().path() == "/metrics" {
@@ -130,6 +134,10 @@ fn host_fault(request: &Request) -> Option<&'static str> {
         return Some("send one Host");
     }
     let target = request.uri().authority();
+    // RFC 9110, section 4.2.4: what is before the @ disguises the host.
+    if target.is_some_and(|target| target.as_str().contains('@')) {
+        return Some("send no user in the target");
+    }
     let Some(host) = host else {
         let may_be_absent = match request.version() {
             Version::HTTP_11 => false,
@@ -143,6 +151,17 @@ fn host_fault(request: &Request) -> Option<&'static str> {
         return Some("send a host, and its port if there is one, as Host");
     };
     target.is_some_and(|target| *target != name).then_some("Host and the target of the request disagree")
+}
+
+/// What is wrong with other fields: two keys, of which programs may take either, and expectations that are
+/// not met.
+fn field_fault(headers: &HeaderMap) -> Option<&'static str> {
+    if headers.get_all(header::AUTHORIZATION).iter().nth(1).is_some() {
+        return Some("send one Authorization");
+    }
+    let is_met = |expected: &HeaderValue| expected.as_bytes().eq_ignore_ascii_case(b"100-continue");
+    let are_met = headers.get_all(header::EXPECT).iter().all(is_met);
+    (!are_met).then_some("100-continue is the only expectation that is met")
 }
 
 /// Ends the connection with this answer; a connection of HTTP/2 ends otherwise.
@@ -187,12 +206,31 @@ mod tests {
             (one, "/", &["a b"]),
             (one, "/", &["me@a.example"]),
             (one, "http://a.example/", &["b.example"]),
+            (one, "http://me@a.example/", &["a.example"]),
             (two, "/", &[]),
+            (two, "http://me:pw@a.example/", &[]),
             (two, "http://a.example/", &["b.example"]),
             (Version::HTTP_10, "/", &["a.example", "b.example"]),
         ] {
             assert!(fault(version, target, hosts).is_some(), "{version:?} {target} {hosts:?}");
         }
+    }
+
+    #[test]
+    fn there_is_one_key_and_no_expectation_but_one() {
+        let fault = |fields: &[(header::HeaderName, &'static str)]| {
+            let fields = fields.iter().map(|(name, value)| (name.clone(), HeaderValue::from_static(value)));
+            let mut headers = HeaderMap::new();
+            fields.for_each(|(name, value)| _ = headers.append(name, value));
+            field_fault(&headers)
+        };
+        let (key, expect) = (header::AUTHORIZATION, header::EXPECT);
+        assert_eq!(fault(&[(key.clone(), "Bearer a"), (expect.clone(), "100-Continue")]), None);
+        assert!(fault(&[(key.clone(), "Bearer a"), (key, "Bearer a")]).is_some());
+        for expected in ["200-ok", "", "100-continue, 200-ok"] {
+            assert!(fault(&[(expect.clone(), expected)]).is_some(), "{expected}");
+        }
+        assert!(fault(&[(expect.clone(), "100-continue"), (expect, "200-ok")]).is_some());
     }
 
     #[test]

@@ -72,7 +72,8 @@ impl Progress {
     }
 
     pub(super) fn solved_to(&self, relative_residual: f64) {
-        self.state().residual = Some(relative_residual);
+        // Beyond float64 it says nothing.
+        self.state().residual = Some(relative_residual).filter(|residual| residual.is_finite());
     }
 
     /// Begins anew: it was refused, and is tried again.
@@ -140,6 +141,8 @@ mod tests {
         let now = progress.now();
         assert!(now.fraction < 1e-6 && now.seconds_left.is_some_and(|left| left > 9e8), "{now:?}");
         assert_eq!(now.residual, Some(1e-12));
+        progress.solved_to(f64::INFINITY);
+        assert_eq!(progress.now().residual, None);
         progress.restart();
         assert_eq!(progress.now(), Snapshot { stage: None, ..nothing });
     }

@@ -7,7 +7,6 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
-use crate::http::wire::write::array::{finite, finite_if_any};
 
 /// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 /// answer has them yet.
@@ -108,15 +107,15 @@ pub struct Diagnostics {
     #[schema(nullable = false)]
     pub rank: Option<usize>,
     /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub reciprocal_condition: Option<f64>,
     /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and surfaces, with Y = 1.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub relative_residual: Option<f64>,
     /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub native_norm_squared: Option<f64>,
     /// The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
@@ -124,11 +123,11 @@ pub struct Diagnostics {
     #[schema(nullable = false)]
     pub mean_coefficients: Option<Vec<f64>>,
     /// |u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub misfit: Option<f64>,
     /// Standard deviation of the noise of the points across the surface, as estimated, length.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "finite_if_any")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub noise_deviation: Option<f64>,
     /// Points that were merged into an earlier one.
@@ -188,6 +187,5 @@ pub struct Degenerate {
     pub reason: DegenerateReason,
     /// |∇| of the function that was asked there: 1/length for the signature function, about 1 for the offset model, 0
     /// where that has no answer.
-    #[serde(serialize_with = "finite")]
     pub gradient_norm: f64,
 }

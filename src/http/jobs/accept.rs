@@ -17,6 +17,7 @@ use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
+use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest};
 
@@ -106,7 +107,7 @@ const ATTEMPTS: usize = 4;
 /// 202 with the location of the job.
 fn accepted(view: &JobView) -> Response {
     let location = [(header::LOCATION, format!("/v1/jobs/{}", view.id()))];
-    let mut response = (StatusCode::ACCEPTED, location, axum::Json(view)).into_response();
+    let mut response = (StatusCode::ACCEPTED, location, Json(view)).into_response();
     response.headers_mut().insert(PREFERENCE_APPLIED, HeaderValue::from_static("respond-async"));
     response
 }

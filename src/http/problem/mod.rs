@@ -146,6 +146,11 @@ impl Problem {
         problem
     }
 
+    /// 404 for a path that there is not.
+    pub fn not_found() -> Self {
+        Self::new(Slug::NotFound, "no such path; /openapi.json lists every path")
+    }
+
     /// 413 for a request whose size in `what` is over a limit.
     pub fn too_large(slug: Slug, what: &str, limit: usize, required: Option<usize>) -> Self {
         let needed = required.map(|n| format!(", this request has {n}")).unwrap_or_default();
@@ -273,7 +278,7 @@ impl Problem {
                 let enough = 1.01 * minimum_alpha;
                 let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
                 let mut problem = Self::of_field(Slug::NotPositiveDefinite, pointers.regularization, remedy);
-                problem.members.minimum_alpha = Some(minimum_alpha);
+                problem.members.minimum_alpha = Some(minimum_alpha).filter(|alpha| alpha.is_finite());
                 if let NotDefinite::NeedsCholesky { point } = reason {
                     problem.members.point_indices = vec![point];
                 }

@@ -24,6 +24,7 @@ use crate::http::serve::sampling::find_sampling;
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
+use crate::http::wire::write::json::Json;
 use crate::numerics::points::sampling::{NearestRange, Scales};
 use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
@@ -197,7 +198,7 @@ pub async fn create_cloud(
     let location = format!("/v1/clouds/{}", cloud.cloud_id);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let named = [(header::LOCATION, location), (CLOUD_HEADER, cloud.cloud_id.clone())];
-    Ok((status, named, axum::Json(cloud)).into_response())
+    Ok((status, named, Json(cloud)).into_response())
 }
 
 /// Describe a cloud
@@ -230,7 +231,7 @@ pub async fn get_cloud(
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, etag)]).into_response());
     }
     let cloud = describe(&app, &admission, &stored).await?;
-    Ok(([(header::ETAG, etag)], axum::Json(cloud)).into_response())
+    Ok(([(header::ETAG, etag)], Json(cloud)).into_response())
 }
 
 /// Describes a cloud, with what its positions say.
@@ -317,12 +318,12 @@ pub async fn list_clouds(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     RawQuery(query): RawQuery,
-) -> Result<axum::Json<CloudList>, Problem> {
+) -> Result<Json<CloudList>, Problem> {
     let window = parse_window(query.as_deref().unwrap_or(""))?;
     let admission = app.compute.admit(owner)?;
     let CloudPage { clouds, next } = list_of(&app, &admission, window).await?;
     let next = next.map(|place| Cursor(place).to_string());
-    Ok(axum::Json(CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next }))
+    Ok(Json(CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next }))
 }
 
 /// The place of the last cloud of a page in the order of the list: it holds when that cloud is gone. Opaque to clients.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use axum::Extension;
 use axum::extract::{Request, State};
-use axum::{Extension, Json};
 use serde::Serialize;
 use serde::de::IgnoredAny;
 use utoipa::openapi::schema::{AdditionalProperties, RefBuilder, Schema, SchemaType, Type};
@@ -32,6 +32,7 @@ use crate::http::serve::operation::{self, Operation, REQUEST_FORMATS};
 use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::without::WithOperation;
+use crate::http::wire::write::json::Json;
 use crate::numerics::solver::kind::SolverKind;
 use crate::store::Owner;
 

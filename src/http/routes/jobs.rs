@@ -21,6 +21,7 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::http::serve::durable::{SECONDS_UNTIL_BACK, unavailable};
 use crate::http::wire::write::encode::holding;
+use crate::http::wire::write::json::{self, Json};
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::objects::jobs::{JobId, Outcome};
@@ -51,8 +52,8 @@ pub async fn get_job(
     State(app): State<Arc<App>>,
     Extension(owner): Extension<Owner>,
     Path(job_id): Path<String>,
-) -> Result<axum::Json<JobView>, Problem> {
-    look(&app, owner, parse(&job_id)?).await.map(axum::Json)
+) -> Result<Json<JobView>, Problem> {
+    look(&app, owner, parse(&job_id)?).await.map(Json)
 }
 
 /// Delete a job
@@ -116,7 +117,8 @@ pub async fn follow_job(
                 Following::Ended => return None,
             };
             let name = if view.has_ended() { "done" } else { "progress" };
-            let event = Event::default().event(name).json_data(&view).ok()?;
+            let text = String::from_utf8(json::to_vec(&view).ok()?).ok()?;
+            let event = Event::default().event(name).data(text);
             let next = if view.has_ended() { Following::Ended } else { Following::Further(Box::new(view)) };
             Some((Ok(event), next))
         }

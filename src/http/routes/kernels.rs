@@ -1,11 +1,11 @@
 //! `GET /v1/kernels`.
 
-use axum::Json;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::fields::KernelFamily;
 use crate::http::openapi::responses::ReadProblems;
+use crate::http::wire::write::json::Json;
 use crate::numerics::kernel::{Family, WendlandSmoothness};
 
 /// A parameter that a family takes beside `length_scale` and `variance`.

@@ -23,6 +23,7 @@ use crate::http::serve::planner::{DenseOnly, Planner};
 use crate::http::wire::read::members::{present, present_word, present_words, word};
 use crate::http::wire::write::answer::{Member, Parts, answer};
 use crate::http::wire::write::array::Array;
+use crate::http::wire::write::json::Nullable;
 use crate::store::Owner;
 use search::{Search, Work};
 
@@ -117,19 +118,22 @@ pub struct PathEntry {
     /// α.
     pub alpha: f64,
     /// The score; null where the matrix is not positive definite.
-    #[schema(nullable = true)]
-    pub score: Option<f64>,
+    #[schema(value_type = Option<f64>, nullable = true)]
+    pub score: Nullable,
 }
 
 /// What each value is predicted to be from all others.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct LeftOut {
     /// The predictions, in the order of the points; null where the mean is not determined without the point.
-    pub means: Vec<Option<f64>>,
+    #[schema(value_type = Vec<Option<f64>>)]
+    pub means: Vec<Nullable>,
     /// The variances of the values predicted, their noise included.
-    pub variances: Vec<Option<f64>>,
+    #[schema(value_type = Vec<Option<f64>>)]
+    pub variances: Vec<Nullable>,
     /// The logarithms of the densities of the values under their predictions.
-    pub log_predictive_densities: Vec<Option<f64>>,
+    #[schema(value_type = Vec<Option<f64>>)]
+    pub log_predictive_densities: Vec<Nullable>,
 }
 
 impl Member for LeftOut {
@@ -148,8 +152,8 @@ pub struct FamilyScore {
     #[schema(nullable = false)]
     pub nu: Option<f64>,
     /// Its best score; null where the matrix was not positive definite from any start.
-    #[schema(nullable = true)]
-    pub score: Option<f64>,
+    #[schema(value_type = Option<f64>, nullable = true)]
+    pub score: Nullable,
 }
 
 answer! {
@@ -168,7 +172,7 @@ answer! {
         /// Derivatives of the score in the logarithms of what is free, in the order of `vary`; for `length_scales` without an axis, in that of a factor
         /// of all; null for nu, which takes steps.
         #[schema(value_type = Vec<Option<f64>>)]
-        gradient: Vec<Option<f64>>,
+        gradient: Vec<Nullable>,
         /// Whether no slope is left to follow within the bounds.
         converged: bool,
         /// How often the criterion was evaluated.

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -13,6 +12,7 @@ use crate::http::metrics;
 use crate::http::openapi::responses::{ProbeProblems, ReadyProblems};
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
+use crate::http::wire::write::json::Json;
 
 /// The state of the process.
 #[derive(Serialize, ToSchema)]

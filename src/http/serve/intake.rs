@@ -18,10 +18,6 @@ use crate::numerics::observer::Observer;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 
-/// Bytes read and thrown away behind a body that is too large, so that a client which only listens after sending gets its
-/// answer instead of a broken connection.
-const MAX_DRAINED_BYTES: usize = 64 << 20;
-
 /// Bytes that are asked for at first; then the buffer doubles as bytes come, whatever was announced.
 const FIRST_BYTES: usize = 64 << 10;
 
@@ -104,11 +100,8 @@ pub async fn read_bytes(
 ) -> Result<(Vec<u8>, Reservation), Problem> {
     let limit = app.memory.body;
     let length = announced_length(headers);
+    // At once: the connection hears out a client that only listens after sending.
     if let Some(required) = length.filter(|&length| length > limit) {
-        // Who asks before sending is told; who sends anyway is heard out.
-        if !headers.contains_key(header::EXPECT) {
-            drain(body, app.config.body_timeout()).await;
-        }
         return Err(too_large(limit, Some(required)));
     }
     app.compute.check_room(owner)?;
@@ -122,7 +115,6 @@ pub async fn read_bytes(
     let mut body = body;
     while let Some(data) = reader.next(&mut body).await? {
         if reader.bytes.len() + data.len() > limit {
-            drain(body, app.config.body_timeout()).await;
             return Err(too_large(limit, None));
         }
         reader.make_room(data.len()).await?;
@@ -183,16 +175,5 @@ impl Reader<'_> {
         }
         self.bytes.reserve_exact(wanted - self.bytes.len());
         Ok(())
-    }
-}
-
-async fn drain(mut body: Body, patience: Duration) {
-    let until = Instant::now() + patience;
-    let mut drained = 0;
-    while let Ok(Some(Ok(frame))) = timeout_at(until, body.frame()).await {
-        drained += frame.into_data().map_or(0, |data| data.len());
-        if drained > MAX_DRAINED_BYTES {
-            break;
-        }
     }
 }

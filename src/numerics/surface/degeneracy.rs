@@ -71,10 +71,12 @@ const OBLIQUE: f64 = 0.5;
 /// Spacings from the nearest point beyond which a query is far from the cloud.
 const FAR_SPACINGS: f64 = 3.0;
 
-/// T1 at each query: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j|) + ‖Y − (K+αI)Λ‖_∞]`.
+/// T1 at each query: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j| + η(1 + v)Σ|λ_j|) + ‖Y − (K+αI)Λ‖_∞]`, η the
+/// least normal number; and wherever |∇u| itself is below η: subnormal numbers have lost digits, however
+/// small their sum of magnitudes is.
 ///
-/// The sums of magnitudes take half of a pass over all pairs more. They are at most `Σ|λ_j|` times the greatest values of k and
-/// ℓ|∇k|, which nearly every gradient exceeds; only the others are asked for theirs.
+/// The sums of magnitudes take half of a pass over all pairs more. They are at most `Σ|λ_j|` times the
+/// greatest values of k and ℓ|∇k|, which nearly every gradient exceeds; only the others are asked for theirs.
 ///
 /// # Errors
 /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -86,11 +88,13 @@ pub(crate) fn roundings(
 ) -> Result<Vec<bool>, NumericsError> {
     let (kernel, solution) = (signature.solver.kernel(), &signature.solution);
     let length_scale = kernel.length_scale();
-    let is_rounding = |query: usize, magnitudes: f64| {
-        let rounding = f64::EPSILON * magnitudes + solution.residual_max;
-        length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding
-    };
     let total: f64 = solution.weights.iter().map(|weight| weight.abs()).sum();
+    let underflow = f64::MIN_POSITIVE * (1.0 + kernel.variance()) * total;
+    let is_rounding = |query: usize, magnitudes: f64| {
+        let rounding = f64::EPSILON * (magnitudes + underflow) + solution.residual_max;
+        let length = norm(jets.gradient(query));
+        length < f64::MIN_POSITIVE || length_scale * length <= ROUNDING_FACTOR * rounding
+    };
     let at_most = total * (kernel.at_zero() + kernel.variance() * MAX_SLOPE);
     let mut found: Vec<bool> = (0..jets.n_queries()).map(|query| is_rounding(query, at_most)).collect();
     let suspects: Vec<usize> = (0..found.len()).filter(|&query| found[query]).collect();
@@ -155,6 +159,28 @@ mod tests {
     use crate::numerics::testing::fibonacci_sphere;
 
     #[test]
+    fn gradients_that_are_subnormal_are_rounding() {
+        // e^{−d²} from 26.5 to 27.3 away: 1e-305 to 1e-323, and then nothing. A single point has a residual
+        // of exactly 0.
+        let places: Vec<f64> = (0..9).flat_map(|i| [26.5 + 0.1 * f64::from(i), 0.0, 0.0]).collect();
+        let queries = Cloud::new(places, 3).unwrap();
+        let cloud = Arc::new(Cloud::new(vec![0.0; 3], 3).unwrap());
+        for variance in [1.0, 1e12] {
+            let kernel = Kernel::new(Family::Gauss, 1.0, variance).unwrap();
+            let system = System::new(cloud.clone(), kernel, Regularization::Uniform(0.0)).unwrap();
+            let solver = Arc::new(Solver::dense(system, &Unobserved).unwrap());
+            let signature = Interpolant::signature(solver, &Unobserved).unwrap();
+            let jets = signature.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
+            let found = roundings(&signature, &queries, &jets, &Unobserved).unwrap();
+            for (query, found) in found.iter().enumerate() {
+                let length = norm(jets.gradient(query));
+                assert!(*found || length >= f64::MIN_POSITIVE, "{variance}: {length:e}");
+            }
+            assert!(!found[0] && found[8], "{variance}: {found:?}");
+        }
+    }
+
+    #[test]
     fn gradients_are_judged_as_if_all_were_asked_for_their_magnitudes() {
         // The centre, where ∇u vanishes, points of the sphere, and places so far away that k underflows.
         let places = [[0.0; 3], [1e-14, 0.0, 0.0], [0.6, 0.8, 0.0], [0.5, 0.0, 0.0], [40.0, 0.0, 0.0]];
@@ -173,7 +199,9 @@ mod tests {
                 let (value, slope) = jets.magnitudes(query);
                 let rounding =
                     f64::EPSILON * (length_scale * slope + value) + signature.solution.residual_max;
-                let expected = length_scale * norm(jets.gradient(query)) <= ROUNDING_FACTOR * rounding;
+                let length = norm(jets.gradient(query));
+                let is_subnormal = length < f64::MIN_POSITIVE;
+                let expected = is_subnormal || length_scale * length <= ROUNDING_FACTOR * rounding;
                 assert_eq!(found, expected, "query {query}, ℓ = {length_scale}");
                 n_rounding += usize::from(found);
             }

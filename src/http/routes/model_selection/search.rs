@@ -13,6 +13,7 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::plan::FitModel;
 use crate::http::serve::planner::check_seed;
 use crate::http::wire::write::array::Array;
+use crate::http::wire::write::json::Nullable;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
 use crate::numerics::selection::{
@@ -273,11 +274,11 @@ impl Work {
         let left_out = leave_one_out_with((cloud, &merged, mean), &selected.hyperparameters, observer);
         let path = path(&selection, &selected.hyperparameters, observer).map_err(refused)?;
         let n_given = search.vary.as_ref().map_or(variations.len(), Vec::len);
-        let mut gradient = vec![None; n_given];
+        let mut gradient = vec![Nullable(None); n_given];
         let mut slopes = selected.gradient.iter();
         for (at, variation) in &variations {
             let n_free = if variation.parameter == Parameter::LengthScales { cloud.dimension() } else { 1 };
-            gradient[*at] = Some(slopes.by_ref().take(n_free).sum());
+            gradient[*at] = Nullable(Some(slopes.by_ref().take(n_free).sum()));
         }
         let kernel = selected.hyperparameters.kernel_on(cloud).map_err(refused)?;
         let noise = &selected.hyperparameters.noise;
@@ -334,7 +335,7 @@ fn path(
     let scores = alpha_path((cloud, values, mean), at, &alphas, criterion, observer)?;
     let entry = |(&alpha, score): (&f64, f64)| PathEntry {
         alpha,
-        score: Some(score).filter(|score| score.is_finite()),
+        score: Nullable(Some(score).filter(|score| score.is_finite())),
     };
     Ok(alphas.iter().zip(scores).map(entry).collect())
 }
@@ -348,14 +349,19 @@ fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
             Family::Wendland { .. } => (KernelFamily::Wendland, None),
             Family::InverseMultiquadric => (KernelFamily::InverseMultiquadric, None),
         };
-        FamilyScore { family, nu, score }
+        FamilyScore { family, nu, score: Nullable(score) }
     };
     selected.families.iter().map(one).collect()
 }
 
 impl From<LeaveOneOut> for LeftOut {
     fn from(found: LeaveOneOut) -> Self {
-        let or_null = |list: Vec<f64>| list.into_iter().map(|x| Some(x).filter(|x| !x.is_nan())).collect();
+        // Whatever else has no number is beyond float64, and no null.
+        let is_determined: Vec<bool> = found.observation_variances.iter().map(|x| !x.is_nan()).collect();
+        let or_null = |list: Vec<f64>| {
+            let entries = list.into_iter().zip(&is_determined);
+            entries.map(|(x, is_determined)| Nullable(is_determined.then_some(x))).collect()
+        };
         Self {
             means: or_null(found.means),
             variances: or_null(found.observation_variances),

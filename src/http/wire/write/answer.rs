@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::array::Array;
 use super::chunk::{Chunk, ChunkBuilder};
 use super::integers::Integers;
+use super::json;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::wire::negotiation::Format;
@@ -77,7 +78,7 @@ impl<T: Serialize> Member for Vec<T> {
 
 impl Member for f64 {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        if self.is_finite() { parts.add_json(name, &self) } else { Err(beyond_float64()) }
+        parts.add_json(name, &self)
     }
 }
 
@@ -121,10 +122,10 @@ impl Parts {
     /// Adds what is written as JSON in every format.
     ///
     /// # Errors
-    /// 422 `invalid-request` for what JSON cannot say.
+    /// 422 `invalid-request` for a number that is not finite: answers follow from numbers of the client, so
+    /// theirs were too large.
     pub fn add_json(&mut self, name: &'static str, value: &impl Serialize) -> Result<(), Problem> {
-        // The encoder's only objection is a number that JSON does not have.
-        let text = serde_json::to_vec(value).map_err(|_| beyond_float64())?;
+        let text = json::to_vec(value).map_err(|_| beyond_float64())?;
         self.0.push((name, Part::Json(text)));
         Ok(())
     }
@@ -157,7 +158,7 @@ impl Parts {
                 Part::Numbers(array) => chunks.numbers(Arc::new(array)),
                 // Plain integers: the encoder has no objection.
                 Part::Integers(numbers) => {
-                    chunks.text(&serde_json::to_vec(&numbers).unwrap_or_else(|_| b"[]".to_vec()));
+                    chunks.text(&json::to_vec(&numbers).unwrap_or_else(|_| b"[]".to_vec()));
                 }
                 Part::Json(text) => chunks.text(&text),
             }
@@ -234,11 +235,13 @@ mod tests {
             surfaces: Vec<&'static str>,
             /// A number.
             score: f64,
+            /// A list.
+            scores: Option<Vec<f64>>,
         }
     }
 
     fn sample(values: Array) -> Sample {
-        Sample { values, gradients: None, surfaces: vec!["a"], score: 1.5 }
+        Sample { values, gradients: None, surfaces: vec!["a"], score: 1.5, scores: None }
     }
 
     fn written(answer: Sample, format: Format) -> Vec<u8> {
@@ -290,5 +293,8 @@ mod tests {
         assert_eq!(refusal.map(|problem| problem.slug()), Some(Slug::InvalidRequest));
         let infinite = Sample { score: f64::INFINITY, ..sample(with_null()) };
         assert!(infinite.into_parts().is_err());
+        let in_a_list = Sample { scores: Some(vec![1.0, f64::NEG_INFINITY]), ..sample(with_null()) };
+        let refusal = in_a_list.into_parts().err();
+        assert_eq!(refusal.map(|problem| problem.slug()), Some(Slug::InvalidRequest));
     }
 }

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use bytes::Bytes;
 use rayon::prelude::*;
-use serde::ser::{Error, Serializer};
 
 /// Numbers that one thread looks through at a time.
 const NUMBERS_PER_TASK: usize = 1 << 16;
@@ -206,25 +205,6 @@ struct Raw(Vec<f64>);
 impl AsRef<[u8]> for Raw {
     fn as_ref(&self) -> &[u8] {
         bytemuck::cast_slice(&self.0)
-    }
-}
-
-/// For single numbers of an answer: what JSON cannot say is an error, not a silent null.
-///
-/// # Errors
-/// For NaN and infinities.
-pub fn finite<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    if x.is_finite() { serializer.serialize_f64(*x) } else { Err(S::Error::custom("a number is not finite")) }
-}
-
-/// [`finite`] of what may be absent.
-///
-/// # Errors
-/// Those of [`finite`].
-pub fn finite_if_any<S: Serializer>(x: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-    match x {
-        Some(x) => finite(x, serializer),
-        None => serializer.serialize_none(),
     }
 }
 

@@ -5,3 +5,4 @@ pub mod array;
 pub mod chunk;
 pub mod encode;
 pub mod integers;
+pub mod json;
