@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use crate::common::random::Random;
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Answer, Server, document, fibonacci_sphere};
 
@@ -129,37 +130,136 @@ async fn what_takes_too_long_is_told_and_not_begun() {
     assert!(problem["detail"].as_str().unwrap().contains("nothing was computed"), "{problem}");
 }
 
-/// Requests over clouds of three sizes; times of the last are compared with what was expected of them after the others.
+/// Dimensions in which prices are held against times.
+const DIMENSIONS: [usize; 7] = [2, 3, 4, 6, 8, 12, 16];
+
+/// Seconds that a request takes, or was expected to take, for its time to say something of its price.
+const LEAST_SECONDS: f64 = 1e-3;
+
+/// n points near the unit sphere of d dimensions.
+fn sphere(n: usize, d: usize) -> Vec<Vec<f64>> {
+    let mut random = Random(d as u64);
+    let point = |_| {
+        let x: Vec<f64> = (0..d).map(|_| random.normal()).collect();
+        let length = x.iter().map(|c| c * c).sum::<f64>().sqrt();
+        x.iter().map(|c| c / length).collect()
+    };
+    (0..n).map(point).collect()
+}
+
+/// A request of an operation in d dimensions that every dimension admits.
+fn request_in(path: &str, n: usize, d: usize) -> Value {
+    let points = sphere(n, d);
+    let outside = |x: &Vec<f64>| x.iter().map(|c| 1.01 * c).collect::<Vec<_>>();
+    let mut request = request(path, n, 0.0);
+    request["cloud"] = json!({"points": points});
+    if request.get("queries").is_some() {
+        request["queries"] = json!(points[..n / 4].iter().map(outside).collect::<Vec<_>>());
+    }
+    if request.get("kernel").is_some() {
+        request["kernel"]["length_scale"] = json!(2.0);
+    }
+    request
+}
+
+/// What may be added to a request of an operation: everything that its `include` names, alone and with each
+/// order of derivatives, solver and surface, as the document has them.
+fn variants(document: &Value, path: &str) -> Vec<Value> {
+    let resolve = |schema: &Value| match schema["$ref"].as_str() {
+        Some(name) => document.pointer(name.trim_start_matches('#')).unwrap().clone(),
+        None => schema.clone(),
+    };
+    let body = &document["paths"][path]["post"]["requestBody"]["content"]["application/json"]["schema"];
+    let properties = resolve(body)["properties"].clone();
+    let include = resolve(&properties["include"]["items"]);
+    let names = include["enum"].as_array().cloned().unwrap_or_default();
+    let mut all: Vec<Value> = names.iter().map(|name| json!({"include": [name]})).collect();
+    if properties.get("derivatives").is_some() {
+        all.extend((1..=2).flat_map(|order| {
+            [json!({"derivatives": order}), json!({"derivatives": order, "include": ["deviations"]})]
+        }));
+    }
+    if path == "/v1/interpolation" || path == "/v1/posterior" {
+        let local = all.clone().into_iter().map(|mut extra| {
+            extra["solver"] = json!("local");
+            extra
+        });
+        all.extend(local.collect::<Vec<_>>());
+    }
+    if properties.get("surface").is_some() {
+        all.extend(
+            ["signature", "local"].map(|surface| json!({"surface": surface, "include": ["deviations"]})),
+        );
+    }
+    if properties.get("samples").is_some() {
+        all.push(json!({"samples": {"count": 50}, "quantiles": [0.1, 0.9], "threshold": 0.5}));
+    }
+    all
+}
+
+/// Every operation in every dimension, as it is and with all that can be included. What is included is
+/// estimated before any of it is computed in that dimension, so that the times are those of its price and not
+/// of itself.
 #[tokio::test]
-async fn seconds_are_within_a_factor_of_two_in_the_median_over_all_routes() {
-    let server = Server::start().await;
+async fn seconds_are_within_a_factor_of_two_in_the_median_over_routes_dimensions_and_inclusions() {
+    let server = Server::with_flags(&["--deadline-seconds", "300"]).await;
+    let document = document();
     let mut ratios = Vec::new();
-    for (index, (id, path)) in operations().iter().enumerate() {
-        for (size, n) in [400, 500, 600].into_iter().enumerate() {
-            let request = request(path, n, (3 * index + size) as f64);
+    // The first round says how fast the machine is.
+    for (round, d) in [3].into_iter().chain(DIMENSIONS).enumerate() {
+        for (id, path) in operations().iter().filter(|(_, path)| d <= 4 || !path.ends_with("sparse-matrix")) {
+            let plain = request_in(path, 240 - usize::from(round == 0), d);
+            let extended = variants(&document, path).into_iter().map(|extra| {
+                let mut request = plain.clone();
+                request.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+                request
+            });
             // What is missing first, and then with everything there.
-            for state in ["cold", "warm"] {
-                let expected = estimate(&server, id, &request).await.expect_ok()["seconds"].as_f64().unwrap();
-                let began = Instant::now();
-                let answer = server.post(path, &request).await;
-                assert_eq!(answer.status, 200, "{id}: {}", answer.text);
-                if size == 2 {
-                    let computed = computed_seconds(&answer).min(began.elapsed().as_secs_f64());
-                    println!("{id} {state}: expected {expected:.4} s, took {computed:.4} s");
-                    ratios.push((expected / computed).max(computed / expected));
-                }
+            let mut found = ratios_of(&server, id, path, std::slice::from_ref(&plain)).await;
+            let extended: Vec<Value> = extended.chain([plain.clone()]).collect();
+            found.extend(ratios_of(&server, id, path, &extended).await);
+            if round > 0 {
+                ratios.extend(found);
             }
         }
     }
     ratios.sort_by(f64::total_cmp);
-    let median = ratios[ratios.len() / 2];
-    println!("median factor {median:.2}, largest {:.2}", ratios.last().unwrap());
-    assert!(median <= 2.0, "{ratios:?}");
+    let at = |share: f64| ratios[(share * ratios.len() as f64) as usize];
+    println!("factors of {} requests: median {:.2}, nine tenths {:.2}", ratios.len(), at(0.5), at(0.9));
+    assert!(ratios.len() > 200 && at(0.5) <= 2.0, "{ratios:?}");
+    // Whatever a price leaves out is off by more.
+    assert!(at(0.9) <= 6.0, "{ratios:?}");
 }
 
-/// All stages but the parsing of the body, which is known before anything is estimated.
-fn computed_seconds(answer: &Answer) -> f64 {
+/// By which factors the times of requests were missed that were estimated before any of them was answered;
+/// what is refused has none.
+async fn ratios_of(server: &Server, id: &str, path: &str, requests: &[Value]) -> Vec<f64> {
+    let mut expected = Vec::new();
+    for request in requests {
+        let estimated = estimate(server, id, request).await;
+        let seconds = (estimated.status == 200).then(|| estimated.json()["seconds"].as_f64().unwrap());
+        expected.extend(seconds.map(|seconds| (request, seconds)));
+    }
+    assert!(!expected.is_empty(), "{id}");
+    let mut ratios = Vec::new();
+    for (request, expected) in expected {
+        let began = Instant::now();
+        let answer = server.post(path, request).await;
+        assert_eq!(answer.status, 200, "{id}: {}", answer.text);
+        let took = began.elapsed().as_secs_f64() - parsing_seconds(&answer);
+        let included = ["include", "derivatives", "solver", "surface"].map(|name| request[name].to_string());
+        let d = request["cloud"]["points"][0].as_array().unwrap().len();
+        println!("{id} d = {d} {}: expected {expected:.4} s, took {took:.4} s", included.join(" "));
+        if expected.max(took) >= LEAST_SECONDS {
+            ratios.push((expected / took).max(took / expected));
+        }
+    }
+    ratios
+}
+
+/// The parsing of the body is known before anything is estimated.
+fn parsing_seconds(answer: &Answer) -> f64 {
     let stages = answer.header("server-timing").split(", ");
     let duration = |stage: &str| stage.split_once(";dur=").unwrap().1.parse::<f64>().unwrap() * 1e-3;
-    stages.filter(|stage| !stage.starts_with("parse")).map(duration).sum()
+    stages.filter(|stage| stage.starts_with("parse")).map(duration).sum()
 }

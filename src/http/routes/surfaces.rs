@@ -21,7 +21,8 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::selection::learning_flops;
 use crate::numerics::solver::choose::{
-    Asked, MAX_OFFSETS, Offsets, deviations_price, judging_price, n_entries_per_row, work_price,
+    Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, n_entries_per_row,
+    work_price,
 };
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
@@ -98,12 +99,10 @@ pub fn plan_geometry(
     let queries = planner.queries(queries, &mut [&mut main])?;
     let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
     let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
-    let offsets = match (request.model, request.checks_curvatures) {
-        (SurfaceModel::Offset, _) => Offsets::Everywhere,
-        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, true) => Offsets::Confirmations,
-        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, false) => Offsets::Rescues,
+    let asked = match main.is_local() {
+        true => Asked::LocalGeometry,
+        false => Asked::Geometry(asked_of(&request, &main, &queries)),
     };
-    let asked = if main.is_local() { Asked::LocalGeometry } else { Asked::Geometry { offsets } };
     let cost = Cost { work: work_price(asked, n, m, d), n_numbers, n_held: m * d };
     Ok(Plan { main, surface: None, work: GeometryWork { queries, request }, cost })
 }
@@ -144,9 +143,11 @@ pub fn plan_applied(
     };
     let (m, d) = (queries.n_points(), queries.dimension());
     let n_surface_points = surface.as_ref().map_or(0, PlannedFit::n_points);
-    let asked = match nodes {
-        Some(_) => Asked::Stencils,
-        None => Asked::Operator { n_surface_points },
+    let asked = match (&nodes, &surface) {
+        (None, Some(surface)) => {
+            Asked::Operator { n_surface_points, surface: asked_of(&request, surface, &queries) }
+        }
+        (Some(_), _) | (_, None) => Asked::Stencils,
     };
     let mut work = work_price(asked, n_values, m, d);
     let mut n_numbers = m.checked_mul(numbers_per_query(d));
@@ -185,8 +186,11 @@ pub fn plan_matrix(
     let n = main.stored.cloud.n_points();
     let (m, d) = (queries.n_points(), queries.dimension());
     let n_rows = m.checked_mul(rows_per_query(d));
-    let asked =
-        Asked::OperatorMatrix { n_surface_points: surface.n_points(), n_rows: n_rows.unwrap_or(usize::MAX) };
+    let asked = Asked::OperatorMatrix {
+        n_surface_points: surface.n_points(),
+        n_rows: n_rows.unwrap_or(usize::MAX),
+        surface: asked_of(&request, &surface, &queries),
+    };
     let cost = Cost {
         n_numbers: planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?,
         work: work_price(asked, n, m, d),
@@ -324,6 +328,21 @@ pub fn geometry_request(
         checks_curvatures,
         max_offsets: MAX_OFFSETS,
         has_deviations: include.is_some_and(|include| include.contains(&GeometryInclude::Deviations)),
+    }
+}
+
+/// What a request takes of its surface, as far as its price goes.
+fn asked_of(request: &GeometryRequest, surface: &PlannedFit, queries: &Cloud) -> AskedOfSurface {
+    let offsets = match (request.model, request.checks_curvatures) {
+        (SurfaceModel::Offset, _) => Offsets::Everywhere,
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, true) => Offsets::Confirmations,
+        (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, false) => Offsets::Rescues,
+    };
+    let are_points = *queries == *surface.stored.cloud;
+    AskedOfSurface {
+        offsets,
+        has_own_quadrics: request.checks_curvatures && !are_points,
+        has_deviations: request.has_deviations,
     }
 }
 

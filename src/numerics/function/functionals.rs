@@ -102,6 +102,17 @@ impl JetFunctional {
         !self.of_hessian.is_empty()
     }
 
+    /// `sᵀAs` as a sum of products: the entries of A that are not 0, those across counted for both of their
+    /// places.
+    fn form(&self) -> Vec<FormTerm> {
+        let d = self.of_gradient.len();
+        let entry = |a: usize, b: usize| self.of_hessian[a * d + b];
+        let pairs = (0..if self.has_hessian() { d } else { 0 }).flat_map(|a| (a..d).map(move |b| (a, b)));
+        let term =
+            |(a, b)| FormTerm { a, b, factor: if a == b { entry(a, a) } else { entry(a, b) + entry(b, a) } };
+        pairs.map(term).filter(|term| term.factor != 0.0).collect()
+    }
+
     fn trace(&self) -> f64 {
         self.of_hessian.iter().step_by(self.of_gradient.len() + 1).sum()
     }
@@ -120,6 +131,14 @@ impl JetFunctional {
         }
         kernel.variance() * total
     }
+}
+
+/// `factor · s_a s_b`.
+#[derive(Debug, Clone, Copy)]
+struct FormTerm {
+    a: usize,
+    b: usize,
+    factor: f64,
 }
 
 /// Whether the process has the derivatives of some functionals at a point: their variance is finite.
@@ -210,7 +229,8 @@ impl<'a> Covariant<'a> {
         let Self { nodes, kernel } = self;
         columns.par_chunks_exact_mut(nodes.n_points()).zip(functionals).for_each(|(column, functional)| {
             let (x, functional) = (queries.point(functional.query), &functional.in_length_scales(kernel));
-            nodes.dispatch(Covariances { nodes, kernel, functional, x, column });
+            let form = &functional.form();
+            nodes.dispatch(Covariances { nodes, kernel, functional, form, x, column });
         });
     }
 }
@@ -220,6 +240,8 @@ struct Covariances<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
     functional: &'a JetFunctional,
+    /// Few terms for one entry of a Hessian, whatever the dimension.
+    form: &'a [FormTerm],
     x: &'a [f64],
     column: &'a mut [f64],
 }
@@ -265,8 +287,7 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
 
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
-        let Covariances { nodes, kernel, functional, x, .. } = *self.of;
-        let d = x.len();
+        let Covariances { nodes, kernel, functional, form: terms, x, .. } = *self.of;
         let zero = Pack::splat(self.simd, 0.0);
         let mut along = zero;
         let inverse = 1.0 / kernel.length_scale();
@@ -277,15 +298,9 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
             difference.store(&mut differences[c], at);
         });
         let mut form = zero;
-        if functional.has_hessian() {
-            for a in 0..d {
-                let mut row = zero;
-                for b in 0..d {
-                    let entry = Pack::splat(self.simd, functional.of_hessian[a * d + b]);
-                    row = Pack::load(self.simd, &self.differences[b], at).mul_add(entry, row);
-                }
-                form = Pack::load(self.simd, &self.differences[a], at).mul_add(row, form);
-            }
+        for FormTerm { a, b, factor } in terms {
+            let other = Pack::load(self.simd, &self.differences[*b], at) * *factor;
+            form = Pack::load(self.simd, &self.differences[*a], at).mul_add(other, form);
         }
         (q, (along, form))
     }

@@ -195,3 +195,26 @@ impl Patches {
         self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::machine::random::Random;
+    use crate::numerics::machine::vector::norm;
+    use crate::numerics::observer::Unobserved;
+
+    #[test]
+    fn dimensions_without_regressions_take_no_neighbours_and_have_no_answers() {
+        for (dimension, has_answers) in [(4, true), (5, false), (8, false)] {
+            let mut raw = vec![0.0; 150 * dimension];
+            Random::of(5, 0).fill_normal(&mut raw);
+            let on_sphere = raw.chunks(dimension).flat_map(|x| x.iter().map(|c| c / norm(x)));
+            let cloud = Arc::new(Cloud::new(on_sphere.collect(), dimension).unwrap());
+            let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+            let patches = Patches::of(cloud.clone(), sampling, &Unobserved).unwrap();
+            assert_eq!(patches.n_points_used() > 0, has_answers, "d = {dimension}");
+            let found = patches.at(&cloud, true, true, &Unobserved).unwrap();
+            assert_eq!(found.is_known.contains(&true), has_answers, "d = {dimension}");
+        }
+    }
+}

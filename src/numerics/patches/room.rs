@@ -29,6 +29,8 @@ pub(super) struct Room {
     scratch: Scratch,
     nearest: Vec<Neighbour>,
     set: InstructionSet,
+    /// Whether no lane has a neighbourhood.
+    is_empty: bool,
     /// By lane and model.
     pub kriged: Vec<Vec<Kriged>>,
 }
@@ -41,6 +43,7 @@ impl Room {
             scratch: Scratch::default(),
             nearest: Vec::new(),
             set: InstructionSet::best(),
+            is_empty: true,
             kriged: vec![Vec::new(); lanes],
         }
     }
@@ -65,7 +68,9 @@ impl Room {
             places.push(place);
         }
         // Lanes without a neighbourhood do as one that has: their numbers are not looked at.
-        if let Some(filled) = places.iter().position(Option::is_some) {
+        let filled = places.iter().position(Option::is_some);
+        self.is_empty = filled.is_none();
+        if let Some(filled) = filled {
             let is_empty = |lane: usize| places.get(lane).is_none_or(Option::is_none);
             for lane in (0..self.batch.lanes).filter(|&lane| is_empty(lane)) {
                 self.batch.copy_lane(filled, lane);
@@ -76,6 +81,9 @@ impl Room {
 
     pub(super) fn krige(&mut self, models: &[Model], purpose: Purpose) {
         self.kriged.iter_mut().for_each(Vec::clear);
+        if self.is_empty {
+            return;
+        }
         for model in models {
             let predicts = purpose != Purpose::Likelihood;
             let krige = Krige { batch: &self.batch, model, workspace: &mut self.workspace, predicts };

@@ -3,6 +3,13 @@
 //! Pure: sizes in, prices out. The routes say what they want, and whoever admits, queues or refuses asks here. Flops are those
 //! of a large factorization, so that all prices compare: a sum over pairs takes longer for each of its operations.
 
+mod geometry;
+
+pub use geometry::{AskedOfSurface, MAX_OFFSETS, Offsets};
+use geometry::{
+    choosing_flops, deviation_numbers, geometry_flops, pair_flops, quadric_flops, regression_flops,
+};
+
 use super::dense::Dense;
 use super::kind::SolverKind;
 use crate::numerics::points::monomials::n_stencil_nodes;
@@ -91,9 +98,6 @@ pub fn prefers_local(
     }
 }
 
-/// Flops of a local regression at one query: 20 to 60 µs were measured at some 5 Gflop/s.
-const FLOPS_PER_REGRESSION: f64 = 2e5;
-
 /// Entries of a row of a sparse operator, at most.
 pub fn n_entries_per_row(dimension: usize) -> usize {
     n_stencil_nodes(dimension.max(2))
@@ -109,7 +113,8 @@ pub fn choose_local(n_points: usize, dimension: usize) -> Choice {
     let per_point = 700 + 16 * dimension * dimension;
     let surface = Price {
         n_bytes: n_points.saturating_mul(per_point).saturating_add(of_coarse.expected.n_bytes),
-        flops: n * FLOPS_PER_REGRESSION
+        flops: choosing_flops(n_points, dimension)
+            + n * regression_flops(dimension)
             + 60.0 * n * coarse as f64
             + of_coarse.expected.flops
             + sampling_flops(n_points, dimension),
@@ -153,8 +158,9 @@ fn numbers_to_krige(dimension: usize, n_deviations: usize) -> usize {
 /// The sums at the points, two searches and a quadric at each. Jets, normals and quadrics are kept; while they are made, half as
 /// much again is there beside the lists of neighbours.
 fn surface_price(n_points: usize, dimension: usize) -> Price {
-    let (n, n_columns) = (n_points as f64, n_coefficients(dimension) as f64);
-    let flops = 60.0 * n * n + 2.0 * sampling_flops(n_points, dimension) + 40.0 * n * n_columns.powi(3);
+    let n = n_points as f64;
+    let at_points = n * pair_flops(dimension, 2) + quadric_flops(n_points, dimension);
+    let flops = n * at_points + 2.0 * sampling_flops(n_points, dimension);
     // 4.5 kB in three dimensions were measured when quadrics were small vectors (tests/it/memory.rs); now it is a bound.
     Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops }
 }
@@ -185,55 +191,25 @@ pub fn noise_flops(n_points: usize, dimension: usize) -> f64 {
 /// Queries of which variances are held at once.
 pub const VARIANCES_AT_ONCE: usize = 512;
 
-/// Queries at which one request may ask the offset model: as much work as a factorization of 8,500 points.
-pub const MAX_OFFSETS: usize = 20_000;
-
-/// What the offset model costs at one query: 0.12 ms of one core.
-const FLOPS_PER_OFFSET: f64 = 1e7;
-
-/// At how many queries the offset model is asked, which is known only afterwards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Offsets {
-    /// Where the gradient of the signature function vanishes: nowhere on spheres, tori and the bunny, everywhere on a plane.
-    Rescues,
-    /// Where quadrics do not confirm curvatures as well. By the time that it takes: nearly nowhere on spheres of 1,000 points and
-    /// more, at some tenth of a random torus of 3,000, nearly everywhere on one of 1,000, on a sphere of 256, and on the bunny.
-    Confirmations,
-    /// At every query.
-    Everywhere,
-}
-
-impl Offsets {
-    /// A price between the extremes: 2 in 100 queries, a quarter, all.
-    fn flops(self, n_queries: usize) -> f64 {
-        let n_asked = match self {
-            Self::Rescues => n_queries / 50,
-            Self::Confirmations => n_queries / 4,
-            Self::Everywhere => n_queries,
-        };
-        FLOPS_PER_OFFSET * n_asked.min(MAX_OFFSETS) as f64
-    }
-}
-
 /// What is asked of a prepared fit, beside its solver and surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
-    /// A function through new values, with derivatives or without.
-    Function,
+    /// A function through new values, with derivatives up to an order.
+    Function { order: usize },
     /// The same as a Gaussian process.
     Posterior { variances: bool, covariance: bool },
     /// Values, derivatives and variances from the points nearest to each query, and so many deviations at each.
     Moving { n_deviations: usize },
     /// Normals or curvatures.
-    Geometry { offsets: Offsets },
+    Geometry(AskedOfSurface),
     /// Normals and curvatures by local regressions.
     LocalGeometry,
     /// An operator by stencils of the nearest nodes, on local geometry or another.
     Stencils,
     /// An operator on the surface of `n_surface_points`, applied to values.
-    Operator { n_surface_points: usize },
-    /// The same as a matrix with so many rows per query.
-    OperatorMatrix { n_surface_points: usize, n_rows: usize },
+    Operator { n_surface_points: usize, surface: AskedOfSurface },
+    /// An operator as a matrix of so many rows.
+    OperatorMatrix { n_surface_points: usize, n_rows: usize, surface: AskedOfSurface },
 }
 
 /// What answering m queries takes, beside the numbers of the answer.
@@ -242,8 +218,12 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
     let at_points = n_points.saturating_mul(numbers_at_point(dimension));
     let at_queries = n_queries.saturating_mul(numbers_at_query(dimension));
     let jets = n_queries.saturating_mul(1 + dimension + dimension * dimension);
+    let of_deviations =
+        |of: AskedOfSurface| if of.has_deviations { deviation_numbers(n_queries, dimension) } else { 0 };
     let (flops, n_numbers) = match asked {
-        Asked::Function => (40.0 * n * (n + m), at_points.saturating_add(jets)),
+        Asked::Function { order } => {
+            (n * (40.0 * n + pair_flops(dimension, order) * m), at_points.saturating_add(jets))
+        }
         Asked::Posterior { variances, covariance } => {
             let whitened = match (covariance, variances) {
                 (true, _) => n_queries,
@@ -251,7 +231,7 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
                 (false, false) => 0,
             };
             let flops = 40.0 * n * (n + m)
-                + if whitened > 0 { n * n * m } else { 0.0 }
+                + if whitened > 0 { n * m * whitening_flops(n) } else { 0.0 }
                 + if covariance { n * m * m } else { 0.0 };
             let n_numbers = whitened.saturating_add(numbers_at_point(dimension)).saturating_mul(n_points);
             (flops, n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)))
@@ -267,31 +247,30 @@ pub fn work_price(asked: Asked, n_points: usize, n_queries: usize, dimension: us
             let at_queries = n_queries.saturating_mul(2 + 3 * n_deviations);
             (flops, rooms.saturating_add(n_points).saturating_add(jets).saturating_add(at_queries))
         }
-        Asked::Geometry { offsets } => {
-            let flops = 60.0 * n * (n + m) + 30.0 * m * d.powi(3) + offsets.flops(n_queries);
-            (flops, (4 * n_points).saturating_add(at_queries))
+        Asked::Geometry(asked) => {
+            let flops = geometry_flops(asked, n_points, n_queries, dimension);
+            (flops, (4 * n_points).saturating_add(at_queries).saturating_add(of_deviations(asked)))
         }
-        Asked::LocalGeometry => (FLOPS_PER_REGRESSION * m, at_queries),
+        Asked::LocalGeometry => (regression_flops(dimension) * m, at_queries),
         Asked::Stencils => {
             // A column, its place among the ordered ones and a number per component, once more while they are put together.
             let n_entries = 4 * (2 + dimension) * n_stencil_nodes(dimension.max(2));
-            let flops = (FLOPS_PER_REGRESSION + FLOPS_PER_STENCIL) * m + sampling_flops(n_points, dimension);
+            // A system of as many unknowns as there are nodes, for surfaces in space 3e5 of them.
+            let of_stencil = FLOPS_PER_STENCIL
+                * (n_entries_per_row(dimension) as f64 / n_entries_per_row(3) as f64).powi(3);
+            let flops = (regression_flops(dimension) + of_stencil) * m + sampling_flops(n_points, dimension);
             (flops, at_queries.saturating_add(n_queries.saturating_mul(n_entries)))
         }
-        Asked::Operator { n_surface_points } => {
-            let n_all = n_points + n_surface_points;
-            let flops = 60.0 * n_all as f64 * (n_all as f64 + m) + Offsets::Confirmations.flops(n_queries);
-            (
-                flops,
-                n_all
-                    .saturating_mul(numbers_at_point(dimension))
-                    .saturating_add(at_queries)
-                    .saturating_add(jets),
-            )
+        Asked::Operator { n_surface_points, surface } => {
+            let n_all = n_points.saturating_add(n_surface_points);
+            let geometry = geometry_flops(surface, n_surface_points, n_queries, dimension);
+            let sums = n * (40.0 * n + pair_flops(dimension, 2) * m);
+            let numbers = n_all.saturating_mul(numbers_at_point(dimension)).saturating_add(at_queries);
+            (geometry + sums, numbers.saturating_add(jets).saturating_add(of_deviations(surface)))
         }
-        Asked::OperatorMatrix { n_surface_points, n_rows } => {
-            let sums = 60.0 * n_surface_points as f64 * m + Offsets::Confirmations.flops(n_queries);
-            (2.0 * n * n * n_rows as f64 + sums, at_points.saturating_add(at_queries))
+        Asked::OperatorMatrix { n_surface_points, n_rows, surface } => {
+            let geometry = geometry_flops(surface, n_surface_points, n_queries, dimension);
+            (2.0 * n * n * n_rows as f64 + geometry, at_points.saturating_add(at_queries))
         }
     };
     Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops }
@@ -341,7 +320,9 @@ pub fn judging_price((n_points, dimension): (usize, usize), n_queries: usize, n_
         n_bytes: numbers
             .saturating_mul(size_of::<f64>())
             .saturating_add(n_functionals * functional_bytes(dimension)),
-        flops: n * n * (4.0 * k + 40.0 * n_blocks) + 1000.0 * n_queries as f64,
+        flops: n * n * (4.0 * k + 40.0 * n_blocks)
+            + 2.0 * n * k * covariance_flops(dimension)
+            + 1000.0 * n_queries as f64,
     };
     // The sampling of a cloud of which nobody has asked it.
     let (n_bytes, flops) = (sampling_bytes(n_points, dimension), sampling_flops(n_points, dimension));
@@ -356,12 +337,26 @@ fn functional_bytes(dimension: usize) -> usize {
 
 /// What the deviations of so many functionals take, as variances do.
 pub fn deviations_price(n_points: usize, n_functionals: usize, dimension: usize) -> Price {
-    let (n, d) = (n_points as f64, dimension as f64);
+    let n = n_points as f64;
     let n_at_once = n_functionals.min(VARIANCES_AT_ONCE);
-    let columns = n_points.saturating_mul(n_at_once + 5).saturating_mul(size_of::<f64>());
+    // With what a mean takes.
+    let columns = n_points.saturating_mul(n_at_once + dimension + 5).saturating_mul(size_of::<f64>());
     let found = n_functionals.saturating_mul(4 * size_of::<f64>());
     let n_bytes = columns.saturating_add(found).saturating_add(n_at_once * functional_bytes(dimension));
-    Price { n_bytes, flops: n * (n + 60.0 + 4.0 * d * d) * n_functionals as f64 }
+    let flops = n * (whitening_flops(n) + covariance_flops(dimension)) * n_functionals as f64;
+    Price { n_bytes, flops }
+}
+
+/// Flops for each entry of a column that is whitened: half of a triangle is read for it, at the speed of a
+/// factorization where that is large.
+fn whitening_flops(n: f64) -> f64 {
+    0.75 * n + 750.0
+}
+
+/// Flops of the covariance of a functional of jets with a value: distance, kernel, and the terms of the
+/// functional.
+fn covariance_flops(dimension: usize) -> f64 {
+    60.0 + 10.0 * dimension as f64
 }
 
 /// Numbers that a solve for new values takes at a point: the point, its value, two sets of weights with their sums and residuals
@@ -402,19 +397,25 @@ mod tests {
 
     #[test]
     fn more_of_anything_never_costs_less() {
+        let surface = |offsets| AskedOfSurface { offsets, has_own_quadrics: true, has_deviations: true };
         let all = |n: usize| {
             [
-                Asked::Function,
+                Asked::Function { order: 0 },
+                Asked::Function { order: 2 },
                 Asked::Posterior { variances: false, covariance: false },
                 Asked::Posterior { variances: true, covariance: false },
                 Asked::Posterior { variances: true, covariance: true },
                 Asked::Moving { n_deviations: 0 },
                 Asked::Moving { n_deviations: 10 },
-                Asked::Geometry { offsets: Offsets::Rescues },
-                Asked::Geometry { offsets: Offsets::Confirmations },
-                Asked::Geometry { offsets: Offsets::Everywhere },
-                Asked::Operator { n_surface_points: n },
-                Asked::OperatorMatrix { n_surface_points: n, n_rows: n },
+                Asked::Geometry(surface(Offsets::Rescues)),
+                Asked::Geometry(surface(Offsets::Confirmations)),
+                Asked::Geometry(surface(Offsets::Everywhere)),
+                Asked::Operator { n_surface_points: n, surface: surface(Offsets::Confirmations) },
+                Asked::OperatorMatrix {
+                    n_surface_points: n,
+                    n_rows: n,
+                    surface: surface(Offsets::Confirmations),
+                },
             ]
         };
         let sizes = [1, 10, 600, 30_000];

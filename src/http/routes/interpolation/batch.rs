@@ -116,7 +116,8 @@ impl Operation for InterpolationBatchRequest {
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
         let per_query = numbers_per_query(d, derivatives);
-        let mut work = work_price(Asked::Function, n, m, d).and(many_price(n, m, k, per_query - 1));
+        let mut work = work_price(Asked::Function { order: usize::from(derivatives) }, n, m, d)
+            .and(many_price(n, m, k, per_query - 1));
         if has_deviations {
             work = work.and(price_of_deviations(n, m, d, derivatives));
         }

@@ -137,15 +137,14 @@ impl Operation for InterpolationRequest {
         let mut main = planner.values_fit(fit, None)?;
         let queries = planner.queries(self.queries, &mut [&mut main])?;
         let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+        let function = Asked::Function { order: usize::from(derivatives) };
         let work = match (main.is_moving(), has_deviations) {
             (true, false) => work_price(Asked::Moving { n_deviations: 0 }, n, m, d),
             (true, true) => {
                 work_price(Asked::Moving { n_deviations: deviations_per_query(d, derivatives) }, n, m, d)
             }
-            (false, false) => work_price(Asked::Function, n, m, d),
-            (false, true) => {
-                work_price(Asked::Function, n, m, d).and(price_of_deviations(n, m, d, derivatives))
-            }
+            (false, false) => work_price(function, n, m, d),
+            (false, true) => work_price(function, n, m, d).and(price_of_deviations(n, m, d, derivatives)),
         };
         let n_lists = if has_deviations { 2 } else { 1 };
         let cost = Cost {

@@ -9,13 +9,18 @@ use super::means::Support;
 use super::regression::{Batch, n_terms};
 use crate::numerics::machine::small::Small;
 use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::solver::choose::MAX_LOCAL_DIMENSION;
 use grown::Grown;
 
 /// Points per term of the trend in a whole neighbourhood: 30 for surfaces in space.
 const POINTS_PER_TERM: usize = 5;
 
-/// Points, or means, in a neighbourhood: even, and at most as many as there are.
+/// Points, or means, in a neighbourhood: even, and at most as many as there are. None in dimensions that have
+/// no regressions, so that nothing is searched or factorized there.
 pub(crate) fn n_neighbours(dimension: usize, available: usize) -> usize {
+    if dimension > MAX_LOCAL_DIMENSION {
+        return 0;
+    }
     (POINTS_PER_TERM * n_terms(dimension)).next_multiple_of(2).min(available / 2 * 2)
 }
 
