@@ -21,7 +21,7 @@ const PIECE: usize = 1 << 20;
 /// The state of a key.
 pub(super) enum Known {
     /// The key belongs to this job.
-    Job(JobView),
+    Job(Box<JobView>),
     /// The key has no job. The next job claims it by this name.
     Free(ClaimName),
 }
@@ -89,7 +89,7 @@ pub(super) async fn known(
                 "this Idempotency-Key was sent with another request: send each request with a key of its own";
             Err(Problem::new(Slug::InvalidRequest, detail))
         }
-        Ok(view) => Ok(Known::Job(view)),
+        Ok(view) => Ok(Known::Job(Box::new(view))),
         Err(problem) if problem.slug() == Slug::UnknownJob => Ok(free),
         Err(problem) => Err(problem),
     }
