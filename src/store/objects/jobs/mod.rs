@@ -26,8 +26,8 @@ mod tests;
 use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
-use object_store::{ObjectMeta, PutPayload};
 use object_store::path::Path;
+use object_store::{ObjectMeta, PutPayload};
 use serde::Serialize;
 use uuid::Uuid;
 
