@@ -88,7 +88,7 @@ pub struct JobView {
 
 /// A job of this process, as far as that knows.
 pub fn view_of_here(here: &Here) -> JobView {
-    let (status, progress) = match here.is_running() {
+    let (status, progress) = match here.has_lease() {
         true => (Status::Running, of_snapshot(here.progress.now())),
         false => (Status::Queued, at("queued", 0.0)),
     };
@@ -101,7 +101,7 @@ pub fn view_of_here(here: &Here) -> JobView {
 /// 404 `unknown-job`; 503 if the store does not answer.
 pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
     // One that waits here may have been begun elsewhere.
-    if let Some(here) = here_of(app, owner, id).filter(|here| here.is_running()) {
+    if let Some(here) = here_of(app, owner, id).filter(|here| here.has_lease()) {
         return Ok(view_of_here(&here));
     }
     let (objects, name) = (&app.jobs.objects, app.keys.name_of(owner));

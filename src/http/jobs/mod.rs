@@ -70,7 +70,10 @@ pub struct Here {
     /// The last attempt at it when it came here. One that is newer when its turn comes is another process's.
     last: Option<(u32, SystemTime)>,
     pub progress: Arc<Progress>,
+    /// Whether it has a turn in this process.
     is_running: AtomicBool,
+    /// Whether its lease is in the store, so that each process says that it is running.
+    has_lease: AtomicBool,
     cancelled: CancellationToken,
     /// Cancelled when it is not here any more.
     over: CancellationToken,
@@ -166,6 +169,7 @@ impl Jobs {
             last,
             progress: Arc::default(),
             is_running: AtomicBool::new(false),
+            has_lease: AtomicBool::new(false),
             cancelled: CancellationToken::new(),
             over: CancellationToken::new(),
         });
@@ -249,6 +253,10 @@ impl Jobs {
 impl Here {
     fn is_running(&self) -> bool {
         self.is_running.load(Ordering::Relaxed)
+    }
+
+    fn has_lease(&self) -> bool {
+        self.has_lease.load(Ordering::Relaxed)
     }
 }
 

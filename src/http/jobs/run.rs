@@ -58,6 +58,8 @@ impl Runner {
             Ok(None) => return,
             Err(error) => return tracing::error!(job = %here.id, %error, "a job is put off"),
         };
+        // Other processes see it as well from here on.
+        here.has_lease.store(true, Ordering::Relaxed);
         let ended = tokio::select! {
             () = here.cancelled.cancelled() => Ok(Ended::Done),
             () = self.app.draining.cancelled() => Ok(Ended::Released),
