@@ -17,7 +17,7 @@ use gramian::numerics::function::posterior;
 use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::machine::instruction_set::InstructionSet;
 use gramian::numerics::observer::{Observer, Stage, Unobserved};
-use gramian::numerics::points::neighbours::Neighbours;
+use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::solver::{Solution, Solver, System};
 use gramian::numerics::sums::jets::{JetOrder, Jets};
 use gramian::numerics::sums::nodes::Nodes;
@@ -137,7 +137,7 @@ fn variances() {
 /// The k-d tree and a search for every point.
 fn neighbours() {
     let cloud = scattered(2000, 3, 1);
-    measured(|| Neighbours::of(&cloud).spacings(&cloud));
+    measured(|| Sampling::of(&cloud, &Unobserved)).unwrap();
 }
 
 /// Tree, local fits, jets at the points and orientation.
