@@ -27,7 +27,7 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours,
     Ok(Neighbours { dimension: cloud.dimension(), coordinates, points: order, starts, nodes })
 }
 
-/// The cloud with coordinates that are multiples of [`GRID`], as nearly every cloud is.
+/// The cloud with coordinates that are on the grid, as those of nearly every cloud are.
 fn on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>, NumericsError> {
     if is_on_grid(cloud.coordinates()) {
         return Ok(Cow::Borrowed(cloud));

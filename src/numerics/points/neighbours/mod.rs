@@ -18,7 +18,7 @@ const LEAF_SIZE: usize = 12;
 ///
 /// Points at the same coordinates are one position, so that the work of a search does not depend on how often a position is
 /// repeated. Positions whose squared distance underflows are one position as well: coordinates are rounded to multiples of
-/// [`grid::GRID`], which changes none above 1e-137. Two positions therefore never have the distance 0.
+/// 2⁻⁵¹¹ (grid.rs), which changes none above 1e-137. Two positions therefore never have the distance 0.
 ///
 /// Built in O(p log p) for p positions, by splits of the widest coordinate near its median. Ties of distance are broken by the
 /// smaller index of a point, so answers do not depend on the tree.
