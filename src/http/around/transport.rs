@@ -153,7 +153,7 @@ fn host_fault(request: &Request) -> Option<&'static str> {
     target.is_some_and(|target| *target != name).then_some("Host and the target of the request disagree")
 }
 
-/// What is wrong with other fields: two keys, of which programs may take either, and expectations that are
+/// The fault of other fields, if any: two keys, of which programs may take either, or an expectation that is
 /// not met.
 fn field_fault(headers: &HeaderMap) -> Option<&'static str> {
     if headers.get_all(header::AUTHORIZATION).iter().nth(1).is_some() {

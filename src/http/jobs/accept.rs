@@ -81,7 +81,7 @@ async fn accept(runner: Runner, request: Request) -> Result<Response, Problem> {
         return Ok(accepted(&entered.begin()?));
     };
     let fingerprint = fingerprint(&asked.request, &MEANT_HEADERS, &asked.body).await;
-    // Of equal requests at once one claims the key. The others find its job in the next turn, unless it was
+    // One of several equal requests claims the key. The others find its job in the next turn, unless it was
     // deleted meanwhile.
     for _ in 0..ATTEMPTS {
         let claim = match known(&app, owner, &key, &fingerprint).await? {

@@ -72,7 +72,7 @@ impl Runner {
             }
             let here = jobs.find(id);
             let Some(job) = jobs.objects.find_job(&name, id).await?.filter(JobObjects::is_open) else {
-                // It ended elsewhere.
+                // Another process has ended the job.
                 here.inspect(|here| here.cancelled.cancel());
                 jobs.objects.unmark_open(&name, id).await?;
                 continue;
@@ -228,8 +228,8 @@ mod tests {
     async fn what_a_process_left_behind_is_found_when_all_jobs_are_counted() {
         let runner = runner().await;
         let (objects, name) = (runner.app.jobs.objects.clone(), runner.name());
-        // One that an earlier version wrote says nowhere that it is open; one has ended, and says still that
-        // it is.
+        // A job of an earlier version has no mark that it is open. The other has ended, and its mark was
+        // left.
         let (open, ended) = (runner.put_job().await, runner.put_job().await);
         objects.unmark_open(&name, open).await.unwrap();
         runner.end(ended).await;
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(runner.app.jobs.kept.of(OWNER), HashSet::from([open, ended]));
         assert_eq!(runner.round().await.1, [open]);
         assert_eq!(objects.open_jobs(&name).await.unwrap(), [open]);
-        // One that somebody else deleted counts no more.
+        // Jobs that another process deleted are not counted.
         assert!(objects.delete_job(&name, ended).await.unwrap());
         runner.count(OWNER, &name).await.unwrap();
         assert_eq!(runner.app.jobs.kept.of(OWNER), HashSet::from([open]));
