@@ -35,6 +35,9 @@ const MAX_DIMENSION: usize = 3;
 struct Flags {
     /// Points of each cloud.
     n_points: usize,
+    /// Only the clouds whose names hold this.
+    #[arg(long, default_value = "")]
+    named: String,
     #[command(flatten)]
     config: Config,
 }
@@ -107,12 +110,12 @@ impl Server {
 
 #[tokio::main]
 async fn main() {
-    let Flags { n_points, config } = Flags::parse();
+    let Flags { n_points, named, config } = Flags::parse();
     let server = Server::start(config).await;
     let mut random: Vec<(usize, Vec<Timed>)> = Vec::new();
     println!("| {n_points} points | d | register, ms | over random | normals | interpolation |");
     println!("|---|---|---|---|---|---|");
-    for hostile in &HOSTILE {
+    for hostile in HOSTILE.iter().filter(|hostile| hostile.name.contains(&named)) {
         if !random.iter().any(|(dimension, _)| *dimension == hostile.dimension) {
             random.push((hostile.dimension, server.time(&hostile.ordinary(), n_points).await));
         }

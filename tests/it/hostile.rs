@@ -134,6 +134,21 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
     assert!(n_ended > 100, "{n_ended} requests were cut off, too few to see anything");
 }
 
+#[tokio::test]
+async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
+    let process = Process::start(&["--deadline-seconds", "2", "--threads", "2"]);
+    let client = reqwest::Client::new();
+    let few_positions = HOSTILE.iter().find(|hostile| hostile.name == "5 positions").unwrap();
+    // As many as there are threads and more, each of another size so that none is known.
+    let hostile = [57_000, 58_000, 59_000, 60_000].map(|n_points| few_positions.cloud(n_points));
+    let two_points = Cloud::new(vec![0.0, 1.0], 1).unwrap();
+    let clouds = hostile.iter().chain([&two_points]);
+    let answers =
+        futures_util::future::join_all(clouds.map(|cloud| register(&process, &client, cloud))).await;
+    let statuses: Vec<u16> = answers.iter().map(|(status, _)| *status).collect();
+    assert_eq!(statuses, [201; 5]);
+}
+
 /// The least time of three that looking at the neighbours of a cloud takes, seconds.
 fn seconds_to_sample(cloud: &Cloud) -> f64 {
     let time = |_| {

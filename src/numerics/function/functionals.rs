@@ -187,7 +187,7 @@ pub(crate) fn deviations(
         let columns = &mut buffer[..n * block.len()];
         covariances.fill(&block, queries, columns);
         observer.enter(Stage::Solve);
-        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()))?;
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()), observer)?;
         let variance = |(column, functional): (&[f64], &JetFunctional)| {
             let explained = ColRef::from_slice(column).squared_norm_l2();
             let unexplained = of_mean.as_ref().map(|mean| {

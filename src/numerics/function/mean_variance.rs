@@ -8,6 +8,7 @@ use faer::{Mat, MatMut};
 use super::functionals::JetFunctional;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::dot;
+use crate::numerics::observer::Unobserved;
 use crate::numerics::solver::Solver;
 use crate::numerics::solver::trend::{Basis, Trend, solve_gram};
 
@@ -28,7 +29,7 @@ impl<'a> MeanVariance<'a> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();
         let mut whitened = basis.columns(solver.cloud());
-        solver.whiten_in_place(MatMut::from_column_major_slice_mut(&mut whitened, n, p))?;
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(&mut whitened, n, p), &Unobserved)?;
         let gram = Mat::from_fn(p, p, |a, b| dot(&whitened[a * n..][..n], &whitened[b * n..][..n]));
         let inverse = solve_gram(&gram, Mat::identity(p, p)).ok_or(NumericsError::MeanNotDetermined)?;
         Ok(Self { basis, whitened, inverse, n_points: n })

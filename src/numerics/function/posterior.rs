@@ -215,7 +215,7 @@ fn whitened_cross_gram(
     fill_cross_gram(nodes, solver.kernel(), queries, columns, observer)?;
     observer.enter(Stage::Solve);
     let (n, m) = (solver.n_points(), queries.n_points());
-    solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m))
+    solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m), observer)
 }
 
 fn check_is_rounding(

@@ -110,7 +110,7 @@ fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>
         let columns = &mut buffer[..n * n_columns];
         columns.fill(0.0);
         columns.chunks_exact_mut(n).enumerate().for_each(|(k, column)| column[first + k] = 1.0);
-        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, n_columns))?;
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, n_columns), observer)?;
         let norm = |column: &[f64]| ColRef::from_slice(column).squared_norm_l2();
         diagonal.extend(columns.par_chunks_exact(n).map(norm).collect::<Vec<f64>>());
     }

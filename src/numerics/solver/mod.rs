@@ -163,9 +163,13 @@ impl Solver {
     /// Overwrites the columns of `[n, k]` by `L⁻¹` times them, `LLᵀ = K + αI`.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64.
-    pub(crate) fn whiten_in_place(&self, columns: MatMut<'_, f64>) -> Result<(), NumericsError> {
-        self.as_dense().whiten_in_place(columns)
+    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64; [`NumericsError::Cancelled`].
+    pub(crate) fn whiten_in_place(
+        &self,
+        columns: MatMut<'_, f64>,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
+        self.as_dense().whiten_in_place(columns, observer)
     }
 
     /// The diagonal of `(K + αI)⁻¹`, `[n]`.

@@ -237,7 +237,7 @@ fn nothing_of_what_was_in_the_memory_before_is_read() {
         let solve = |solver: &Solver| {
             let mut columns = Mat::from_fn(1300, n_columns, |i, j| (0.1 * (i * (j + 1)) as f64).sin());
             solver.solve_in_place(columns.as_mut());
-            solver.whiten_in_place(columns.as_mut()).unwrap();
+            solver.whiten_in_place(columns.as_mut(), &Unobserved).unwrap();
             columns
         };
         assert_eq!(solve(&recycled), solve(&fresh));

@@ -1,7 +1,7 @@
 //! The neighbourhoods of several queries side by side, one in each lane.
 
 use super::kriging::COLUMNS;
-use crate::numerics::points::neighbours::Neighbour;
+use crate::numerics::points::neighbours::{Neighbour, on_grid};
 use crate::numerics::solver::System;
 
 /// The nearest points of a few queries, as many for each.
@@ -11,7 +11,8 @@ pub(super) struct Batch {
     pub count: usize,
     lanes: usize,
     /// From the nearest point to each of the others as the kernel stretches it, `[d, places, lanes]`, unit L: differences are what distances
-    /// are made of, and from a query far away all of them would be the same.
+    /// are made of, and from a query far away all of them would be the same. On the grid of the neighbours, whose step is 1e-14 of the shortest
+    /// length scale there is, so that no square is subnormal.
     pub points: Vec<f64>,
     /// From the nearest point to the query, likewise, `[d, lanes]`.
     pub query: Vec<f64>,
@@ -52,12 +53,12 @@ impl Batch {
         let (lanes, n_places, kernel) = (self.lanes, self.n_places(), system.kernel());
         let Some(origin) = nearest.first().map(|first| system.cloud().point(first.point)) else { return };
         for (axis, (x, o)) in x.iter().zip(origin).enumerate() {
-            self.query[axis * lanes + lane] = (x - o) * kernel.stretch(axis);
+            self.query[axis * lanes + lane] = on_grid((x - o) * kernel.stretch(axis));
         }
         for (j, neighbour) in nearest.iter().enumerate() {
             let at = j * lanes + lane;
             for (axis, (x, o)) in system.cloud().point(neighbour.point).iter().zip(origin).enumerate() {
-                self.points[axis * n_places * lanes + at] = (x - o) * kernel.stretch(axis);
+                self.points[axis * n_places * lanes + at] = on_grid((x - o) * kernel.stretch(axis));
             }
             self.values[at] = values[neighbour.point];
             self.noise[at] = system.regularization().at(neighbour.point);

@@ -21,6 +21,10 @@ pub(super) const COLUMNS: usize = 4;
 /// fallback of the dense solver stops there as well.
 const DEPENDENT: f64 = 64.0 * f64::EPSILON;
 
+/// 2⁻⁵⁰⁰. Correlations below this count as 0, and what is left of a covariance once less than this times √k₀ is: no product of two others
+/// is then subnormal, for which some processors take a hundred cycles.
+const VANISHES: f64 = f64::from_bits((1023 - 500) << 52);
+
 /// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query, then those of derivatives.
 const N_ROWS: usize = 5;
 const VALUES: usize = 0;
@@ -124,6 +128,12 @@ struct Factored<'a, S: Simd> {
     matrix: &'a mut [S::f64s],
 }
 
+/// `variance · φ`, or 0 where that is negligible.
+#[inline(always)]
+fn covariance<S: Simd>(kernel: &Kernel, correlation: Pack<S>) -> Pack<S> {
+    correlation.select_below(VANISHES, 0.0, kernel.variance()) * correlation
+}
+
 /// `variance · φ` over squared distances that are there already.
 struct Values<'a, S: Simd> {
     simd: S,
@@ -141,7 +151,7 @@ impl<S: Simd> Pairs<S> for Values<'_, S> {
 
     #[inline(always)]
     fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        (profile[0] * self.kernel.variance()).write(self.entries, at);
+        covariance(self.kernel, profile[0]).write(self.entries, at);
     }
 }
 
@@ -164,7 +174,7 @@ impl<S: Simd> Pairs<S> for Derivatives<'_, S> {
 
     #[inline(always)]
     fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        (profile[0] * self.kernel.variance()).write(self.entries, at);
+        covariance(self.kernel, profile[0]).write(self.entries, at);
         profile[1].write(self.slopes, at);
         profile[2].write(self.bends, at);
     }
@@ -366,6 +376,9 @@ impl<S: Simd> Factored<'_, S> {
     #[inline(always)]
     fn finish(&mut self, first: usize, column: usize, pivot: usize, sums: [Pack<S, 1>; COLUMNS]) {
         let mut entries = [self.splat(0.0); COLUMNS];
+        // Values have a unit of their own, and may be small.
+        let is_values = (self.row(VALUES)..self.row(CROSS)).contains(&first);
+        let least = if is_values { 0.0 } else { VANISHES * self.kernel.at_zero().sqrt() };
         for c in 0..COLUMNS {
             let above = triangle(column + c) + column;
             let mut entry = self.at(first + c) - sums[c];
@@ -377,6 +390,7 @@ impl<S: Simd> Factored<'_, S> {
                 return;
             }
             entries[c] = entry * self.at(above + c);
+            entries[c] = entries[c] * entries[c].abs().select_below(least, 0.0, 1.0);
             entries[c].write(self.matrix, first + c);
         }
     }

@@ -102,6 +102,31 @@ fn a_small_cloud_has_the_dense_deviations_of_derivatives_on_every_instruction_se
     }
 }
 
+#[test]
+fn covariances_and_distances_that_are_next_to_nothing_change_no_answer() {
+    let comb = |i: usize| [3.0 * (i % 7) as f64, 80.0 * i as f64 * (0.37 * i as f64).sin()];
+    let specks = |i: usize| [1e-160 * (i % 11) as f64, 1e-157 * (i as f64).sin()];
+    for cloud in [(0..127).flat_map(comb).collect(), (0..127).flat_map(specks).collect()] {
+        let cloud = Cloud::new(cloud, 2).unwrap();
+        let values: Vec<f64> = (0..127).map(|i| (0.7 * f64::from(i)).sin()).collect();
+        for family in all_families() {
+            let dense = Arc::new(Solver::dense(system(&cloud, family, 1e-2), &Unobserved).unwrap());
+            let rounding = 100.0 * 127.0 * f64::EPSILON / dense.reciprocal_condition();
+            let latent = variances(&dense, &cloud, &Unobserved).unwrap().latent;
+            let dense = Interpolant::fit(dense, &values, &Unobserved).unwrap();
+            let dense = dense.at(&cloud, JetOrder::Value, &Unobserved).unwrap();
+            for set in InstructionSet::available() {
+                let request = MovingRequest { order: JetOrder::Value, ..EVERYTHING };
+                let found = moving(system(&cloud, family, 1e-2));
+                let found = found.at_with(set, &values, &cloud, request, &Unobserved).unwrap();
+                let context = format!("{family:?}, {}", set.name());
+                are_close(&found.jets.values(), &dense.values(), rounding, &context);
+                are_close(&found.variances.unwrap().latent, &latent, rounding, &context);
+            }
+        }
+    }
+}
+
 fn are_close(found: &[f64], expected: &[f64], tolerance: f64, context: &str) {
     let largest = expected.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     assert_eq!(found.len(), expected.len());

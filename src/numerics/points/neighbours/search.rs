@@ -90,18 +90,12 @@ impl Search<'_> {
         if candidate.squared_distance > self.reach {
             return;
         }
-        if self.found.len() < self.count {
-            self.found.push(candidate);
-        } else if self.is_before(&candidate, &self.found[self.count - 1]) {
-            self.found[self.count - 1] = candidate;
-        } else {
+        let place = self.found.partition_point(|found| !self.is_before(&candidate, found));
+        if place == self.count {
             return;
         }
-        let mut place = self.found.len() - 1;
-        while place > 0 && self.is_before(&candidate, &self.found[place - 1]) {
-            self.found.swap(place - 1, place);
-            place -= 1;
-        }
+        self.found.truncate(self.count - 1);
+        self.found.insert(place, candidate);
         if self.found.len() == self.count {
             self.reach = self.found[self.count - 1].squared_distance;
         }

@@ -237,7 +237,7 @@ fn solve_below(l: MatRef<'_, f64>, mut below: MatMut<'_, f64>, observer: &dyn Ob
 }
 
 /// The first index and the length of parts of n, each of [`FLOPS_PER_CHECKPOINT`] at most or as short as matrix products are fast.
-fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
     let most = ((FLOPS_PER_CHECKPOINT / flops_each) as usize).max(LEAST_PIECE);
     let length = n.div_ceil(n.div_ceil(most).max(1)).max(1);
     (0..n).step_by(length).map(move |first| (first, length.min(n - first)))

@@ -9,6 +9,7 @@ mod substitution;
 
 use std::sync::Arc;
 
+use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, Par};
 
 use super::condition::estimate_norm1;
@@ -19,8 +20,8 @@ use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::numerics::machine::pages::SpareBuffer;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use cholesky::Cholesky;
 pub(in crate::numerics) use cholesky::factorize_in_place;
+use cholesky::{Cholesky, pieces};
 pub use factor::{Factor, FactorBuilder};
 use pivoted_cholesky::PivotedCholesky;
 
@@ -178,9 +179,17 @@ impl Dense {
     /// Overwrites the columns of `[n, k]` by `L⁻¹` times them.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
-    pub(super) fn whiten_in_place(&self, columns: MatMut<'_, f64>) -> Result<(), NumericsError> {
-        self.cholesky()?.whiten_in_place(columns);
+    /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor; [`NumericsError::Cancelled`].
+    pub(super) fn whiten_in_place(
+        &self,
+        mut columns: MatMut<'_, f64>,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
+        let (n, cholesky) = (self.system.n_points(), self.cholesky()?);
+        for (first, count) in pieces(columns.ncols(), (n * n) as f64) {
+            observer.checkpoint()?;
+            cholesky.whiten_in_place(columns.rb_mut().subcols_mut(first, count));
+        }
         Ok(())
     }
 
