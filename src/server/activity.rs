@@ -51,6 +51,8 @@ pub struct Activity {
     is_broken: AtomicBool,
     /// An answer was given before its request had been read.
     is_answered_early: AtomicBool,
+    /// All requests that have begun were received to their end.
+    has_whole_requests: AtomicBool,
     fault: AtomicU8,
 }
 
@@ -90,6 +92,7 @@ impl Activity {
             is_draining: false.into(),
             is_broken: false.into(),
             is_answered_early: false.into(),
+            has_whole_requests: true.into(),
             fault: 0.into(),
         })
     }
@@ -149,6 +152,16 @@ impl Activity {
 
     pub fn answer_early(&self) {
         self.is_answered_early.store(true, Relaxed);
+    }
+
+    /// What was received last ends with a request, or amid one.
+    pub fn receive(&self, is_whole: bool) {
+        self.has_whole_requests.store(is_whole, Relaxed);
+    }
+
+    /// Whether no request is still on its way.
+    pub fn has_whole_requests(&self) -> bool {
+        self.has_whole_requests.load(Relaxed)
     }
 
     /// Whether the client may still be sending what was refused.

@@ -7,6 +7,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::body::Body;
 use hyper::body::{Body as _, Incoming};
+use hyper::header::{CONNECTION, CONTENT_LENGTH, HeaderValue};
 use hyper::rt::Executor;
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response};
@@ -169,12 +170,16 @@ async fn exchange(
     let received = arrival.clone();
     let mut request = request.map(|body| Body::new(Receiving { body, arrival: received }));
     request.extensions_mut().insert(arrival.clone());
-    let response = router.oneshot(request).await?;
+    let mut response = router.oneshot(request).await?;
     let pace = STREAM.try_with(Arc::clone).ok();
     if pace.is_none() && !arrival.is_read() {
         in_flight.activity().answer_early();
+        // hyper ends the connection unless the rest of the body is there already, so the client must not send its next request on it.
+        if !in_flight.activity().has_whole_requests() {
+            response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
+        }
     }
-    let length = response.headers().get(hyper::header::CONTENT_LENGTH);
+    let length = response.headers().get(CONTENT_LENGTH);
     let n_announced = length.and_then(|length| length.to_str().ok()?.parse().ok());
     Ok(response.map(|body| Sending::new(body, in_flight, pace, is_sent, n_announced)))
 }

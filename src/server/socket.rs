@@ -107,6 +107,7 @@ impl AsyncRead for Socket {
         if let Err(fault) = self.scanner.scan(received) {
             self.activity.distrust(fault);
         }
+        self.activity.receive(self.scanner.is_between_requests());
         outcome
     }
 }

@@ -391,6 +391,8 @@ async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
             let mut stream = sent(&server, head).await;
             let refused = answer(&mut stream).await;
             assert_eq!(refused.status, 413, "{path}");
+            // A client that keeps its connections would send the next request into one that ends.
+            assert_eq!(refused.headers["connection"], "close");
             contract::check("POST", path, &refused);
         }
     }
