@@ -51,7 +51,7 @@ pub struct Activity {
     is_broken: AtomicBool,
     /// An answer was given before its request had been read.
     is_answered_early: AtomicBool,
-    /// All requests that have begun were received to their end.
+    /// See [`Activity::has_whole_requests`].
     has_whole_requests: AtomicBool,
     fault: AtomicU8,
 }
@@ -154,12 +154,12 @@ impl Activity {
         self.is_answered_early.store(true, Relaxed);
     }
 
-    /// What was received last ends with a request, or amid one.
+    /// Bytes came from the client: up to the end of a request, or not.
     pub fn receive(&self, is_whole: bool) {
         self.has_whole_requests.store(is_whole, Relaxed);
     }
 
-    /// Whether no request is still on its way.
+    /// Whether all requests that have begun were received to their end.
     pub fn has_whole_requests(&self) -> bool {
         self.has_whole_requests.load(Relaxed)
     }

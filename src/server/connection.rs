@@ -166,6 +166,7 @@ async fn exchange(
     if request.body().is_end_stream() {
         arrival.set_read();
     }
+    let has_length = request.body().size_hint().exact().is_some();
     let is_sent = request.method() != Method::HEAD;
     let received = arrival.clone();
     let mut request = request.map(|body| Body::new(Receiving { body, arrival: received }));
@@ -173,9 +174,11 @@ async fn exchange(
     let mut response = router.oneshot(request).await?;
     let pace = STREAM.try_with(Arc::clone).ok();
     if pace.is_none() && !arrival.is_read() {
-        in_flight.activity().answer_early();
-        // hyper ends the connection unless the rest of the body is there already, so the client must not send its next request on it.
-        if !in_flight.activity().has_whole_requests() {
+        let activity = in_flight.activity();
+        activity.answer_early();
+        // hyper ends the connection unless it gets to the end of the body in one step, and then the client must not send
+        // another request: chunks take a step each, and a body of known length one if it was received.
+        if !(has_length && activity.has_whole_requests()) {
             response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
         }
     }

@@ -292,14 +292,17 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
             String::new(),
             LIVE.repeat(2),
             "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\n{}".to_owned(),
-            format!("POST /v1/clouds HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n{chunks}"),
+            // Chunks that are not read would end the connection.
+            format!(
+                "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n{chunks}"
+            ),
         ];
         for before in before {
             let mut stream = connect(&server).await;
             if !before.is_empty() {
                 stream.write_all(before.as_bytes()).await.unwrap();
                 for _ in 0..before.matches(" HTTP/1.1").count() {
-                    assert!([200, 415].contains(&answer(&mut stream).await.status));
+                    assert!([200, 415, 422].contains(&answer(&mut stream).await.status));
                 }
             }
             // What follows must not be taken for a request.
@@ -408,6 +411,37 @@ async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
     }
     let text = rest_of(&mut stream).await;
     assert!(text.starts_with("HTTP/1.1 413 "), "{text}");
+}
+
+#[tokio::test]
+async fn an_answer_before_its_body_is_read_ends_the_connection_only_if_it_says_so() {
+    let server = Server::start().await;
+    // None has a media type, so that the head is enough to refuse it.
+    let head = "POST /v1/clouds HTTP/1.1\r\nHost: x\r\n";
+    let spaces = " ".repeat(3000);
+    let known = format!("{head}Content-Length: 3000\r\n\r\n");
+    let chunk = format!("bb8\r\n{spaces}\r\n");
+    let chunked = |n: usize| format!("{head}Transfer-Encoding: chunked\r\n\r\n{}0\r\n\r\n", chunk.repeat(n));
+    for (request, may_go_on) in [
+        (format!("{known}{spaces}"), true),
+        (known.clone(), false),
+        (format!("{known}{}", &spaces[..1000]), false),
+        (chunked(1), false),
+        (chunked(2), false),
+        (chunked(50), false),
+    ] {
+        for _ in 0..20 {
+            let mut stream = sent(&server, &request).await;
+            let refused = answer(&mut stream).await;
+            assert_eq!(refused.status, 415);
+            let ends = refused.headers.get("connection").is_some_and(|value| value == "close");
+            assert!(ends || may_go_on, "{request}");
+            if !ends {
+                stream.write_all(LIVE.as_bytes()).await.unwrap();
+                assert_eq!(answer(&mut stream).await.status, 200);
+            }
+        }
+    }
 }
 
 /// A request with the end of what its client sends right behind it.

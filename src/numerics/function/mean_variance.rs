@@ -29,6 +29,7 @@ impl<'a> MeanVariance<'a> {
         let (basis, n) = (trend.basis(), solver.n_points());
         let p = basis.n_functions();
         let mut whitened = basis.columns(solver.cloud());
+        // A handful of columns, which take a moment.
         solver.whiten_in_place(MatMut::from_column_major_slice_mut(&mut whitened, n, p), &Unobserved)?;
         let gram = Mat::from_fn(p, p, |a, b| dot(&whitened[a * n..][..n], &whitened[b * n..][..n]));
         let inverse = solve_gram(&gram, Mat::identity(p, p)).ok_or(NumericsError::MeanNotDetermined)?;

@@ -163,7 +163,8 @@ impl Solver {
     /// Overwrites the columns of `[n, k]` by `L⁻¹` times them, `LLᵀ = K + αI`.
     ///
     /// # Errors
-    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64; [`NumericsError::Cancelled`].
+    /// [`NumericsError::NotPositiveDefinite`] where the matrix has no such factor in float64;
+    /// [`NumericsError::Cancelled`].
     pub(crate) fn whiten_in_place(
         &self,
         columns: MatMut<'_, f64>,

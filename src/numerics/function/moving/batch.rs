@@ -10,9 +10,11 @@ pub(super) struct Batch {
     /// Points of a neighbourhood.
     pub count: usize,
     lanes: usize,
-    /// From the nearest point to each of the others as the kernel stretches it, `[d, places, lanes]`, unit L: differences are what distances
-    /// are made of, and from a query far away all of them would be the same. On the grid of the neighbours, whose step is 1e-14 of the shortest
-    /// length scale there is, so that no square is subnormal.
+    /// From the nearest point to each of the others as the kernel stretches it, `[d, places, lanes]`, unit L:
+    /// differences are what distances are made of, and from a query far away all of them would be the same.
+    ///
+    /// Differences are rounded to the grid of the neighbours, so that no square of one is subnormal. The step of the
+    /// grid is 1e-14 of the shortest length scale that a kernel takes.
     pub points: Vec<f64>,
     /// From the nearest point to the query, likewise, `[d, lanes]`.
     pub query: Vec<f64>,

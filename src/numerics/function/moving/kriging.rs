@@ -21,8 +21,10 @@ pub(super) const COLUMNS: usize = 4;
 /// fallback of the dense solver stops there as well.
 const DEPENDENT: f64 = 64.0 * f64::EPSILON;
 
-/// 2⁻⁵⁰⁰. Correlations below this count as 0, and what is left of a covariance once less than this times √k₀ is: no product of two others
-/// is then subnormal, for which some processors take a hundred cycles.
+/// 2⁻⁵⁰⁰: correlations below this count as 0, as do entries of the factor below this times √k₀.
+///
+/// With a variance k₀ near 1 no product of two other entries is subnormal then. Some processors take a hundred cycles
+/// for each that is. Values that are tiny beside the greatest of their neighbourhood may still lead there.
 const VANISHES: f64 = f64::from_bits((1023 - 500) << 52);
 
 /// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query, then those of derivatives.

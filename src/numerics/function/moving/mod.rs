@@ -5,6 +5,8 @@
 //! values alone (Chilès and Delfiner 2012, sec. 3.6). A cloud of no more than [`NEIGHBOURS`] points is its own
 //! neighbourhood everywhere, and this is the dense posterior.
 //!
+//! Points whose correlation with the query is below 2⁻⁵⁰⁰ do not count: far from all points the mean is exactly that of the process.
+//!
 //! Gradient and Hessian are those of the function that the neighbours define: exact for it, but the means of two queries with other
 //! neighbours are not values of one function.
 

@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::cmp::Ordering;
 
-use super::grid::{is_on_grid, rounded};
+use super::grid::{is_on_grid, on_grid};
 use super::{LEAF_SIZE, Neighbours, Node};
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 
 pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours, NumericsError> {
-    let cloud = on_grid(cloud)?;
+    let cloud = cloud_on_grid(cloud)?;
     let cloud = cloud.as_ref();
     let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
     let mut builder = Builder { cloud, observer, nodes: Vec::new(), starts: Vec::new() };
@@ -28,11 +28,11 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours,
 }
 
 /// The cloud with coordinates that are on the grid, as those of nearly every cloud are.
-fn on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>, NumericsError> {
+fn cloud_on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>, NumericsError> {
     if is_on_grid(cloud.coordinates()) {
         return Ok(Cow::Borrowed(cloud));
     }
-    let coordinates = cloud.coordinates().iter().map(|&x| rounded(x)).collect();
+    let coordinates = cloud.coordinates().iter().map(|&x| on_grid(x)).collect();
     Cloud::new(coordinates, cloud.dimension()).map(Cow::Owned)
 }
 

@@ -7,12 +7,12 @@ pub(super) const GRID: f64 = f64::from_bits((1023 - 511) << 52);
 const FINER_THAN_GRID: f64 = GRID * (1u64 << 53) as f64;
 
 /// The nearest multiple of [`GRID`].
-pub(crate) fn rounded(x: f64) -> f64 {
+pub(crate) fn on_grid(x: f64) -> f64 {
     // GRID is a power of two, so that `round` alone changes digits. Adding 0 turns −0 into 0.
     if x.abs() < FINER_THAN_GRID { (x / GRID).round() * GRID + 0.0 } else { x }
 }
 
 /// Whether rounding changes no coordinate.
 pub(super) fn is_on_grid(coordinates: &[f64]) -> bool {
-    coordinates.iter().all(|&x| x == rounded(x))
+    coordinates.iter().all(|&x| x == on_grid(x))
 }

@@ -11,7 +11,7 @@ use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
 
-pub(crate) use grid::rounded as on_grid;
+pub(crate) use grid::on_grid;
 
 /// Positions per leaf: scanning 12 of them costs about what two more levels of descent do.
 const LEAF_SIZE: usize = 12;

@@ -1,6 +1,6 @@
 //! The search for the nearest positions.
 
-use super::grid::{is_on_grid, rounded};
+use super::grid::{is_on_grid, on_grid};
 use super::{Neighbour, Neighbours, Node};
 use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::points::cloud::squared_distance;
@@ -24,12 +24,12 @@ impl Neighbours {
         if count == 0 {
             return;
         }
-        let on_grid: Small;
+        let moved: Small;
         let x = if is_on_grid(x) {
             x
         } else {
-            on_grid = x.iter().map(|&x| rounded(x)).collect();
-            &on_grid
+            moved = x.iter().map(|&x| on_grid(x)).collect();
+            &moved
         };
         let (offsets, reach) = (zeros(self.dimension), f64::INFINITY);
         let mut search = Search { tree: self, x, count, offsets, reach, found };
