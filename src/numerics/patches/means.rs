@@ -5,10 +5,10 @@ use std::sync::Arc;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
+use crate::numerics::points::cells::Cells;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::sampling::Sampling;
-use crate::numerics::points::thinning::widest_axis;
 
 /// Points, or means of points, with their neighbours.
 ///
@@ -30,15 +30,14 @@ pub(crate) struct Means {
 }
 
 impl Support {
-    /// Means of at most `group` points, by halving the cloud across its widest side until that is so.
+    /// Means of cells of at most `group` points.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let d = cloud.dimension();
-        let mut order: Vec<u32> = (0..cloud.n_points() as u32).collect();
         let mut found = Gathered::default();
-        halve(cloud, &mut order, group, &mut found);
+        Cells::of_all(cloud, group).iter().for_each(|cell| gather(cloud, cell, &mut found));
         let cloud = Cloud::new(found.coordinates, d)?;
         let neighbours = Neighbours::of(&cloud, observer)?;
         Ok(Self::Means(Means { cloud, neighbours, counts: found.counts, moments: found.moments }))
@@ -107,20 +106,6 @@ struct Gathered {
     coordinates: Vec<f64>,
     counts: Vec<f64>,
     moments: Vec<f64>,
-}
-
-fn halve(cloud: &Cloud, order: &mut [u32], group: usize, found: &mut Gathered) {
-    if order.len() <= group {
-        gather(cloud, order, found);
-        return;
-    }
-    let axis = widest_axis(cloud, order);
-    let coordinate = |point: u32| cloud.point(point as usize)[axis];
-    let middle = order.len() / 2;
-    order.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)).then(a.cmp(&b)));
-    let (left, right) = order.split_at_mut(middle);
-    halve(cloud, left, group, found);
-    halve(cloud, right, group, found);
 }
 
 fn gather(cloud: &Cloud, points: &[u32], found: &mut Gathered) {

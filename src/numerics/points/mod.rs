@@ -1,5 +1,6 @@
 //! What positions alone say, without a kernel: distances, neighbours, quadrics, noise.
 
+pub(crate) mod cells;
 pub mod cloud;
 pub mod duplicates;
 pub mod neighbours;
