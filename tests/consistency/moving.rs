@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use gramian::numerics::function::deviations::JetDeviations;
 use gramian::numerics::function::interpolant::Interpolant;
 use gramian::numerics::function::moving::{Moving, MovingRequest};
 use gramian::numerics::function::posterior::variances;
@@ -10,6 +11,8 @@ use gramian::numerics::kernel::{Family, Kernel};
 use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::sampling::Sampling;
+use gramian::numerics::selection::{Noise, Observed, learn_mean};
+use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::solver::{Solver, System};
 use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::sums::regularization::Regularization;
@@ -46,7 +49,12 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         let dense = dense.at(&queries, JetOrder::Gradient, &Unobserved).unwrap();
         let deviations: Vec<f64> =
             variances(&solver, &queries, &Unobserved).unwrap().latent.iter().map(|v| v.sqrt()).collect();
-        let request = MovingRequest { order: JetOrder::Gradient, has_variances: true, has_deviations: false };
+        let request = MovingRequest {
+            order: JetOrder::Gradient,
+            has_variances: true,
+            has_deviations: false,
+            trend: None,
+        };
         let found = Moving::new(system(), sampling.clone(), &Unobserved)
             .unwrap()
             .at(&values, &queries, request, &Unobserved)
@@ -64,5 +72,55 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         // Fewer observations say less.
         assert!((0..m).all(|q| latent[q] >= deviations[q].powi(2) * (1.0 - 1e-9)), "{family:?}");
         assert_eq!(found.n_dependent, 0);
+    }
+}
+
+#[test]
+fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
+    let mut random = Random(12);
+    // As many points as a neighbourhood has at most: both posteriors are given the same values.
+    let cloud = Arc::new(random_cube(100, 3, &mut random));
+    let values = noisy_values(&cloud, 0.1, &mut random);
+    // Among the points, and so far away that nothing but the mean is left.
+    let mut queries = random_cube(20, 3, &mut random).coordinates().to_vec();
+    queries.extend([9.0, -7.0, 8.0]);
+    let queries = Cloud::new(queries, 3).unwrap();
+    let kernel = Kernel::new(Family::Matern { order: 2 }, 0.5, 1.7).unwrap();
+    let system = || System::new(cloud.clone(), kernel.clone(), Regularization::Uniform(0.01)).unwrap();
+    let solver = Arc::new(Solver::dense(system(), &Unobserved).unwrap());
+    let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+    let moving = Moving::new(system(), sampling.clone(), &Unobserved).unwrap();
+    for mean in [Mean::Constant, Mean::Linear] {
+        let noise = Noise::Uniform(0.01);
+        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let trend = learn_mean(observed, &kernel, &Unobserved).unwrap().trend;
+        let request = MovingRequest {
+            order: JetOrder::Hessian,
+            has_variances: false,
+            has_deviations: true,
+            trend: trend.as_ref(),
+        };
+        let found = moving.at(&values, &queries, request, &Unobserved).unwrap();
+        let dense = Interpolant::fit_with_mean(solver.clone(), &values, mean, &Unobserved).unwrap();
+        let bars = JetDeviations::of(&dense, 1.0, &queries, 2, &Unobserved).unwrap();
+        let jets = dense.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
+        let near = |found: &[f64], expected: &[f64]| {
+            // Both lose some digits of what is left of a variance.
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < 1e-8 * (1.0 + expected.abs()),
+                    "{mean:?}: {found} {expected}"
+                );
+            }
+        };
+        near(&found.jets.values(), &jets.values());
+        near(&found.jets.gradients(), &jets.gradients());
+        let deviations = found.deviations.unwrap();
+        near(&deviations.values, &bars.values);
+        near(&deviations.gradients, &bars.gradients);
+        near(&deviations.hessians, &bars.hessians);
+        // Far away a mean that were known would leave the deviation of the process.
+        assert!(deviations.values[20] > 1.01 * 1.7f64.sqrt(), "{mean:?}");
     }
 }

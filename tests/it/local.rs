@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde_json::{Value, json};
 
+use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
 /// One curvature of 1 within so many of its deviations at every query.
@@ -93,24 +94,32 @@ async fn beyond_the_dense_limit_auto_regresses_locally() {
 }
 
 #[tokio::test]
-async fn sparse_matrices_apply_as_the_operators_do() {
+async fn sparse_matrices_agree_with_the_operators() {
     let server = Server::start().await;
     let points = fibonacci_sphere(600);
     let body = json!({"cloud": {"points": points}, "solver": "local"});
     let matrix = server.post("/v1/laplace-beltrami/sparse-matrix", &body).await.expect_ok();
     assert_eq!(numbers(&matrix["shape"]), [600.0, 600.0]);
+    assert_eq!(matrix["diagnostics"]["stencils"]["nearest"], 600);
     let [indptr, indices, data] = ["indptr", "indices", "data"].map(|name| numbers(&matrix[name]));
     assert_eq!((indptr.len(), indptr[600] as usize, data.len()), (601, indices.len(), indices.len()));
     let values: Vec<f64> = points.iter().map(|x| (PI * x[2]).sin()).collect();
-    let applied = json!({"cloud": {"points": points}, "solver": "local", "values": values});
-    let applied = numbers(&server.post("/v1/laplace-beltrami", &applied).await.expect_ok()["values"]);
+    let request = json!({
+        "cloud": {"points": points}, "solver": "local", "values": values, "include": ["deviations"],
+    });
+    let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
+    let deviations = numbers(&applied["value_deviations"]);
+    let applied = numbers(&applied["values"]);
+    // The operator reaches π² + 2π, and six hundred points leave less than a hundredth of it.
+    let scale = PI * PI + 2.0 * PI;
+    assert!(deviations.iter().all(|deviation| *deviation < 0.01 * scale), "{deviations:?}");
     for (row, expected) in applied.iter().enumerate() {
         let range = indptr[row] as usize..indptr[row + 1] as usize;
         let columns = &indices[range.clone()];
         assert!(columns.windows(2).all(|pair| pair[0] < pair[1]));
         let found: f64 =
             data[range].iter().zip(columns).map(|(w, &column)| w * values[column as usize]).sum();
-        assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
+        assert!((found - expected).abs() < 0.03 * scale, "{found} and {expected}");
     }
     let gradient = server.post("/v1/surface-gradient/sparse-matrix", &body).await.expect_ok();
     assert_eq!(numbers(&gradient["shape"]), [3.0, 600.0, 600.0]);
@@ -120,19 +129,19 @@ async fn sparse_matrices_apply_as_the_operators_do() {
 #[tokio::test]
 async fn too_few_points_for_an_operator_are_said_to_be() {
     let server = Server::start().await;
-    for (n, is_empty) in [(10, true), (20, false)] {
+    for n in [10, 16] {
         let angle = |i: usize| 2.0 * PI * i as f64 / n as f64;
         let points: Vec<[f64; 2]> = (0..n).map(|i| [angle(i).cos(), angle(i).sin()]).collect();
         let body = json!({"cloud": {"points": points}, "solver": "local"});
         let matrix = server.post("/v1/laplace-beltrami/sparse-matrix", &body).await.expect_ok();
-        assert_eq!(numbers(&matrix["indptr"])[n] == 0.0, is_empty);
+        assert!(numbers(&matrix["indptr"]).windows(2).all(|ends| ends[0] < ends[1]), "no row is empty");
         let values: Vec<f64> = points.iter().map(|x| x[0]).collect();
         let request = json!({"cloud": {"points": points}, "solver": "local", "values": values});
         let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
-        assert!(applied["values"].as_array().unwrap().iter().all(|value| value.is_null() == is_empty));
+        assert!(applied["values"].as_array().unwrap().iter().all(|value| value.is_number()));
         let slopes = server.post("/v1/surface-gradient", &request).await.expect_ok();
         let rows = slopes["gradients"].as_array().unwrap();
-        assert!(rows.len() == n && rows.iter().all(|row| row.is_null() == is_empty));
+        assert!(rows.len() == n && rows.iter().all(|row| row.is_array()));
         let gradient = server.post("/v1/surface-gradient/sparse-matrix", &body).await.expect_ok();
         assert_eq!(gradient["data"].as_array().unwrap().len(), 2);
         for answer in [matrix, applied] {
@@ -178,4 +187,64 @@ async fn eight_equal_requests_make_one_surface() {
         futures_util::future::join_all(asked).await.into_iter().map(|answer| answer.expect_ok()).collect();
     let first = numbers(&answers[0]["mean_curvatures"]);
     assert!(answers.iter().all(|answer| numbers(&answer["mean_curvatures"]) == first));
+}
+
+#[tokio::test]
+async fn operators_of_noisy_values_have_bars_that_hold_whatever_the_solver() {
+    let server = Server::start().await;
+    let (points, mut random) = (fibonacci_sphere(2000), Random(7));
+    // Δz = −2z; noise of 2 % of the field.
+    let values: Vec<f64> = points.iter().map(|x| x[2] + 0.012 * random.normal()).collect();
+    let body = json!({
+        "cloud": {"points": points}, "values": values, "solver": "local", "include": ["deviations"],
+    });
+    let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
+    assert_eq!(answer["diagnostics"]["solver"], "local");
+    let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_deviations"]));
+    let off = |i: usize| (found[i] + 2.0 * points[i][2]).abs();
+    let n_within = (0..2000).filter(|&i| off(i) <= 1.96 * bars[i]).count();
+    assert!(n_within >= 1760, "{n_within} of 2000 within their bars");
+    // Stencils would be off by some hundred: they differentiate the noise.
+    assert!((0..2000).all(|i| off(i) < 0.5));
+}
+
+#[tokio::test]
+async fn values_far_from_their_nodes_are_flagged_however_near_the_surface_is() {
+    let server = Server::start().await;
+    // The nodes are on the upper half of a sphere that is sampled all over.
+    let nodes: Vec<_> = fibonacci_sphere(400).into_iter().filter(|x| x[2] > 0.0).collect();
+    let values: Vec<f64> = nodes.iter().map(|x| x[2]).collect();
+    let queries = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    let body = json!({
+        "cloud": {"points": nodes}, "values": values, "queries": queries,
+        "geometry": {"cloud": {"points": fibonacci_sphere(600)}},
+    });
+    for path in ["/v1/laplace-beltrami", "/v1/surface-gradient"] {
+        let answer = server.post(path, &body).await.expect_ok();
+        let flags = answer["degenerate"].as_array().unwrap();
+        let is_far = |flag: &&Value| flag["reason"] == "far_from_cloud" && flag["query"] == 1;
+        assert_eq!(flags.iter().filter(is_far).count(), 1, "{path}: {flags:?}");
+        assert!(flags.iter().all(|flag| flag["query"] == 1), "{path}: {flags:?}");
+    }
+}
+
+#[tokio::test]
+async fn neighbourhoods_that_are_too_small_are_said_to_be() {
+    let server = Server::start().await;
+    let points: Vec<_> = (0..2000).map(|i| [f64::from(i % 50) / 25.0, f64::from(i / 50) / 20.0]).collect();
+    let warned = async |alpha: f64, length_scale: f64| {
+        let mut random = Random(3);
+        let values: Vec<f64> = points.iter().map(|x| x[0].sin() + alpha.sqrt() * random.normal()).collect();
+        let body = json!({
+            "cloud": {"points": points}, "values": values, "queries": [[0.51, 0.52], [1.43, 1.01]], "solver": "local",
+            "kernel": {"family": "matern", "nu": 2.5, "length_scale": length_scale}, "alpha": alpha,
+        });
+        let answer = server.post("/v1/posterior", &body).await.expect_ok();
+        let warnings = answer["diagnostics"]["warnings"].as_array().unwrap().clone();
+        warnings.iter().any(|warning| warning["code"] == "neighbours_not_enough")
+    };
+    // With noise as large as here, points beyond the nearest 128 still count; with little they screen all others.
+    for (alpha, length_scale, expected) in [(1.0, 1.0, true), (1e-4, 0.1, false)] {
+        assert_eq!(warned(alpha, length_scale).await, expected, "{alpha} {length_scale}");
+    }
 }

@@ -101,7 +101,8 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
     let values = waves(&cloud);
     for family in families_without_kink() {
         let has_deviations = of_one(family).has_second_derivatives();
-        let request = MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations };
+        let request =
+            MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations, trend: None };
         let at = |kernel: Kernel, cloud: &Cloud, queries: &Cloud| {
             let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
             let system = System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-3)).unwrap();

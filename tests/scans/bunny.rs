@@ -14,7 +14,7 @@ fn read(name: &str) -> Vec<f64> {
 }
 
 /// The points, and the normals of the mesh there.
-fn bunny() -> (Cloud, Vec<f64>) {
+pub fn bunny() -> (Cloud, Vec<f64>) {
     (Cloud::new(read("bunny.xyz"), 3).unwrap(), read("bunny.normals"))
 }
 

@@ -5,4 +5,6 @@ mod common;
 
 mod bunny;
 mod curvatures;
+mod sides;
+mod stability;
 mod support;

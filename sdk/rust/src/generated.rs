@@ -332,6 +332,8 @@ where that has no answer.*/
         VanishingGradient,
         #[serde(rename = "under_resolved")]
         UnderResolved,
+        #[serde(rename = "ambiguous_side")]
+        AmbiguousSide,
         #[serde(rename = "uncertain")]
         Uncertain,
         #[serde(rename = "kernel_too_rough")]
@@ -346,6 +348,7 @@ where that has no answer.*/
             match *self {
                 Self::VanishingGradient => f.write_str("vanishing_gradient"),
                 Self::UnderResolved => f.write_str("under_resolved"),
+                Self::AmbiguousSide => f.write_str("ambiguous_side"),
                 Self::Uncertain => f.write_str("uncertain"),
                 Self::KernelTooRough => f.write_str("kernel_too_rough"),
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
@@ -361,6 +364,7 @@ where that has no answer.*/
             match value {
                 "vanishing_gradient" => Ok(Self::VanishingGradient),
                 "under_resolved" => Ok(Self::UnderResolved),
+                "ambiguous_side" => Ok(Self::AmbiguousSide),
                 "uncertain" => Ok(Self::Uncertain),
                 "kernel_too_rough" => Ok(Self::KernelTooRough),
                 "far_from_cloud" => Ok(Self::FarFromCloud),
@@ -434,6 +438,9 @@ where that has no answer.*/
         ///Why it was chosen, where `auto` chose another one than the dense one.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver_reason: ::std::option::Option<::std::string::String>,
+        ///Rows of a sparse operator by how their weights came about.
+        #[serde(skip_serializing_if = "::std::option::Option::is_none")]
+        pub stencils: ::std::option::Option<StencilsUsed>,
         ///What was changed or limits the accuracy.
         pub warnings: ::std::vec::Vec<Warning>,
     }
@@ -2495,6 +2502,25 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
+    ///Rows of a sparse operator by how their weights came about.
+    #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
+    pub struct StencilsUsed {
+        ///Rows without entries.
+        pub empty: u64,
+        ///Polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones lie on one side.
+        pub graded: u64,
+        ///Least squares of the least norm, where the nodes do not determine derivatives.
+        pub least_norm: u64,
+        ///Polyharmonic splines on the nearest nodes: the ordinary row.
+        pub nearest: u64,
+        ///Weights without negative ones beside the diagonal, where no splines give a stable row, as at a rim.
+        pub positive: u64,
+    }
+    impl StencilsUsed {
+        pub fn builder() -> builder::StencilsUsed {
+            Default::default()
+        }
+    }
     ///Which function's level surface is meant.
     #[derive(
         ::serde::Deserialize,
@@ -2913,6 +2939,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         DisagreesWithNeighbours,
         #[serde(rename = "far_from_cloud")]
         FarFromCloud,
+        #[serde(rename = "neighbours_not_enough")]
+        NeighboursNotEnough,
     }
     impl ::std::fmt::Display for WarningCode {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
@@ -2927,6 +2955,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self::KernelTooRough => f.write_str("kernel_too_rough"),
                 Self::DisagreesWithNeighbours => f.write_str("disagrees_with_neighbours"),
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
+                Self::NeighboursNotEnough => f.write_str("neighbours_not_enough"),
             }
         }
     }
@@ -2946,6 +2975,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 "kernel_too_rough" => Ok(Self::KernelTooRough),
                 "disagrees_with_neighbours" => Ok(Self::DisagreesWithNeighbours),
                 "far_from_cloud" => Ok(Self::FarFromCloud),
+                "neighbours_not_enough" => Ok(Self::NeighboursNotEnough),
                 _ => Err("invalid value".into()),
             }
         }
@@ -4067,6 +4097,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::option::Option<::std::string::String>,
                 ::std::string::String,
             >,
+            stencils: ::std::result::Result<
+                ::std::option::Option<super::StencilsUsed>,
+                ::std::string::String,
+            >,
             warnings: ::std::result::Result<
                 ::std::vec::Vec<super::Warning>,
                 ::std::string::String,
@@ -4097,6 +4131,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     relative_residual: Ok(Default::default()),
                     solver: Err("no value supplied for solver".to_string()),
                     solver_reason: Ok(Default::default()),
+                    stencils: Ok(Default::default()),
                     warnings: Err("no value supplied for warnings".to_string()),
                 }
             }
@@ -4332,6 +4367,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn stencils<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::option::Option<super::StencilsUsed>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.stencils = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for stencils: {e}")
+                    });
+                self
+            }
             pub fn warnings<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::vec::Vec<super::Warning>>,
@@ -4369,6 +4416,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     relative_residual: value.relative_residual?,
                     solver: value.solver?,
                     solver_reason: value.solver_reason?,
+                    stencils: value.stencils?,
                     warnings: value.warnings?,
                 })
             }
@@ -4394,6 +4442,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     relative_residual: Ok(value.relative_residual),
                     solver: Ok(value.solver),
                     solver_reason: Ok(value.solver_reason),
+                    stencils: Ok(value.stencils),
                     warnings: Ok(value.warnings),
                 }
             }
@@ -10020,6 +10069,112 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             }
         }
         #[derive(Clone, Debug)]
+        pub struct StencilsUsed {
+            empty: ::std::result::Result<u64, ::std::string::String>,
+            graded: ::std::result::Result<u64, ::std::string::String>,
+            least_norm: ::std::result::Result<u64, ::std::string::String>,
+            nearest: ::std::result::Result<u64, ::std::string::String>,
+            positive: ::std::result::Result<u64, ::std::string::String>,
+        }
+        impl ::std::default::Default for StencilsUsed {
+            fn default() -> Self {
+                Self {
+                    empty: Err("no value supplied for empty".to_string()),
+                    graded: Err("no value supplied for graded".to_string()),
+                    least_norm: Err("no value supplied for least_norm".to_string()),
+                    nearest: Err("no value supplied for nearest".to_string()),
+                    positive: Err("no value supplied for positive".to_string()),
+                }
+            }
+        }
+        impl StencilsUsed {
+            pub fn empty<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.empty = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for empty: {e}")
+                    });
+                self
+            }
+            pub fn graded<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.graded = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for graded: {e}")
+                    });
+                self
+            }
+            pub fn least_norm<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.least_norm = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for least_norm: {e}")
+                    });
+                self
+            }
+            pub fn nearest<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.nearest = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for nearest: {e}")
+                    });
+                self
+            }
+            pub fn positive<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<u64>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.positive = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for positive: {e}")
+                    });
+                self
+            }
+        }
+        impl ::std::convert::TryFrom<StencilsUsed> for super::StencilsUsed {
+            type Error = super::error::ConversionError;
+            fn try_from(
+                value: StencilsUsed,
+            ) -> ::std::result::Result<Self, super::error::ConversionError> {
+                Ok(Self {
+                    empty: value.empty?,
+                    graded: value.graded?,
+                    least_norm: value.least_norm?,
+                    nearest: value.nearest?,
+                    positive: value.positive?,
+                })
+            }
+        }
+        impl ::std::convert::From<super::StencilsUsed> for StencilsUsed {
+            fn from(value: super::StencilsUsed) -> Self {
+                Self {
+                    empty: Ok(value.empty),
+                    graded: Ok(value.graded),
+                    least_norm: Ok(value.least_norm),
+                    nearest: Ok(value.nearest),
+                    positive: Ok(value.positive),
+                }
+            }
+        }
+        #[derive(Clone, Debug)]
         pub struct SurfaceGradientMatrixRequest {
             alpha: ::std::result::Result<
                 ::std::option::Option<f64>,
@@ -11604,8 +11759,10 @@ let response = client.assemble_laplace_beltrami_matrix()
     }
     /**Assemble the sparse matrix of the Laplace–Beltrami operator
 
-Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
-these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4 over the tangent plane: exact
+for these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes. Over the nodes
+themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows at a rim are those of a
+boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each kind.
 
 Sends a `POST` request to `/v1/laplace-beltrami/sparse-matrix`
 

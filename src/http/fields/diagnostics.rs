@@ -7,6 +7,7 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
+use crate::numerics::surface::operators::{RowKind, Stencils};
 
 /// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 /// answer has them yet.
@@ -65,6 +66,8 @@ pub enum WarningCode {
     DisagreesWithNeighbours,
     /// Queries lie far from the cloud.
     FarFromCloud,
+    /// Values from the points nearest to a query still change with how many of them are taken.
+    NeighboursNotEnough,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.
@@ -132,12 +135,43 @@ pub struct Diagnostics {
     pub noise_deviation: Option<f64>,
     /// Points that were merged into an earlier one.
     pub n_merged_duplicates: usize,
+    /// Rows of a sparse operator by how their weights came about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub stencils: Option<StencilsUsed>,
     /// What was changed or limits the accuracy.
     pub warnings: Vec<Warning>,
     /// The same for the fit of the surface, in answers about values on a surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, no_recursion)]
     pub geometry: Option<Box<Diagnostics>>,
+}
+
+/// Rows of a sparse operator by how their weights came about.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+pub struct StencilsUsed {
+    /// Polyharmonic splines on the nearest nodes: the ordinary row.
+    pub nearest: usize,
+    /// Polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones lie on one side.
+    pub graded: usize,
+    /// Weights without negative ones beside the diagonal, where no splines give a stable row, as at a rim.
+    pub positive: usize,
+    /// Least squares of the least norm, where the nodes do not determine derivatives.
+    pub least_norm: usize,
+    /// Rows without entries.
+    pub empty: usize,
+}
+
+impl StencilsUsed {
+    pub fn of(stencils: &Stencils) -> Self {
+        Self {
+            nearest: stencils.n_rows(RowKind::Nearest),
+            graded: stencils.n_rows(RowKind::Graded),
+            positive: stencils.n_rows(RowKind::Positive),
+            least_norm: stencils.n_rows(RowKind::LeastNorm),
+            empty: stencils.n_rows(RowKind::Empty),
+        }
+    }
 }
 
 impl Diagnostics {
@@ -149,6 +183,18 @@ impl Diagnostics {
             queries.len()
         );
         self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
+    }
+}
+
+impl Diagnostics {
+    /// Says that neighbourhoods are too small, and by how many deviations half of one differs from all of it.
+    pub fn warn_of_unsettled(&mut self, deviations: Option<f64>) {
+        let Some(deviations) = deviations else { return };
+        let detail = format!(
+            "values from half of the nearest points differ by {deviations:.1e} deviations in root mean square: points beyond the nearest may \
+             matter; take a shorter length scale, less noise, or \"solver\": \"dense\""
+        );
+        self.warnings.push(Warning { code: WarningCode::NeighboursNotEnough, detail });
     }
 }
 
@@ -167,6 +213,8 @@ pub enum DegenerateReason {
     VanishingGradient,
     /// The points around the query do not confirm its curvatures; the number is served.
     UnderResolved,
+    /// What is known of the side contradicts itself: the normal is served, and may point inward.
+    AmbiguousSide,
     /// What is served of values is off by more than a fifth of its root mean square over the queries, as far as the values say, or the kernel has no
     /// such derivatives; the number is served.
     Uncertain,

@@ -14,7 +14,8 @@ pub use choices::{
 };
 pub use cloud_ref::CloudRef;
 pub use diagnostics::{
-    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, Warning, WarningCode,
+    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, SolverUsed, StencilsUsed, Warning,
+    WarningCode,
 };
 pub(crate) use fit::request;
 pub use fit::{Fit, Geometry, HasCloud};

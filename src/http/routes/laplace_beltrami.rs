@@ -29,7 +29,8 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
-    Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix, laplace_beltrami_stencils,
+    Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix,
+    laplace_beltrami_of_kriged, laplace_beltrami_stencils,
 };
 use crate::store::Owner;
 
@@ -184,14 +185,14 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
-        if let Some(nodes) = &work.nodes {
-            let values = work.by_stencils(fits, &mut surface, nodes, laplace_beltrami_stencils, observer)?;
+        let surface = work.surface(fits, observer)?;
+        if let Some(found) = work.by_kriging(fits, &surface, laplace_beltrami_of_kriged, observer)? {
+            let m = surface.geometry.n_queries();
             return Ok(LaplaceBeltramiResponse {
-                values: surface.per_query(values, &[surface.geometry.n_queries()]),
-                value_deviations: None,
-                degenerate: surface.degenerate(),
-                diagnostics: surface.diagnostics(fits)?,
+                values: surface.per_query(found.values, &[m]),
+                value_deviations: found.deviations.map(|found| surface.known_per_query(found, &[m])),
+                degenerate: found.degenerate,
+                diagnostics: found.diagnostics,
             });
         }
         let geometry = &surface.geometry;
@@ -299,8 +300,10 @@ answer! {
 
 /// Assemble the sparse matrix of the Laplace–Beltrami operator
 ///
-/// Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
-/// these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+/// Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4 over the tangent plane: exact
+/// for these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes. Over the nodes
+/// themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows at a rim are those of a
+/// boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each kind.
 #[utoipa::path(
     post,
     path = "/v1/laplace-beltrami/sparse-matrix",

@@ -28,7 +28,7 @@ use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::numerics::surface::operators::{
     Judged, surface_gradient, surface_gradient_deviations, surface_gradient_matrices,
-    surface_gradient_stencils,
+    surface_gradient_of_kriged, surface_gradient_stencils,
 };
 use crate::store::Owner;
 
@@ -169,17 +169,14 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
-        if let Some(nodes) = &work.nodes {
+        let surface = work.surface(fits, observer)?;
+        if let Some(found) = work.by_kriging(fits, &surface, surface_gradient_of_kriged, observer)? {
             let (m, d) = (surface.geometry.n_queries(), surface.geometry.dimension());
-            let components =
-                work.by_stencils(fits, &mut surface, nodes, surface_gradient_stencils, observer)?;
-            let gradients = (0..m * d).map(|at| components[at % d * m + at / d]).collect();
             return Ok(SurfaceGradientResponse {
-                gradients: surface.per_query(gradients, &[m, d]),
-                gradient_deviations: None,
-                degenerate: surface.degenerate(),
-                diagnostics: surface.diagnostics(fits)?,
+                gradients: surface.per_query(found.values, &[m, d]),
+                gradient_deviations: found.deviations.map(|found| surface.known_per_query(found, &[m, d])),
+                degenerate: found.degenerate,
+                diagnostics: found.diagnostics,
             });
         }
         let geometry = &surface.geometry;

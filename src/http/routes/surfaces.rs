@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Diagnostics, Fit, Geometry, GeometryInclude, OrientationChoice, SurfaceChoice, ValuesInclude,
+    Degenerate, Diagnostics, Fit, Geometry, GeometryInclude, OrientationChoice, StencilsUsed, SurfaceChoice,
+    ValuesInclude,
 };
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -12,23 +13,24 @@ use crate::http::serve::fitted::{Fits, SurfaceGeometry};
 use crate::http::serve::operation::Plan;
 use crate::http::serve::plan::Cost;
 use crate::http::serve::plan::PlannedFit;
-use crate::http::serve::planner::{OperatorFits, Planner};
+use crate::http::serve::planner::Planner;
 use crate::http::wire::read::points::Points;
 use crate::numerics::defaults::Purpose;
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
+use crate::numerics::points::sampling::Sampling;
 use crate::numerics::selection::learning_flops;
 use crate::numerics::solver::choose::{
-    Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, n_entries_per_row,
-    work_price,
+    Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, kriged_operator_price,
+    n_entries_per_row, work_price,
 };
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use crate::numerics::surface::operators::{JUDGED_FUNCTIONALS, SparseMatrix, Stencils};
+use crate::numerics::surface::operators::{JUDGED_FUNCTIONALS, Kriged, OfKriged, SparseMatrix, Stencils};
 use crate::store::clouds::RegisteredCloud;
 
 /// A checked request for normals or curvatures.
@@ -39,8 +41,6 @@ pub struct GeometryWork {
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {
-    /// The nodes of the values, where stencils and not a solver serve them.
-    pub nodes: Option<Arc<RegisteredCloud>>,
     pub values: Arc<Vec<f64>>,
     pub queries: Arc<Cloud>,
     pub request: GeometryRequest,
@@ -120,52 +120,39 @@ pub fn plan_applied(
     let Applied { geometry, values, queries, include } = applied;
     let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
     let request = GeometryRequest { has_deviations, ..operator_request(&geometry) };
-    let has_mean = fit.mean.is_some();
-    let (mut main, mut surface, nodes) = match planner.operator_fits(fit, geometry, &request)? {
-        OperatorFits::Stencils { .. } if has_mean => return Err(stencils_lack("mean", "/mean")),
-        OperatorFits::Stencils { .. } if has_deviations => {
-            return Err(stencils_lack("deviations", "/include"));
-        }
-        OperatorFits::Solved { values, surface } => (values, Some(surface), None),
-        OperatorFits::Stencils { nodes, surface } => (surface, None, Some(nodes)),
-    };
+    let (mut main, mut surface) = planner.operator_fits(fit, geometry, &request)?;
     check_is_surface(&main.stored.cloud)?;
-    let n_values = match &nodes {
-        Some(nodes) => {
-            planner.check_values_of(&values, &nodes.cloud)?;
-            nodes.cloud.n_points()
-        }
-        None => main.n_points(),
-    };
-    let queries = match &mut surface {
-        None => planner.queries(queries, &mut [&mut main])?,
-        Some(surface) => planner.queries(queries, &mut [&mut main, surface])?,
-    };
-    let (m, d) = (queries.n_points(), queries.dimension());
-    let n_surface_points = surface.as_ref().map_or(0, PlannedFit::n_points);
-    let asked = match (&nodes, &surface) {
-        (None, Some(surface)) => {
-            Asked::Operator { n_surface_points, surface: asked_of(&request, surface, &queries) }
-        }
-        (Some(_), _) | (_, None) => Asked::Stencils,
-    };
-    let mut work = work_price(asked, n_values, m, d);
+    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
+    let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+    let n_surface_points = surface.n_points();
     let mut n_numbers = m.checked_mul(numbers_per_query(d));
     let of_operator = n_numbers.unwrap_or(usize::MAX);
+    let of_surface = asked_of(&request, &surface, &queries);
+    let mut work = match main.is_moving() {
+        true => {
+            let geometry = match surface.is_local() {
+                true => Asked::LocalGeometry,
+                false => Asked::Geometry(of_surface),
+            };
+            let geometry = work_price(geometry, n_surface_points, m, d);
+            geometry.and(kriged_operator_price(n, m, d))
+        }
+        false => {
+            let asked = Asked::Operator { n_surface_points, surface: of_surface };
+            let judging = judging_price((n, d), m, of_operator.min(JUDGED_FUNCTIONALS));
+            work_price(asked, n, m, d).and(judging)
+        }
+    };
+    work.flops += learning_flops(n);
     if has_deviations {
-        work = work.and(deviations_price(n_values, of_operator, d));
+        if !main.is_moving() {
+            work = work.and(deviations_price(n, of_operator, d));
+        }
         n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
     }
-    if surface.is_some() {
-        work = work.and(judging_price((n_values, d), m, of_operator.min(JUDGED_FUNCTIONALS)));
-        work.flops += learning_flops(n_values);
-    }
-    let cost = Cost {
-        work,
-        n_numbers: planner.check_answer(n_numbers)?,
-        n_held: n_values + n_surface_points + m * d,
-    };
-    Ok(Plan { main, surface, work: AppliedWork { values, queries, request, nodes }, cost })
+    let cost =
+        Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: n + n_surface_points + m * d };
+    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, cost })
 }
 
 /// Plans an operator as a matrix, with so many rows per query.
@@ -231,21 +218,63 @@ impl StencilWork {
     }
 }
 
+/// One of the operators on values that are kriged around each query.
+type OnKriged =
+    fn(&SurfaceGeometryAtQueries, Kriged<'_>, &Cloud, &dyn Observer) -> Result<OfKriged, NumericsError>;
+
+/// An operator on values that were kriged around each query.
+pub struct KrigedAnswer {
+    /// `[m, k]`.
+    pub values: Vec<f64>,
+    /// Likewise, if asked for.
+    pub deviations: Option<Vec<f64>>,
+    pub degenerate: Vec<Degenerate>,
+    pub diagnostics: Diagnostics,
+}
+
 impl AppliedWork {
-    /// An operator applied to the values by stencils, `[components, m]`; queries that their nodes do not resolve are flagged.
+    /// The surface at the queries, of which those are flagged that are far from the nodes of the values.
+    ///
+    /// # Errors
+    /// Those of [`Fits::geometry`].
+    pub fn surface(&self, fits: &Fits, observer: &JobObserver) -> Result<SurfaceGeometry, Problem> {
+        let mut surface = fits.geometry(&self.queries, &self.request, observer)?;
+        let nodes = &fits.main.plan.stored;
+        if fits.surface().plan.stored.id != nodes.id {
+            let sampling = match nodes.sampling() {
+                Some(sampling) => sampling.clone(),
+                None => {
+                    Arc::new(Sampling::of(&nodes.cloud, observer).map_err(|error| fits.main.refused(error))?)
+                }
+            };
+            surface.geometry.flag_far_from(&sampling, &self.queries);
+        }
+        Ok(surface)
+    }
+
+    /// An operator on the values where they are kriged around each query; `None` where one solver serves all.
     ///
     /// # Errors
     /// Those of the numerics as a [`Problem`].
-    pub fn by_stencils(
+    pub fn by_kriging(
         &self,
         fits: &Fits,
-        surface: &mut SurfaceGeometry,
-        nodes: &RegisteredCloud,
-        assemble: Assemble,
+        surface: &SurfaceGeometry,
+        operator: OnKriged,
         observer: &JobObserver,
-    ) -> Result<Vec<f64>, Problem> {
-        let matrix = matrix_of(fits, surface, (&nodes.cloud, &self.queries), assemble, observer)?;
-        Ok(matrix.apply(&self.values))
+    ) -> Result<Option<KrigedAnswer>, Problem> {
+        let Some(moving) = fits.main.stored.of_queries() else { return Ok(None) };
+        let refused = |error| fits.main.refused(error);
+        let (plan, values) = (&fits.main.plan, fits.main.merged(&self.values));
+        let function = Kriged { moving, values: &values, trend: plan.trend.as_ref(), factor: plan.scale };
+        let found = operator(&surface.geometry, function, &self.queries, observer).map_err(refused)?;
+        let mut degenerate = surface.degenerate();
+        surface.flag_uncertain(Ok(found.uncertain), &mut degenerate).map_err(refused)?;
+        let m = self.queries.n_points();
+        let mut diagnostics = fits.main.moving_diagnostics((m, found.n_dependent), moving.n_neighbours())?;
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
+        let deviations = self.request.has_deviations.then_some(found.deviations);
+        Ok(Some(KrigedAnswer { values: found.values, deviations, degenerate, diagnostics }))
     }
 }
 
@@ -265,6 +294,7 @@ fn matrix_of(
     };
     let found = found.map_err(|error| fits.surface().refused(error))?;
     surface.geometry.take_resolutions(&found.resolutions);
+    surface.stencils = Some(StencilsUsed::of(&found));
     Ok(found.matrix)
 }
 
@@ -291,14 +321,6 @@ pub fn plan_stencils(
         n_held: m * d,
     };
     Ok(Plan { main, surface: None, work: StencilWork { nodes, queries, request }, cost })
-}
-
-/// 422 for what only a kernel has.
-fn stencils_lack(what: &str, pointer: &str) -> Problem {
-    let detail = format!(
-        "stencils reproduce polynomials and have no {what}; leave it out, or take \"solver\": \"dense\""
-    );
-    Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
 }
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.

@@ -6,15 +6,14 @@ use std::sync::Arc;
 use super::plan::{FitModel, FitPlan, LocalReason};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, SurfaceUsed,
-    Warning, WarningCode,
+    Degenerate, DegenerateReason, Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, StencilsUsed,
+    SurfaceUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::wire::write::array::Array;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
-use crate::numerics::function::moving::MovingAnswer;
 use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Beside;
 use crate::numerics::patches::PatchKernel;
@@ -110,7 +109,7 @@ impl Fits {
         let surface = self.made.clone().ok_or_else(Problem::internal)?;
         let geometry =
             Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
-        Ok(SurfaceGeometry { surface, geometry, request: *request })
+        Ok(SurfaceGeometry { surface, geometry, stencils: None, request: *request })
     }
 }
 
@@ -118,6 +117,8 @@ impl Fits {
 pub struct SurfaceGeometry {
     pub surface: Arc<Surface>,
     pub geometry: Geometry,
+    /// Rows of the sparse operator over it, once there is one.
+    pub stencils: Option<StencilsUsed>,
     request: GeometryRequest,
 }
 
@@ -239,6 +240,7 @@ impl Fitted {
             misfit: None,
             noise_deviation: None,
             n_merged_duplicates: self.plan.merge.as_ref().map_or(0, |merge| merge.n_merged()),
+            stencils: None,
             warnings: Vec::new(),
             geometry: None,
         }
@@ -277,20 +279,18 @@ impl Fitted {
     ///
     /// # Errors
     /// None: the fits that have such values have a kernel.
-    pub(super) fn moving_diagnostics(
+    pub fn moving_diagnostics(
         &self,
-        found: &MovingAnswer,
+        (m, n_dependent): (usize, usize),
         n_neighbours: usize,
     ) -> Result<Diagnostics, Problem> {
         let FitModel::Moving { kernel, regularization, reason } = &self.plan.model else {
             return Err(Problem::internal());
         };
-        let m = found.jets.n_queries();
         let mut warnings = self.warnings_of_merging();
-        if found.n_dependent > 0 {
+        if n_dependent > 0 {
             let detail = format!(
-                "points that follow from nearer ones to rounding are left out of the {n_neighbours} nearest (queries: {} of {m})",
-                found.n_dependent
+                "points that follow from nearer ones to rounding are left out of the {n_neighbours} nearest (queries: {n_dependent} of {m})"
             );
             warnings.push(Warning { code: WarningCode::IllConditioned, detail });
         }
@@ -358,6 +358,7 @@ impl SurfaceGeometry {
                 DegeneracyReason::KernelTooRough => DegenerateReason::KernelTooRough,
                 DegeneracyReason::FarFromCloud => DegenerateReason::FarFromCloud,
                 DegeneracyReason::UnderResolved => DegenerateReason::UnderResolved,
+                DegeneracyReason::AmbiguousSide => DegenerateReason::AmbiguousSide,
             },
             gradient_norm: d.gradient_norm,
         };
@@ -429,6 +430,7 @@ impl SurfaceGeometry {
             Surface::Local(surface) => fitted.local_diagnostics(surface, m),
         };
         diagnostics.warnings.extend(self.warnings());
+        diagnostics.stencils = self.stencils;
         Ok(diagnostics)
     }
 

@@ -115,19 +115,19 @@ impl Fits {
         // It has deviations of what it finds.
         let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
         let has_deviations = asked.deviations.is_some();
-        let request = MovingRequest { order, has_variances: asked.has_variances, has_deviations };
         let plan = &self.main.plan;
+        let trend = plan.trend.as_ref();
+        let request = MovingRequest { order, has_variances: asked.has_variances, has_deviations, trend };
         let values = self.main.merged(asked.values);
-        let rest = match &plan.trend {
-            None => values,
-            Some(trend) => Cow::Owned(trend.removed_from(&values, &plan.fitted)),
-        };
-        let mut found =
-            moving.at(&rest, asked.queries, request, observer).map_err(|error| self.main.refused(error))?;
-        if let Some(trend) = &plan.trend {
-            found.jets = found.jets.plus_linear(asked.queries, &trend.gradient(), |x| trend.at(x));
-        }
-        let diagnostics = self.main.moving_diagnostics(&found, moving.n_neighbours())?;
+        let found =
+            moving.at(&values, asked.queries, request, observer).map_err(|error| self.main.refused(error))?;
+        let unsettled = moving
+            .unsettled(&values, asked.queries, trend, observer)
+            .map_err(|error| self.main.refused(error))?;
+        let mut diagnostics = self
+            .main
+            .moving_diagnostics((found.jets.n_queries(), found.n_dependent), moving.n_neighbours())?;
+        diagnostics.warn_of_unsettled(unsettled);
         let variances = found.variances.map(|variances| variances.scaled(plan.scale));
         let deviations = found.deviations.map(|deviations| deviations.scaled(plan.scale));
         Ok(ValuesAt { jets: found.jets, variances, deviations, diagnostics, interpolant: None })

@@ -94,6 +94,21 @@ impl JetFunctional {
         functions
     }
 
+    /// Its coefficients on derivatives in units of the length scale: on those of first order, then on those of second, an upper triangle with entries
+    /// across counted for both of their places; on the value it has none.
+    pub(super) fn coefficients(&self, kernel: &Kernel) -> Small {
+        let Self { of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
+        let (mut coefficients, d) = (of_gradient, self.of_gradient.len());
+        if !of_hessian.is_empty() {
+            let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
+            let entry = |(a, b)| {
+                if a == b { of_hessian[a * d + a] } else { of_hessian[a * d + b] + of_hessian[b * d + a] }
+            };
+            coefficients.extend(pairs.map(entry));
+        }
+        coefficients
+    }
+
     fn has_derivatives(&self) -> bool {
         self.has_hessian() || self.of_gradient.iter().any(|g| *g != 0.0)
     }

@@ -335,6 +335,15 @@ fn functional_bytes(dimension: usize) -> usize {
     2 * (400 + beyond_the_stack * size_of::<f64>())
 }
 
+/// What an operator takes on values that are kriged around each query: derivatives of second order with their covariances, among the points or
+/// among means of them, which are found as a cloud is sampled.
+pub fn kriged_operator_price(n_points: usize, n_queries: usize, dimension: usize) -> Price {
+    let n_derivatives = dimension.saturating_mul(dimension + 3) / 2;
+    let kriging = Asked::Moving { n_deviations: n_derivatives };
+    let (n_bytes, flops) = (sampling_bytes(n_points, dimension), sampling_flops(n_points, dimension));
+    work_price(kriging, n_points, n_queries, dimension).and(Price { n_bytes, flops })
+}
+
 /// What the deviations of so many functionals take, as variances do.
 pub fn deviations_price(n_points: usize, n_functionals: usize, dimension: usize) -> Price {
     let n = n_points as f64;

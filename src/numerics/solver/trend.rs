@@ -126,12 +126,28 @@ impl Basis {
 pub struct Trend {
     basis: Basis,
     coefficients: Vec<f64>,
+    /// `(FᵀWF)⁻¹` `[p, p]`, the covariance of the coefficients under the kernel that they were found with; empty where they are known.
+    covariance: Vec<f64>,
+}
+
+/// How well the coefficients of a mean are known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrendUncertainty<'a> {
+    pub(crate) basis: &'a Basis,
+    /// `[p, p]`, under the kernel that they were found with.
+    pub(crate) covariance: &'a [f64],
 }
 
 impl Trend {
     /// With coefficients that are known, one for each function.
     pub(crate) fn new(basis: Basis, coefficients: Vec<f64>) -> Self {
-        Self { basis, coefficients }
+        Self { basis, coefficients, covariance: Vec::new() }
+    }
+
+    /// How well the coefficients are known, unless they are given.
+    pub(crate) fn uncertainty(&self) -> Option<TrendUncertainty<'_>> {
+        let Self { basis, covariance, .. } = self;
+        (!covariance.is_empty()).then_some(TrendUncertainty { basis, covariance })
     }
 
     /// The mean of values `[n]` under a solver; `None` for [`Mean::Zero`].
@@ -172,12 +188,18 @@ impl Trend {
             })
             .collect();
         let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
-        let moments = Mat::from_fn(p, shared.len(), |a, list| moments[list * p + a]);
-        let solved = solve_gram(&gram, moments).ok_or(NumericsError::MeanNotDetermined)?;
+        let right = |a: usize, b: usize| match b.checked_sub(p) {
+            Some(list) => moments[list * p + a],
+            None => f64::from(u8::from(a == b)),
+        };
+        let right = Mat::from_fn(p, p + shared.len(), right);
+        let solved = solve_gram(&gram, right).ok_or(NumericsError::MeanNotDetermined)?;
+        let column = |b: usize| solved.col(b).iter().copied();
+        let covariance: Vec<f64> = (0..p).flat_map(column).collect();
         let trend = |(list, shared): (usize, &f64)| {
-            let mut coefficients: Vec<f64> = solved.col(list).iter().copied().collect();
+            let mut coefficients: Vec<f64> = column(p + list).collect();
             coefficients[0] += shared;
-            Self { basis: basis.clone(), coefficients }
+            Self { basis: basis.clone(), coefficients, covariance: covariance.clone() }
         };
         Ok(Some(shared.iter().enumerate().map(trend).collect()))
     }
@@ -218,7 +240,7 @@ impl Trend {
 
     /// Bytes held on the heap.
     pub(crate) fn n_bytes(&self) -> usize {
-        vec_bytes(&self.coefficients) + vec_bytes(&self.basis.centre)
+        vec_bytes(&self.coefficients) + vec_bytes(&self.covariance) + vec_bytes(&self.basis.centre)
     }
 }
 

@@ -24,6 +24,9 @@ pub enum DegeneracyReason {
     FarFromCloud,
     /// The curvatures differ from those that the neighbours suggest (T4): the sampling does not resolve the surface.
     UnderResolved,
+    /// What is known of the side contradicts itself: the winding number of the oriented points is not ½ there,
+    /// or the neighbours point to the other side. The normal is served, and may point inward.
+    AmbiguousSide,
 }
 
 impl DegeneracyReason {
@@ -31,7 +34,7 @@ impl DegeneracyReason {
     pub fn is_null(self) -> bool {
         match self {
             Self::VanishingGradient | Self::UnaffordableRescue => true,
-            Self::KernelTooRough | Self::FarFromCloud | Self::UnderResolved => false,
+            Self::KernelTooRough | Self::FarFromCloud | Self::UnderResolved | Self::AmbiguousSide => false,
         }
     }
 }

@@ -4,13 +4,14 @@ use rayon::prelude::*;
 
 use super::Surface;
 use super::curvature::{principal_curvatures, tangential_trace};
-use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution};
+use super::degeneracy::{Degeneracy, DegeneracyReason, Resolution, is_far};
 pub use super::request::{GeometryRequest, Orientation, SurfaceModel};
 use super::served::{Deviations, Served, ServedBy};
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::norm;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::sampling::Sampling;
 
 /// First and second order geometry of the surface at m queries, d ≥ 2.
 ///
@@ -88,21 +89,35 @@ impl Geometry {
 
     /// Flags queries around which nodes do not resolve the surface, and has no answer where there are too few of them.
     pub fn take_resolutions(&mut self, resolutions: &[Resolution]) {
+        let all = || resolutions.iter().enumerate();
+        let unresolved = all().filter(|(_, resolution)| **resolution != Resolution::Resolved);
+        let unresolved: Vec<usize> = unresolved.map(|(query, _)| query).collect();
+        self.flag(&unresolved, DegeneracyReason::UnderResolved);
+        for (query, _) in all().filter(|(_, resolution)| **resolution == Resolution::Empty) {
+            self.is_null[query] = true;
+        }
+    }
+
+    /// Flags queries that are far from all nodes of a function, and not flagged yet: nothing is known of it there.
+    pub fn flag_far_from(&mut self, nodes: &Sampling, queries: &Cloud) {
+        let neighbours = nodes.neighbours();
+        let is_far = |query: &usize| {
+            let nearest = neighbours.nearest(queries.point(*query), 1);
+            nearest.first().is_none_or(|found| is_far(found.squared_distance, nodes.spacing(found.point)))
+        };
+        let far: Vec<usize> = (0..self.n_queries()).into_par_iter().filter(is_far).collect();
+        self.flag(&far, DegeneracyReason::FarFromCloud);
+    }
+
+    /// Flags queries that are not flagged yet.
+    fn flag(&mut self, queries: &[usize], reason: DegeneracyReason) {
         let n_flagged = self.degenerate.len();
-        for (query, resolution) in resolutions.iter().enumerate() {
-            if *resolution == Resolution::Resolved {
-                continue;
-            }
+        for &query in queries {
             let flagged = &self.degenerate[..n_flagged];
             if flagged.binary_search_by_key(&query, |entry| entry.query).is_err() {
                 let gradient_norm = self.gradient_norms[query];
-                self.degenerate.push(Degeneracy {
-                    query,
-                    reason: DegeneracyReason::UnderResolved,
-                    gradient_norm,
-                });
+                self.degenerate.push(Degeneracy { query, reason, gradient_norm });
             }
-            self.is_null[query] |= *resolution == Resolution::Empty;
         }
         self.degenerate.sort_by_key(|entry| entry.query);
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::coarse::outward_directions;
 use super::curvature::principal_curvatures;
 use super::degeneracy::{DegeneracyReason, is_far};
-use super::orientation::{Directions, Oriented, SurfaceOrientation};
+use super::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
 use super::request::{GeometryRequest, Orientation};
 use super::served::{Deviations, Served, ServedBy, Verdict};
 use crate::numerics::error::NumericsError;
@@ -17,6 +17,7 @@ use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::patches::{CurvatureDeviations, PatchGeometry, Patches};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbourhoods::Neighbourhoods;
+use crate::numerics::points::neighbours::Neighbour;
 use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 
 /// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
@@ -41,6 +42,8 @@ pub struct LocalSurface {
     /// What they say at the points, normals outward.
     at_points: PatchGeometry,
     orientation: SurfaceOrientation,
+    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    is_ambiguous: Vec<bool>,
     radius: f64,
 }
 
@@ -62,9 +65,9 @@ impl LocalSurface {
         let d = cloud.dimension();
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
-        let orientation = oriented.how;
+        let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        Ok(Self { cloud, sampling, patches, at_points, orientation, radius })
+        Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius })
     }
 
     pub fn cloud(&self) -> &Cloud {
@@ -90,7 +93,10 @@ impl LocalSurface {
 
     /// Bytes held on the heap beside the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
-        self.patches.n_bytes() + self.at_points.n_bytes() + block_bytes(arc_payload::<Self>())
+        self.patches.n_bytes()
+            + self.at_points.n_bytes()
+            + vec_bytes(&self.is_ambiguous)
+            + block_bytes(arc_payload::<Self>())
     }
 
     /// What is known at queries: that of a function with |∇u| = 1 that grows outward.
@@ -146,12 +152,18 @@ impl LocalSurface {
         if !geometry.is_known[query] {
             return Some(DegeneracyReason::VanishingGradient);
         }
+        let mut point = query;
         if !is_point {
             let nearest = self.sampling.neighbours().nearest(x, 1);
-            let is_far = |found: usize, squared: f64| is_far(squared, self.sampling.spacing(found));
-            if nearest.first().is_none_or(|found| is_far(found.point, found.squared_distance)) {
+            let is_near =
+                |found: &&Neighbour| !is_far(found.squared_distance, self.sampling.spacing(found.point));
+            let Some(found) = nearest.first().filter(is_near) else {
                 return Some(DegeneracyReason::FarFromCloud);
-            }
+            };
+            point = found.point;
+        }
+        if self.is_ambiguous[point] {
+            return Some(DegeneracyReason::AmbiguousSide);
         }
         let is_resolved = match request.checks_curvatures {
             true => self.is_resolved(geometry, query),
@@ -222,7 +234,8 @@ fn orient(
     let count = super::orientation::n_around(cloud);
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
-    Ok(Oriented::of_directions(cloud, (&around, sampling.spacings()), directions, given.is_some()))
+    let sampled = Sampled { cloud, sampling, around: &around, observer };
+    Oriented::of_directions(&sampled, directions, given.is_some())
 }
 
 /// Deviations in the order of the curvatures for normals of this sign.

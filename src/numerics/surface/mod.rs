@@ -11,6 +11,7 @@ mod coarse;
 mod curvature;
 mod orientation;
 mod request;
+mod winding;
 
 use super::error::NumericsError;
 use super::function::interpolant::Interpolant;

@@ -64,15 +64,12 @@ impl<'a> Planner<'a> {
     pub fn values_fit(&self, mut fit: Fit, dense_only: Option<DenseOnly>) -> Result<PlannedFit, Problem> {
         let pointers = pointers_of(&fit);
         let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let is_beyond = stored.cloud.n_points() > self.app.config.max_dense_points;
-        let way = match (fit.solver, dense_only) {
-            (SolverChoice::Local, None) => Way::Moving(LocalReason::Asked),
-            (SolverChoice::Local, Some(asked)) => return Err(asked.refused_by_local()),
-            (SolverChoice::Auto, None) if is_beyond => Way::Moving(LocalReason::Auto(AutoLocal::BeyondDense)),
-            (SolverChoice::Auto, Some(asked)) if is_beyond => {
+        let way = match (self.way_of_values(&fit, &stored), dense_only) {
+            (Way::Moving(LocalReason::Asked), Some(asked)) => return Err(asked.refused_by_local()),
+            (Way::Moving(_), Some(asked)) => {
                 return Err(self.beyond_dense(&stored, pointers).with_remedy(&asked.remedy()));
             }
-            (SolverChoice::Auto | SolverChoice::Dense, _) => Way::Dense,
+            (way, _) => way,
         };
         let duplicates = fit.duplicates;
         self.plan(stored, Chosen::of(fit), way, duplicates, Purpose::Values, pointers)
@@ -160,17 +157,6 @@ impl<'a> Planner<'a> {
         Ok(reason.map(LocalReason::Auto))
     }
 
-    /// Whether an operator on values is asked of stencils: by name, or since there are more nodes than are factorized and nothing is said
-    /// of their kernel.
-    fn wants_stencils(&self, fit: &Fit, nodes: &RegisteredCloud) -> bool {
-        let is_free = fit.kernel.is_none() && fit.alpha.is_none() && fit.noise_variances.is_none();
-        match fit.solver {
-            SolverChoice::Local => true,
-            SolverChoice::Auto => is_free && nodes.cloud.n_points() > self.app.config.max_dense_points,
-            SolverChoice::Dense => false,
-        }
-    }
-
     /// The nodes of stencils and the fit of the surface under them.
     ///
     /// # Errors
@@ -184,11 +170,12 @@ impl<'a> Planner<'a> {
         let pointers = pointers_of(&fit);
         let nodes = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
         // The nodes need no solver: what is said of them is said of the surface.
-        let (_, surface) = self.fits_over((nodes.clone(), pointers), fit, geometry, request, false)?;
+        let (_, surface) = self.fits_over((nodes.clone(), pointers), fit, geometry, request, None)?;
         Ok((nodes, surface))
     }
 
-    /// [`Planner::stencils`] where they are wanted, else [`Planner::fits`].
+    /// The fits of values and of the surface under them, for an operator on the values: kriged around each query where they are more than are
+    /// factorized, or where that is asked for.
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
@@ -197,16 +184,23 @@ impl<'a> Planner<'a> {
         mut fit: Fit,
         geometry: Option<Geometry>,
         request: &GeometryRequest,
-    ) -> Result<OperatorFits, Problem> {
+    ) -> Result<(PlannedFit, PlannedFit), Problem> {
         let pointers = pointers_of(&fit);
-        let nodes = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let wants_stencils = self.wants_stencils(&fit, &nodes);
-        let over = (nodes.clone(), pointers);
-        let (values, surface) = self.fits_over(over, fit, geometry, request, !wants_stencils)?;
-        Ok(match values {
-            None => OperatorFits::Stencils { nodes, surface },
-            Some(values) => OperatorFits::Solved { values, surface },
-        })
+        let cloud = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+        let way = self.way_of_values(&fit, &cloud);
+        let (values, surface) = self.fits_over((cloud, pointers), fit, geometry, request, Some(way))?;
+        Ok((values.ok_or_else(Problem::internal)?, surface))
+    }
+
+    /// How values are served where either solver has what is asked.
+    fn way_of_values(&self, fit: &Fit, cloud: &RegisteredCloud) -> Way {
+        match fit.solver {
+            SolverChoice::Local => Way::Moving(LocalReason::Asked),
+            SolverChoice::Auto if cloud.cloud.n_points() > self.app.config.max_dense_points => {
+                Way::Moving(LocalReason::Auto(AutoLocal::BeyondDense))
+            }
+            SolverChoice::Auto | SolverChoice::Dense => Way::Dense,
+        }
     }
 
     /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
@@ -224,7 +218,8 @@ impl<'a> Planner<'a> {
         }
         let pointers = pointers_of(&fit);
         let cloud = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let (values, surface) = self.fits_over((cloud, pointers), fit, geometry, request, true)?;
+        let (values, surface) =
+            self.fits_over((cloud, pointers), fit, geometry, request, Some(Way::Dense))?;
         Ok((values.ok_or_else(Problem::internal)?, surface))
     }
 
@@ -234,7 +229,7 @@ impl<'a> Planner<'a> {
         fit: Fit,
         geometry: Option<Geometry>,
         request: &GeometryRequest,
-        has_values: bool,
+        way_of_values: Option<Way>,
     ) -> Result<(Option<PlannedFit>, PlannedFit), Problem> {
         let geometry = geometry.unwrap_or_default();
         let surface_pointers = pointers_of_surface(&geometry, pointers);
@@ -255,9 +250,12 @@ impl<'a> Planner<'a> {
             return Err(Problem::invalid_request("/geometry", detail));
         }
         // Local regressions take no kernel: that of the values is not meant for them.
-        let is_local = solver == SolverChoice::Local || request.model == SurfaceModel::Local;
+        let is_beyond = surface_cloud.cloud.n_points() > self.app.config.max_dense_points;
+        let is_local = solver == SolverChoice::Local
+            || request.model == SurfaceModel::Local
+            || solver == SolverChoice::Auto && is_beyond;
         let has_own = geometry.kernel.is_some() || !inherits_noise;
-        let surface_chosen = if is_local && !has_own && has_values {
+        let surface_chosen = if is_local && !has_own && way_of_values.is_some() {
             Chosen::default()
         } else {
             Chosen {
@@ -270,12 +268,8 @@ impl<'a> Planner<'a> {
                 ..Chosen::default()
             }
         };
-        let values = match has_values {
-            true => {
-                Some(self.plan(values_cloud, chosen, Way::Dense, duplicates, Purpose::Values, pointers)?)
-            }
-            false => None,
-        };
+        let plan = |way| self.plan(values_cloud, chosen, way, duplicates, Purpose::Values, pointers);
+        let values = way_of_values.map(plan).transpose()?;
         let asked = (Purpose::Curvatures, request);
         let surface =
             self.plan_surface(surface_cloud, surface_chosen, solver, duplicates, asked, surface_pointers)?;
@@ -358,10 +352,4 @@ impl<'a> Planner<'a> {
         let key = (self.owner, stored.id, named.given(given, regularization.as_ref()));
         Ok(Box::new(PlannedValues { values, key, learned: self.app.learned.get(key) }))
     }
-}
-
-/// What an operator on values is computed from.
-pub enum OperatorFits {
-    Solved { values: PlannedFit, surface: PlannedFit },
-    Stencils { nodes: Arc<RegisteredCloud>, surface: PlannedFit },
 }

@@ -8,14 +8,12 @@
 use pulp::{Simd, WithSimd};
 
 use super::batch::Batch;
+use super::parts::{BENDS, COLUMNS, CROSS, Found, N_ROWS, Parts, SLOPES, VALUES, WEIGHTS, triangle};
 use crate::numerics::kernel::{Kernel, Pairs};
 use crate::numerics::machine::registers::{BLOCK, Pack};
 
 /// Numbers in the widest register.
 const MAX_LANES: usize = 8;
-
-/// Columns that are solved for at once: with as many rows, 16 chains of products that do not wait for one another.
-pub(super) const COLUMNS: usize = 4;
 
 /// Conditional variances up to this multiple of k₀ are rounding: such a point follows from those before it, and is left out. The
 /// fallback of the dense solver stops there as well.
@@ -27,51 +25,6 @@ const DEPENDENT: f64 = 64.0 * f64::EPSILON;
 /// for each that is. Values that are tiny beside the greatest of their neighbourhood may still lead there.
 const VANISHES: f64 = f64::from_bits((1023 - 500) << 52);
 
-/// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query, then those of derivatives.
-const N_ROWS: usize = 5;
-const VALUES: usize = 0;
-const CROSS: usize = 1;
-const WEIGHTS: usize = 2;
-const SLOPES: usize = 3;
-const BENDS: usize = 4;
-
-const fn triangle(n: usize) -> usize {
-    n * (n + 1) / 2
-}
-
-/// What is summed up beyond the value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Parts {
-    /// 0, 1 for the gradient, 2 for the Hessian.
-    pub order: usize,
-    pub variances: bool,
-    /// Derivatives whose variances are asked for: none, those of first order, or with them the upper triangle of those of second.
-    pub n_derivatives: usize,
-}
-
-/// Numbers of a query: those of a jet as sums over the points, `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b`, `Σλφ′`, then three more, and `|L⁻¹c′|²` of the
-/// derivatives.
-pub(super) struct Found {
-    /// `|L⁻¹c|²`.
-    pub explained: usize,
-    /// `|K⁻¹c|²`.
-    pub norm_squared: usize,
-    /// Points left out.
-    pub n_dependent: usize,
-}
-
-impl Found {
-    pub(super) const fn of(dimension: usize) -> Self {
-        let trace = 1 + dimension + triangle(dimension);
-        Self { explained: trace + 1, norm_squared: trace + 2, n_dependent: trace + 3 }
-    }
-
-    /// Of the derivatives.
-    pub(super) const fn of_derivatives(&self) -> usize {
-        self.n_dependent + 1
-    }
-}
-
 /// Room for one batch, and what was found for it, `[numbers, lanes]`.
 pub(super) struct Workspace {
     matrix: Vec<f64>,
@@ -80,14 +33,14 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    pub(super) fn new(dimension: usize, count: usize, n_derivatives: usize) -> Self {
+    pub(super) fn new(dimension: usize, count: usize, parts: Parts) -> Self {
         let n = count.next_multiple_of(COLUMNS);
-        let n_rows = N_ROWS + n_derivatives;
+        let n_rows = N_ROWS + parts.n_rows();
         let n_registers = triangle(n).next_multiple_of(BLOCK) + n_rows * n.next_multiple_of(BLOCK);
         let matrix = vec![0.0; (n_registers + 1) * MAX_LANES];
         // On the boundary of a cache line.
         let start = matrix.as_ptr().align_offset(64).min(MAX_LANES);
-        let found = vec![0.0; (Found::of(dimension).of_derivatives() + n_derivatives) * MAX_LANES];
+        let found = vec![0.0; parts.n_numbers(dimension) * MAX_LANES];
         Self { matrix, start, found }
     }
 }
@@ -114,7 +67,9 @@ impl WithSimd for Krige<'_> {
         system.fill_triangle();
         system.fill_rows(parts.order);
         system.fill_derivatives(parts);
-        system.factorize(parts.n_derivatives);
+        system.fill_functionals(parts);
+        system.fill_functions(parts);
+        system.factorize(parts);
         system.sum_up(parts, found);
     }
 }
@@ -311,9 +266,37 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Covariances of functionals of the derivatives with the values.
+    #[inline(always)]
+    fn fill_functionals(&mut self, parts: Parts) {
+        for functional in 0..parts.n_functionals {
+            let row = self.row(parts.quantities() + functional);
+            for j in 0..self.n {
+                let mut sum = self.splat(0.0);
+                for derivative in 0..parts.n_derivatives {
+                    let factor =
+                        self.of(&self.batch.functionals, functional * parts.n_derivatives + derivative);
+                    sum = factor.mul_add(self.at(self.row(N_ROWS + derivative) + j), sum);
+                }
+                sum.write(self.matrix, row + j);
+            }
+        }
+    }
+
+    /// The functions of the mean at the points.
+    #[inline(always)]
+    fn fill_functions(&mut self, parts: Parts) {
+        for function in 0..parts.n_functions {
+            let row = self.row(parts.functions() + function);
+            for j in 0..self.n {
+                self.of(&self.batch.functions, function * self.n + j).write(self.matrix, row + j);
+            }
+        }
+    }
+
     /// Left-looking, in tiles: K = LLᵀ, and below it the right-hand sides times L⁻ᵀ.
     #[inline(always)]
-    fn factorize(&mut self, n_derivatives: usize) {
+    fn factorize(&mut self, parts: Parts) {
         for column in (0..self.n).step_by(COLUMNS) {
             // The triangle on the diagonal, row by row.
             for i in column..column + COLUMNS {
@@ -335,8 +318,8 @@ impl<S: Simd> Factored<'_, S> {
                 }
             }
             self.tile::<2>([self.row(VALUES), self.row(CROSS)], column, COLUMNS);
-            for derivative in 0..n_derivatives {
-                self.tile::<1>([self.row(N_ROWS + derivative)], column, COLUMNS);
+            for row in parts.quantities()..N_ROWS + parts.n_rows() {
+                self.tile::<1>([self.row(row)], column, COLUMNS);
             }
         }
     }
@@ -420,9 +403,19 @@ impl<S: Simd> Factored<'_, S> {
             self.back_substitute(cross, weights);
             self.product(weights, weights).write(found, places.norm_squared);
         }
-        for derivative in 0..parts.n_derivatives {
-            let row = self.row(N_ROWS + derivative);
-            self.product(row, row).write(found, places.of_derivatives() + derivative);
+        for quantity in 0..parts.n_quantities() {
+            let row = self.row(parts.quantities() + quantity);
+            self.product(row, row).write(found, places.of_quantities() + quantity);
+        }
+        let mut place = places.of_functions(&parts);
+        for function in 0..parts.n_functions {
+            let row = self.row(parts.functions() + function);
+            self.product(row, cross).write(found, place);
+            for quantity in 0..parts.n_quantities() {
+                let other = self.row(parts.quantities() + quantity);
+                self.product(row, other).write(found, place + 1 + quantity);
+            }
+            place += 1 + parts.n_quantities();
         }
         if parts.order > 0 {
             self.back_substitute(values, weights);

@@ -11,31 +11,39 @@
 //! neighbours are not values of one function.
 
 mod batch;
+mod coarse;
+mod enough;
+mod fit;
 mod kriging;
+mod near;
+mod parts;
+mod quantities;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
 use super::deviations::JetDeviations;
-use super::functionals::has_variance;
 use super::posterior::Variances;
-use crate::numerics::error::{NotDefinite, NumericsError};
-use crate::numerics::machine::heap::{arc_payload, block_bytes};
+use crate::numerics::error::NumericsError;
 use crate::numerics::machine::instruction_set::InstructionSet;
-use crate::numerics::machine::small::Small;
 use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::neighbours::{Neighbour, Neighbours};
+use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::System;
 use crate::numerics::solver::choose::NEIGHBOURS;
-use crate::numerics::sums::jets::{JetOrder, Jets, Layout};
-use batch::Batch;
-use kriging::{Found, Krige, Parts, Workspace};
+use crate::numerics::solver::trend::Trend;
+use crate::numerics::sums::jets::{JetOrder, Jets};
+pub use coarse::Coarse;
+use fit::{Fit, Room};
+use near::Near;
+pub(crate) use quantities::Functionals;
+use quantities::Quantities;
 
 /// A system that is solved around each query anew.
 pub struct Moving {
@@ -43,40 +51,15 @@ pub struct Moving {
     near: Near,
 }
 
-/// Who knows which points are near: those with the greatest covariances.
-enum Near {
-    Sampled(Arc<Sampling>),
-    /// In coordinates in which the kernel has one length scale.
-    Stretched(Neighbours),
-}
-
-impl Near {
-    /// The nearest points, nearest first.
-    fn nearest_into(&self, system: &System, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
-        match self {
-            Self::Sampled(sampling) => sampling.neighbours().nearest_into(x, count, found),
-            Self::Stretched(neighbours) => {
-                let stretched = x.iter().enumerate().map(|(axis, x)| x * system.kernel().stretch(axis));
-                neighbours.nearest_into(&stretched.collect::<Small>(), count, found);
-            }
-        }
-    }
-
-    fn n_bytes(&self) -> usize {
-        match self {
-            Self::Sampled(sampling) => block_bytes(arc_payload::<Sampling>()) + sampling.n_bytes(),
-            Self::Stretched(neighbours) => neighbours.n_bytes(),
-        }
-    }
-}
-
 /// What is asked at queries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MovingRequest {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MovingRequest<'a> {
     pub order: JetOrder,
     pub has_variances: bool,
     /// Deviations of all that is asked for, derivatives included.
     pub has_deviations: bool,
+    /// The mean of the function, if it has one.
+    pub trend: Option<&'a Trend>,
 }
 
 /// What is found there.
@@ -88,6 +71,26 @@ pub struct MovingAnswer {
     pub deviations: Option<JetDeviations>,
     /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
     pub n_dependent: usize,
+}
+
+/// What is asked of functionals of derivatives, up to an order.
+#[derive(Clone, Copy)]
+pub(crate) struct FunctionalsRequest<'a> {
+    pub(crate) order: JetOrder,
+    pub(crate) functionals: Functionals<'a>,
+    /// Of each query.
+    pub(crate) count: usize,
+    /// The mean of the function, if it has one.
+    pub(crate) trend: Option<&'a Trend>,
+}
+
+/// What is found of them.
+pub(crate) struct MovingFunctionals {
+    pub(crate) jets: Jets,
+    /// `[m, count]`.
+    pub(crate) deviations: Vec<f64>,
+    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    pub(crate) n_dependent: usize,
 }
 
 impl Moving {
@@ -123,6 +126,8 @@ impl Moving {
 
     /// Answers at queries `[m, d]` for values `[n]`, unit V.
     ///
+    /// Variances and deviations take in what is not known of the mean.
+    ///
     /// A negative variance is clamped only within `τ = 4ε(k₀ + (k k₀ + max α)|w|²)`, k the neighbours, and reported.
     ///
     /// # Errors
@@ -134,7 +139,7 @@ impl Moving {
         &self,
         values: &[f64],
         queries: &Cloud,
-        request: MovingRequest,
+        request: MovingRequest<'_>,
         observer: &dyn Observer,
     ) -> Result<MovingAnswer, NumericsError> {
         self.at_with(InstructionSet::best(), values, queries, request, observer)
@@ -145,19 +150,67 @@ impl Moving {
         set: InstructionSet,
         values: &[f64],
         queries: &Cloud,
-        request: MovingRequest,
+        request: MovingRequest<'_>,
         observer: &dyn Observer,
     ) -> Result<MovingAnswer, NumericsError> {
-        self.system.cloud().check_same_dimension(queries)?;
-        self.system.cloud().check_one_per_point(values)?;
+        let (kernel, d, order) = (self.system.kernel(), queries.dimension(), request.order.degree());
+        let quantities = match request.has_deviations {
+            true => Quantities::derivatives(kernel, d, order)?,
+            false => Quantities::none(),
+        };
+        let asked = Asked { set, request, quantities, n_neighbours: self.n_neighbours() };
+        let Raw { jets, mut sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
+        let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
+        let deviations = request.has_deviations.then(|| {
+            let values = sure.iter_mut().step_by(n_sure).zip(&variances.latent);
+            values.for_each(|(slot, variance)| *slot = if *slot < 0.0 { -0.0 } else { variance.sqrt() });
+            let clamped = of_clamped(&mut sure, n_sure);
+            JetDeviations { clamped, ..JetDeviations::of_packed(&sure, d, order) }
+        });
+        let variances = request.has_variances.then_some(variances);
+        Ok(MovingAnswer { jets, variances, deviations, n_dependent })
+    }
+
+    /// Jets at queries with the deviations `[m, count]` of functionals of their derivatives, `count` at each query.
+    ///
+    /// # Errors
+    /// Those of [`Moving::at`].
+    pub(crate) fn functionals_at(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        asked: FunctionalsRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<MovingFunctionals, NumericsError> {
+        let FunctionalsRequest { order, functionals, count, trend } = asked;
+        let quantities = Quantities::functionals(self.system.kernel(), functionals, count, order.degree())?;
+        let request = MovingRequest { order, has_variances: false, has_deviations: false, trend };
+        let (set, n_neighbours) = (InstructionSet::best(), self.n_neighbours());
+        let asked = Asked { set, request, quantities, n_neighbours };
+        let Raw { jets, sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
+        let deviations = sure.chunks_exact(n_sure).flat_map(|sure| &sure[1..]).map(|s| s.abs()).collect();
+        Ok(MovingFunctionals { jets, deviations, n_dependent })
+    }
+
+    fn run(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        asked: Asked<'_>,
+        observer: &dyn Observer,
+    ) -> Result<Raw, NumericsError> {
+        let (set, trend) = (asked.set, asked.request.trend);
+        let cloud = self.system.cloud();
+        cloud.check_same_dimension(queries)?;
+        cloud.check_one_per_point(values)?;
         observer.enter(Stage::Evaluate);
-        let (m, d, lanes) = (queries.n_points(), queries.dimension(), set.n_lanes());
-        let layout = Layout::new(request.order, d);
-        let width = layout.width();
-        let fit =
-            Fit { moving: self, values, queries, request, layout, derivatives: self.derivatives(request)? };
-        // The variance of the value, then deviations of derivatives.
-        let n_sure = 1 + fit.derivatives.len();
+        let (m, lanes) = (queries.n_points(), set.n_lanes());
+        let values = match trend {
+            None => Cow::Borrowed(values),
+            Some(trend) => Cow::Owned(trend.removed_from(values, cloud)),
+        };
+        let fit = Fit::new(self, &values, queries, asked);
+        let (width, n_sure) = (fit.layout.width(), 1 + fit.parts.n_quantities());
         let (mut packed, mut sure) = (vec![0.0; m * width], vec![0.0; m * n_sure]);
         let n_dependent = AtomicUsize::new(0);
         let slots = packed.par_chunks_mut(lanes * width).zip(sure.par_chunks_mut(lanes * n_sure));
@@ -170,47 +223,31 @@ impl Moving {
                 Ok(())
             },
         )?;
-        let jets = Jets::of(layout, packed);
-        let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
-        let deviations = request.has_deviations.then(|| {
-            let values = sure.iter_mut().step_by(n_sure).zip(&variances.latent);
-            values.for_each(|(slot, variance)| *slot = if *slot < 0.0 { -0.0 } else { variance.sqrt() });
-            let clamped = of_clamped(&mut sure, n_sure);
-            JetDeviations { clamped, ..JetDeviations::of_packed(&sure, d, request.order.degree()) }
-        });
-        let variances = request.has_variances.then_some(variances);
-        Ok(MovingAnswer { jets, variances, deviations, n_dependent: n_dependent.into_inner() })
-    }
-
-    /// The derivatives whose deviations are asked for.
-    fn derivatives(&self, request: MovingRequest) -> Result<Vec<Derivative>, NumericsError> {
-        let (kernel, d, order) =
-            (self.system.kernel(), self.system.cloud().dimension(), request.order.degree());
-        if !request.has_deviations || order == 0 {
-            return Ok(Vec::new());
-        }
-        if !has_variance(kernel, order) {
-            return Err(NumericsError::DerivativesVary { order });
-        }
-        let ([_, slope, bend], v) = (kernel.profile_at_zero(), kernel.variance());
-        let unit = |axis: usize| kernel.stretch(axis) / kernel.length_scale();
-        let first = (0..d).map(|a| Derivative { prior_variance: -2.0 * v * slope, unit: unit(a) });
-        let of_pair = |(a, b): (usize, usize)| Derivative {
-            prior_variance: 4.0 * v * bend * if a == b { 3.0 } else { 1.0 },
-            unit: unit(a) * unit(b),
+        let jets = Jets::of(fit.layout, packed);
+        let jets = match trend {
+            None => jets,
+            Some(trend) => jets.plus_linear(queries, &trend.gradient(), |x| trend.at(x)),
         };
-        let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
-        let second = pairs.map(of_pair).filter(|_| order == 2);
-        Ok(first.chain(second).collect())
+        Ok(Raw { jets, sure, n_sure, n_dependent: n_dependent.into_inner() })
     }
 }
 
-/// A derivative whose deviation is asked for.
-struct Derivative {
-    /// In units of ℓ.
-    prior_variance: f64,
-    /// What turns its deviation in units of ℓ into one along the axes.
-    unit: f64,
+/// What is asked of batches.
+struct Asked<'a> {
+    set: InstructionSet,
+    request: MovingRequest<'a>,
+    quantities: Quantities<'a>,
+    /// Points of a neighbourhood.
+    n_neighbours: usize,
+}
+
+/// What batches find.
+struct Raw {
+    jets: Jets,
+    /// The variance of the value, then deviations of the other quantities, `[m, n_sure]`; −0 where rounding made a variance negative.
+    sure: Vec<f64>,
+    n_sure: usize,
+    n_dependent: usize,
 }
 
 /// The queries with a deviation of −0, which says that rounding made its variance negative; it is 0 then.
@@ -230,130 +267,4 @@ fn clamped(mut latent: Vec<f64>) -> Variances {
     let clamped = (0..latent.len()).filter(|&query| latent[query] < 0.0).collect();
     latent.iter_mut().for_each(|variance| *variance = variance.max(0.0));
     Variances { latent, clamped }
-}
-
-/// What all batches share.
-struct Fit<'a> {
-    moving: &'a Moving,
-    values: &'a [f64],
-    queries: &'a Cloud,
-    request: MovingRequest,
-    layout: Layout,
-    /// Whose deviations are asked for.
-    derivatives: Vec<Derivative>,
-}
-
-/// Room that a thread keeps from one batch to the next.
-struct Room {
-    set: InstructionSet,
-    batch: Batch,
-    workspace: Workspace,
-    nearest: Vec<Neighbour>,
-    sums: Vec<f64>,
-}
-
-impl Room {
-    fn new(fit: &Fit<'_>, set: InstructionSet) -> Self {
-        let (dimension, count) = (fit.queries.dimension(), fit.moving.n_neighbours());
-        let n_derivatives = fit.derivatives.len();
-        Self {
-            set,
-            batch: Batch::new(dimension, count, set.n_lanes()),
-            workspace: Workspace::new(dimension, count, n_derivatives),
-            nearest: Vec::with_capacity(count + 1),
-            sums: vec![0.0; Found::of(dimension).of_derivatives() + n_derivatives],
-        }
-    }
-
-    /// Puts the neighbourhoods of some consecutive queries side by side.
-    fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
-        let Moving { system, near } = fit.moving;
-        let needs_smooth = fit.request.order != JetOrder::Value && system.kernel().has_kink();
-        for lane in 0..n_queries {
-            let (query, count) = (first + lane, self.batch.count);
-            let x = fit.queries.point(query);
-            near.nearest_into(system, x, count, &mut self.nearest);
-            let coinciding = |n: &&Neighbour| system.cloud().point(n.point) == x;
-            if let Some(found) = self.nearest.iter().find(coinciding).filter(|_| needs_smooth) {
-                return Err(NumericsError::KernelNotSmooth { query, point: found.point });
-            }
-            self.batch.put(lane, x, &self.nearest, system, fit.values);
-        }
-        (n_queries..self.set.n_lanes()).for_each(|lane| self.batch.copy_lane(0, lane));
-        Ok(())
-    }
-
-    /// The numbers of one query.
-    fn read(&mut self, lane: usize) {
-        let numbers = self.workspace.found[lane..].iter().step_by(self.set.n_lanes());
-        self.sums.iter_mut().zip(numbers).for_each(|(sum, number)| *sum = *number);
-    }
-}
-
-impl Fit<'_> {
-    /// Answers the queries of a batch; says at how many of them neighbours were left out.
-    fn answer(
-        &self,
-        room: &mut Room,
-        first: usize,
-        jets: &mut [f64],
-        sure: &mut [f64],
-    ) -> Result<usize, NumericsError> {
-        let kernel = self.moving.system.kernel();
-        let parts = Parts {
-            order: self.request.order.degree(),
-            variances: self.request.has_variances || self.request.has_deviations,
-            n_derivatives: self.derivatives.len(),
-        };
-        room.set.dispatch(Krige { batch: &room.batch, kernel, parts, workspace: &mut room.workspace });
-        let places = Found::of(self.queries.dimension());
-        let mut n_thinned = 0;
-        let slots = jets.chunks_exact_mut(self.layout.width());
-        for (lane, (jet, sure)) in slots.zip(sure.chunks_exact_mut(1 + parts.n_derivatives)).enumerate() {
-            let query = first + lane;
-            room.read(lane);
-            self.layout.finish(kernel, &room.sums, jet);
-            // It has the variance already.
-            jet[0] = room.sums[0];
-            if jet.iter().any(|x| !x.is_finite()) {
-                return Err(NumericsError::Overflow { query });
-            }
-            n_thinned += usize::from(room.sums[places.n_dependent] > 0.0);
-            if parts.variances {
-                sure[0] = kernel.at_zero() - room.sums[places.explained];
-                self.check_is_rounding(query, sure[0], room.sums[places.norm_squared], &room.batch)?;
-            }
-            let explained = &room.sums[places.of_derivatives()..];
-            for ((slot, of), explained) in sure[1..].iter_mut().zip(&self.derivatives).zip(explained) {
-                let variance = of.prior_variance - explained;
-                // What is no number stays none.
-                *slot = if variance < 0.0 { -0.0 } else { of.unit * variance.sqrt() };
-            }
-            if sure[1..].iter().any(|deviation| !deviation.is_finite()) {
-                return Err(NumericsError::Overflow { query });
-            }
-        }
-        Ok(n_thinned)
-    }
-
-    fn check_is_rounding(
-        &self,
-        query: usize,
-        variance: f64,
-        norm_squared: f64,
-        batch: &Batch,
-    ) -> Result<(), NumericsError> {
-        if variance >= 0.0 {
-            return Ok(());
-        }
-        let k0 = self.moving.system.kernel().at_zero();
-        // At least the norm of the matrix: no entry of K is greater than k₀.
-        let norm = batch.count as f64 * k0 + batch.noise.iter().copied().fold(0.0, f64::max);
-        if -variance <= 4.0 * f64::EPSILON * (k0 + norm * norm_squared) {
-            return Ok(());
-        }
-        let minimum_alpha = 4.0 * batch.count as f64 * f64::EPSILON * norm;
-        let reason = NotDefinite::NegativeVariance { query, variance };
-        Err(NumericsError::NotPositiveDefinite { reason, minimum_alpha })
-    }
 }

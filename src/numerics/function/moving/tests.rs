@@ -7,8 +7,8 @@ use crate::numerics::solver::Solver;
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::testing::{all_families, fibonacci_sphere};
 
-const EVERYTHING: MovingRequest =
-    MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations: false };
+const EVERYTHING: MovingRequest<'_> =
+    MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations: false, trend: None };
 
 fn system(cloud: &Cloud, family: Family, alpha: f64) -> System {
     let kernel = Kernel::new(family, 0.9, 1.7).unwrap();
@@ -81,7 +81,7 @@ fn a_small_cloud_has_the_dense_deviations_of_derivatives_on_every_instruction_se
         let dense = Interpolant::fit(solver, &values, &Unobserved).unwrap();
         let squares = |deviations: &[f64]| deviations.iter().map(|s| s * s).collect::<Vec<f64>>();
         for order in [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian] {
-            let request = MovingRequest { order, has_variances: false, has_deviations: true };
+            let request = MovingRequest { order, has_variances: false, has_deviations: true, trend: None };
             let expected = JetDeviations::of(&dense, 1.0, &queries, order.degree(), &Unobserved);
             for set in InstructionSet::available() {
                 let moving = moving(system(&cloud, family, 1e-3));
@@ -182,7 +182,8 @@ fn values_are_met_without_noise_and_variances_lie_between_nothing_and_the_prior(
     let (cloud, values) = spiral();
     for family in all_families() {
         let moving = moving(system(&cloud, family, 0.0));
-        let request = MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false };
+        let request =
+            MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false, trend: None };
         let found = moving.at(&values, &cloud, request, &Unobserved).unwrap();
         let (k0, variances) = (moving.system().kernel().at_zero(), found.variances.unwrap());
         for (query, value) in values.iter().enumerate() {
@@ -252,7 +253,8 @@ fn a_kink_at_a_point_has_no_gradient() {
     let queries = Cloud::new([&[0.1, 0.2, 0.3], cloud.point(77)].concat(), 3).unwrap();
     let refused = moving.at(&values, &queries, EVERYTHING, &Unobserved).err();
     assert_eq!(refused, Some(NumericsError::KernelNotSmooth { query: 1, point: 77 }));
-    let request = MovingRequest { order: JetOrder::Value, has_variances: false, has_deviations: false };
+    let request =
+        MovingRequest { order: JetOrder::Value, has_variances: false, has_deviations: false, trend: None };
     assert!(moving.at(&values, &queries, request, &Unobserved).is_ok());
 }
 

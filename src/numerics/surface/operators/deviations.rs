@@ -15,7 +15,7 @@ use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::machine::vector::{dot, norm};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::sums::jets::JetOrder;
+use crate::numerics::sums::jets::{JetOrder, Jets};
 
 /// Standard deviations of `Δ_M u`, `[m]`, unit V/L²; 0 at null queries. Kernel and noise are `factor` times those of the solver.
 ///
@@ -31,8 +31,16 @@ pub fn laplace_beltrami_deviations(
 ) -> Result<Vec<f64>, NumericsError> {
     let of = Applied { geometry, interpolant, factor, queries };
     let mut total = of.of_function(Operator::LaplaceBeltrami, observer)?;
-    let Some(known) = geometry.deviations() else { return Ok(total) };
-    let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+    if geometry.deviations().is_some() {
+        let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+        add_surface_to_laplace_beltrami(geometry, &jets, &mut total);
+    }
+    Ok(total)
+}
+
+/// Adds what is not known of the surface, as far as its deviations are, to the deviations of a function known by its jets, `[m]`.
+pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+    let Some(known) = geometry.deviations() else { return };
     for query in regular(geometry) {
         let (normal, gradient, hessian) = (geometry.normal(query), jets.gradient(query), jets.hessian(query));
         let trace = geometry.trace_of_shape_operator(query);
@@ -46,7 +54,6 @@ pub fn laplace_beltrami_deviations(
         let of_trace = (d - 1) as f64 * known.mean[query] * along;
         total[query] = norm(&[total[query], of_normal, of_trace]);
     }
-    Ok(total)
 }
 
 /// Standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L; 0 at null queries. Kernel and noise are `factor` times those of the
@@ -63,9 +70,17 @@ pub fn surface_gradient_deviations(
 ) -> Result<Vec<f64>, NumericsError> {
     let of = Applied { geometry, interpolant, factor, queries };
     let mut total = of.of_function(Operator::SurfaceGradient, observer)?;
-    let Some(known) = geometry.deviations() else { return Ok(total) };
-    let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
-    let d = queries.dimension();
+    if geometry.deviations().is_some() {
+        let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
+        add_surface_to_gradient(geometry, &jets, &mut total);
+    }
+    Ok(total)
+}
+
+/// The same for the components of the surface gradient, `[m, d]`.
+pub(super) fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+    let Some(known) = geometry.deviations() else { return };
+    let d = jets.dimension();
     for query in regular(geometry) {
         let (normal, gradient) = (geometry.normal(query), jets.gradient(query));
         let along = dot(gradient, normal);
@@ -76,7 +91,6 @@ pub fn surface_gradient_deviations(
             *slot = norm(&[*slot, known.normal[query] * across, known.normal[query] * tilted]);
         }
     }
-    Ok(total)
 }
 
 /// An operator on a function.
@@ -100,7 +114,7 @@ impl Applied<'_> {
         let mut total = vec![0.0; self.queries.n_points() * width];
         for some in all.chunks((FUNCTIONALS_PER_BLOCK / width).max(1)) {
             let functionals: Vec<JetFunctional> =
-                some.iter().flat_map(|&query| self.functionals(operator, query)).collect();
+                some.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect();
             let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
             for (query, found) in some.iter().zip(found.found.chunks_exact(width)) {
                 total[query * width..][..width].copy_from_slice(found);
@@ -108,25 +122,25 @@ impl Applied<'_> {
         }
         Ok(total)
     }
+}
 
-    /// The operator at a query, a functional for each of its components.
-    pub(super) fn functionals(&self, operator: Operator, query: usize) -> Vec<JetFunctional> {
-        let normal = self.geometry.normal(query);
-        let d = normal.len();
-        let projection = |a: usize, b: usize| f64::from(u8::from(a == b)) - normal[a] * normal[b];
-        match operator {
-            Operator::SurfaceGradient => (0..d)
-                .map(|c| {
-                    let row: Vec<f64> = (0..d).map(|b| projection(c, b)).collect();
-                    JetFunctional::derivative(query, &row)
-                })
-                .collect(),
-            Operator::LaplaceBeltrami => {
-                let trace = self.geometry.trace_of_shape_operator(query);
-                let along: Vec<f64> = normal.iter().map(|n| -trace * n).collect();
-                let of_hessian = (0..d * d).map(|at| projection(at / d, at % d)).collect();
-                vec![JetFunctional { of_hessian, ..JetFunctional::derivative(query, &along) }]
-            }
+/// The operator at a query, a functional for each of its components.
+pub(super) fn functionals(geometry: &Geometry, operator: Operator, query: usize) -> Vec<JetFunctional> {
+    let normal = geometry.normal(query);
+    let d = normal.len();
+    let projection = |a: usize, b: usize| f64::from(u8::from(a == b)) - normal[a] * normal[b];
+    match operator {
+        Operator::SurfaceGradient => (0..d)
+            .map(|c| {
+                let row: Vec<f64> = (0..d).map(|b| projection(c, b)).collect();
+                JetFunctional::derivative(query, &row)
+            })
+            .collect(),
+        Operator::LaplaceBeltrami => {
+            let trace = geometry.trace_of_shape_operator(query);
+            let along: Vec<f64> = normal.iter().map(|n| -trace * n).collect();
+            let of_hessian = (0..d * d).map(|at| projection(at / d, at % d)).collect();
+            vec![JetFunctional { of_hessian, ..JetFunctional::derivative(query, &along) }]
         }
     }
 }

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::super::geometry::Geometry;
-use super::deviations::Applied;
+use super::deviations::functionals;
 use super::{Operator, regular};
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::errors::{Process, errors_under};
@@ -76,14 +76,12 @@ impl Judged<'_> {
     /// # Errors
     /// [`NumericsError::InvalidKernelParameter`] for a process beyond float64.
     pub fn by_deviations(self, deviations: &[f64]) -> Result<Vec<usize>, NumericsError> {
-        let k = self.n_components();
-        let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
+        let (kernel, factor) = self.process()?;
+        let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
+        let k = findings.n_components();
         let operator = if k == 1 { Operator::LaplaceBeltrami } else { Operator::SurfaceGradient };
-        let some: Vec<usize> = regular(self.geometry).take(JUDGED_FUNCTIONALS / k).collect();
-        let most = self.most(regular(self.geometry).map(of), &self.functionals(operator, &some))?;
-        // Also where there is no number.
-        let is_sure = |(_, deviation): &(usize, f64)| *deviation <= most;
-        Ok(regular(self.geometry).map(of).filter(|of| !is_sure(of)).map(|(query, _)| query).collect())
+        let some: Vec<usize> = regular(self.geometry).take(findings.n_judged()).collect();
+        Ok(findings.doubtful(deviations, &self.functionals(operator, &some)))
     }
 
     fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
@@ -92,14 +90,16 @@ impl Judged<'_> {
         if regular.is_empty() || !has_derivatives {
             return Ok(regular);
         }
-        let k = self.n_components();
+        let (kernel, factor) = self.process()?;
+        let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
+        let k = findings.n_components();
         let places = self.queries.select(&regular);
-        let chosen = thinned_points(&places, (JUDGED_FUNCTIONALS / k).max(1));
+        let chosen = thinned_points(&places, findings.n_judged());
         let judged: Vec<usize> = chosen.iter().map(|&at| regular[at]).collect();
         let functionals = self.functionals(operator, &judged);
         let errors = self.errors(&functionals, observer)?;
         let errors: Vec<f64> = errors.chunks_exact(k).map(norm).collect();
-        let most = self.most(judged.into_iter().zip(errors.iter().copied()), &functionals)?;
+        let most = findings.most(judged.into_iter().zip(errors.iter().copied()), &functionals);
         let coarse = places.select(&chosen);
         let near = Neighbours::of(&coarse, observer)?;
         let is_doubtful = |found: &mut Vec<Neighbour>, at: usize| {
@@ -117,9 +117,7 @@ impl Judged<'_> {
     }
 
     fn functionals(&self, operator: Operator, judged: &[usize]) -> Vec<JetFunctional> {
-        let Self { geometry, interpolant, factor, queries, .. } = *self;
-        let applied = Applied { geometry, interpolant, factor, queries };
-        judged.iter().flat_map(|&query| applied.functionals(operator, query)).collect()
+        judged.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect()
     }
 
     /// The kernel of the process that the values come from, and by how much it is scaled. What is learned beside a kernel that stretches coordinates
@@ -162,9 +160,35 @@ impl Judged<'_> {
             found => found.map(|found| found.found),
         }
     }
+}
 
+/// What an operator was found to be, on a process with a kernel that is scaled by a factor.
+pub(super) struct Findings<'a> {
+    pub(super) geometry: &'a Geometry,
+    /// `[m, k]`.
+    pub(super) found: &'a [f64],
+    pub(super) kernel: &'a Kernel,
+    pub(super) factor: f64,
+}
+
+impl Findings<'_> {
     fn n_components(&self) -> usize {
-        self.found.len() / self.queries.n_points()
+        self.found.len() / self.geometry.n_queries()
+    }
+
+    /// Queries that are looked at, at most.
+    pub(super) fn n_judged(&self) -> usize {
+        (JUDGED_FUNCTIONALS / self.n_components()).max(1)
+    }
+
+    /// The queries, ascending, at which deviations `[m, k]` leave little; `functionals` are those of some of them.
+    pub(super) fn doubtful(&self, deviations: &[f64], functionals: &[JetFunctional]) -> Vec<usize> {
+        let k = self.n_components();
+        let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
+        let most = self.most(regular(self.geometry).map(of), functionals);
+        // Also where there is no number.
+        let is_sure = |(_, deviation): &(usize, f64)| *deviation <= most;
+        regular(self.geometry).map(of).filter(|of| !is_sure(of)).map(|(query, _)| query).collect()
     }
 
     /// The deviation that leaves little of what there is, from deviations at some queries.
@@ -172,14 +196,10 @@ impl Judged<'_> {
     /// Squares of what was found are those of what there is and of the errors. Where errors differ as much as they do between points of
     /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982). A few queries may all
     /// lie where there is nothing: what the process has beforehand counts like [`N_BEFOREHAND`] more.
-    fn most(
-        &self,
-        deviations: impl Iterator<Item = (usize, f64)>,
-        functionals: &[JetFunctional],
-    ) -> Result<f64, NumericsError> {
-        let (k, (kernel, factor)) = (self.n_components(), self.process()?);
-        let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(&kernel)).sum();
-        let beforehand = (prior * k as f64 / functionals.len().max(1) as f64).sqrt() * factor.sqrt();
+    fn most(&self, deviations: impl Iterator<Item = (usize, f64)>, functionals: &[JetFunctional]) -> f64 {
+        let k = self.n_components();
+        let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(self.kernel)).sum();
+        let beforehand = (prior * k as f64 / functionals.len().max(1) as f64).sqrt() * self.factor.sqrt();
         let lengths = deviations.map(|(query, error)| (norm(&self.found[query * k..][..k]), error));
         let lengths: Vec<(f64, f64)> = lengths.chain([(beforehand, 0.0); N_BEFOREHAND]).collect();
         // In units of the greatest, whose square may have no number. Without one nothing is sure.
@@ -187,7 +207,7 @@ impl Judged<'_> {
         let squared = |&(found, error): &(f64, f64)| ((found / unit).powi(2), (error / unit).powi(2));
         let squares: Vec<(f64, f64)> = lengths.iter().map(squared).collect();
         // Errors that the process does not expect would count as what there is: it is no more than what the process has beforehand.
-        Ok(UNCERTAIN * (unit * spread_beside_errors(&squares).sqrt()).min(beforehand))
+        UNCERTAIN * (unit * spread_beside_errors(&squares).sqrt()).min(beforehand)
     }
 }
 

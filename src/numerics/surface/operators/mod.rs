@@ -6,6 +6,7 @@
 
 mod deviations;
 mod doubts;
+mod kriged;
 mod resolution;
 mod stencils;
 
@@ -26,11 +27,12 @@ use crate::numerics::observer::{Observer, Stage};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::solver::Solver;
 use crate::numerics::solver::trend::{Basis, Mean};
-use crate::numerics::sums::jets::{JetOrder, check_smooth_at};
+use crate::numerics::sums::jets::{JetOrder, Jets, check_smooth_at};
 use crate::numerics::sums::nodes::Nodes;
 pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
 pub use doubts::{JUDGED_FUNCTIONALS, Judged};
-pub use stencils::{SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
+pub use kriged::{Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged};
+pub use stencils::{RowKind, SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
 /// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
 ///
@@ -42,9 +44,13 @@ pub fn surface_gradient(
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
-    let d = queries.dimension();
-    let mut gradients = vec![0.0; queries.n_points() * d];
+    Ok(surface_gradient_of(geometry, &interpolant.at(queries, JetOrder::Gradient, observer)?))
+}
+
+/// The same of a function that is known by its jets.
+fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
+    let d = jets.dimension();
+    let mut gradients = vec![0.0; jets.n_queries() * d];
     for query in regular(geometry) {
         let (gradient, normal) = (jets.gradient(query), geometry.normal(query));
         let along = dot(gradient, normal);
@@ -52,7 +58,7 @@ pub fn surface_gradient(
             *slot = gradient[c] - along * normal[c];
         }
     }
-    Ok(gradients)
+    gradients
 }
 
 /// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at null queries.
@@ -67,15 +73,19 @@ pub fn laplace_beltrami(
     queries: &Cloud,
     observer: &dyn Observer,
 ) -> Result<Vec<f64>, NumericsError> {
-    let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
-    let mut values = vec![0.0; queries.n_points()];
+    Ok(laplace_beltrami_of(geometry, &interpolant.at(queries, JetOrder::Hessian, observer)?))
+}
+
+/// The same of a function that is known by its jets.
+fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
+    let mut values = vec![0.0; jets.n_queries()];
     for query in regular(geometry) {
         let normal = geometry.normal(query);
         let along = dot(jets.gradient(query), normal);
         values[query] =
             tangential_trace(&jets.hessian(query), normal) - geometry.trace_of_shape_operator(query) * along;
     }
-    Ok(values)
+    values
 }
 
 /// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of null queries are zero.

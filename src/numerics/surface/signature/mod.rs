@@ -11,7 +11,7 @@ mod serving;
 use std::sync::{Arc, OnceLock};
 
 use super::degeneracy::is_too_rough;
-use super::orientation::{Oriented, SurfaceOrientation};
+use super::orientation::{Oriented, Sampled, SurfaceOrientation};
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
@@ -79,7 +79,8 @@ impl SignatureSurface {
         let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
         let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
         let directions = directions(&signature, &sampling, &quadrics, observer)?;
-        let oriented = Oriented::of(cloud, (&around, sampling.spacings()), directions, &quadrics, given);
+        let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
+        let oriented = Oriented::of(&sampled, directions, &quadrics, given)?;
         let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
         let left_out_misses = OnceLock::new();
@@ -178,6 +179,11 @@ impl SignatureSurface {
         &self.oriented.normals[point * d..][..d]
     }
 
+    /// Whether what is known of the side of a point contradicts itself.
+    pub(crate) fn has_ambiguous_side(&self, point: usize) -> bool {
+        self.oriented.is_ambiguous[point]
+    }
+
     /// u, ∇u and D²u at the points, where they were kept.
     pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
         self.signature.jets()
@@ -226,6 +232,7 @@ impl SignatureSurface {
             + self.sampling.n_bytes()
             + self.quadrics.n_bytes()
             + vec_bytes(&self.oriented.normals)
+            + vec_bytes(&self.oriented.is_ambiguous)
             + left_out_misses
             + block_bytes(arc_payload::<Sampling>())
             + block_bytes(arc_payload::<Self>())

@@ -294,6 +294,10 @@ impl Service<'_> {
         if is_far(site.nearest.squared_distance, site.spacing) {
             return Some(DegeneracyReason::FarFromCloud);
         }
+        let has_side = self.request.orientation == Orientation::Outward;
+        if has_side && self.surface.has_ambiguous_side(site.nearest.point) {
+            return Some(DegeneracyReason::AmbiguousSide);
+        }
         if !self.request.checks_curvatures {
             return None;
         }

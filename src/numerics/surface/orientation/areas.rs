@@ -1,0 +1,79 @@
+//! The area of the surface that each point stands for.
+
+use super::edges::Edge;
+use super::{Sampled, n_neighbours};
+use crate::numerics::machine::vector::dot;
+use crate::numerics::points::cloud::squared_distance;
+use crate::numerics::surface::winding::ball_volume;
+
+/// Reach of the sum over the distance to the last of the neighbours, so that the last ones count.
+const REACH: f64 = 1.2;
+
+/// The weight of a point in its own sum: 1 is right on a lattice, 0 at random points. With ½ both are right
+/// to a tenth.
+const OWN: f64 = 0.5;
+
+/// The share of its neighbours that is on the sheet of a point at least: rough normals lose edges on their
+/// own sheet, and between two sheets half of the neighbours are on the other one.
+const LEAST_SHARE: f64 = 0.5;
+
+/// Areas in units of radius^{d−1}, `[n]`, from the neighbours of each point on its sheet.
+pub(super) fn areas(sampled: &Sampled<'_>, edges: &[Edge], radius: f64) -> Vec<f64> {
+    let n = sampled.cloud.n_points();
+    let mut areas = Vec::with_capacity(n);
+    let mut rest = edges;
+    for point in 0..n {
+        let (own, others) = rest.split_at(rest.iter().take_while(|edge| edge.a == point).count());
+        rest = others;
+        let place = Place { sampled, point, own };
+        areas.push(match sampled.cloud.dimension() {
+            2 => place.length() / radius,
+            _ => place.area(radius),
+        });
+    }
+    areas
+}
+
+/// A point with its edges.
+struct Place<'a> {
+    sampled: &'a Sampled<'a>,
+    point: usize,
+    own: &'a [Edge],
+}
+
+impl Place<'_> {
+    /// `V_{d−1} R^{d−1} 2/(d+1) / Σ (1 − |y − x|²/R²)`: the integral of the summand over its sum.
+    fn area(&self, radius: f64) -> f64 {
+        let (cloud, k) = (self.sampled.cloud, self.sampled.cloud.dimension() - 1);
+        let around = self.sampled.around.around(self.point).iter().take(n_neighbours(cloud) + 1);
+        let squared_reach =
+            REACH * REACH * around.clone().next_back().map_or(0.0, |last| last.squared_distance);
+        if squared_reach == 0.0 {
+            return 0.0;
+        }
+        // An edge across a gap may be longer than the reach.
+        let term = |squared: f64| (1.0 - squared / squared_reach).max(0.0);
+        let x = cloud.point(self.point);
+        let on_sheet: f64 = self.own.iter().map(|edge| term(squared_distance(x, cloud.point(edge.b)))).sum();
+        let others = around.filter(|found| found.squared_distance > 0.0);
+        let all: f64 = others.map(|found| term(found.squared_distance)).sum();
+        let sum = OWN + on_sheet.max(LEAST_SHARE * all);
+        ball_volume(k) * 2.0 / (k + 2) as f64 * (squared_reach.sqrt() / radius).powi(k as i32) / sum
+    }
+
+    /// Half the way to the next points of the curve on both sides; twice the half on one side at an end.
+    fn length(&self) -> f64 {
+        let x = self.sampled.cloud.point(self.point);
+        let step = |edge: &Edge| -> [f64; 2] {
+            let y = self.sampled.cloud.point(edge.b);
+            [y[0] - x[0], y[1] - x[1]]
+        };
+        let Some(ahead) = self.own.first().map(step) else {
+            return self.sampled.sampling.spacing(self.point);
+        };
+        let first = dot(&ahead, &ahead).sqrt();
+        // Edges come nearest first.
+        let behind = self.own.iter().map(step).find(|step| dot(step, &ahead) < 0.0);
+        0.5 * (first + behind.map_or(first, |step| dot(&step, &step).sqrt()))
+    }
+}

@@ -1,0 +1,59 @@
+//! Disjoint sets of points with signs relative to one another.
+
+/// Disjoint sets whose members have a sign relative to their root.
+pub(super) struct SignedForest {
+    parents: Vec<usize>,
+    signs: Vec<f64>,
+    sizes: Vec<usize>,
+}
+
+/// Where a member of a forest is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    pub root: usize,
+    /// Relative to the root, +1 or −1.
+    pub sign: f64,
+}
+
+impl SignedForest {
+    pub(super) fn new(n: usize) -> Self {
+        Self { parents: (0..n).collect(), signs: vec![1.0; n], sizes: vec![1; n] }
+    }
+
+    /// The root of a member and the sign relative to it. Depth is logarithmic, since smaller sets join larger
+    /// ones.
+    pub(super) fn find(&mut self, member: usize) -> Found {
+        let (mut root, mut sign) = (member, 1.0);
+        while self.parents[root] != root {
+            sign *= self.signs[root];
+            root = self.parents[root];
+        }
+        (self.parents[member], self.signs[member]) = (root, sign);
+        Found { root, sign }
+    }
+
+    /// [`SignedForest::find`] of every member.
+    pub(super) fn find_all(&mut self) -> Vec<Found> {
+        (0..self.parents.len()).map(|member| self.find(member)).collect()
+    }
+
+    /// Members of the set with this root.
+    pub(super) fn size(&self, root: usize) -> usize {
+        self.sizes[root]
+    }
+
+    /// Joins the sets of two members that have this sign relative to one another; members of one set keep
+    /// theirs.
+    pub(super) fn join(&mut self, a: usize, b: usize, sign: f64) {
+        let (mut a, mut b) = (self.find(a), self.find(b));
+        if a.root == b.root {
+            return;
+        }
+        if self.sizes[a.root] < self.sizes[b.root] {
+            std::mem::swap(&mut a, &mut b);
+        }
+        self.parents[b.root] = a.root;
+        self.signs[b.root] = sign * a.sign * b.sign;
+        self.sizes[a.root] += self.sizes[b.root];
+    }
+}

@@ -1,0 +1,95 @@
+//! The clouds whose sides are counted, by name.
+
+use std::f64::consts::TAU;
+
+use super::clouds::{
+    Sided, along, cassini, folded_strip, half_plate, length_of, polar, revolved, revolved_area, ring, sphere,
+    surface_spacing,
+};
+use crate::common::random::Random;
+
+/// A cloud, and how far its sheets are apart, in spacings; infinite where there is one only.
+pub struct Case {
+    pub name: String,
+    pub sided: Sided,
+    pub thickness: f64,
+}
+
+impl Case {
+    fn new(name: String, sided: Sided, thickness: f64) -> Self {
+        Self { name, sided, thickness }
+    }
+}
+
+/// Curves `r = 1 + a cos kt` and ovals of Cassini.
+pub fn curves(n: usize, seed: u64) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for is_random in [true, false] {
+        let sampled = |r: &dyn Fn(f64) -> f64| polar(r, n, is_random.then_some(&mut Random(seed + n as u64)));
+        let kind = if is_random { "random" } else { "regular" };
+        for (a, k) in [(0.3, 3.0), (0.5, 5.0), (0.3, 8.0), (0.7, 2.0)] {
+            let name = format!("1 + {a} cos {k}t, {kind}");
+            cases.push(Case::new(name, sampled(&|t| 1.0 + a * (k * t).cos()), f64::INFINITY));
+        }
+        for b in [1.05, 1.01] {
+            let name = format!("Cassini {b}, {kind}");
+            cases.push(Case::new(name, sampled(&cassini(1.0, b)), f64::INFINITY));
+        }
+    }
+    cases
+}
+
+/// A strip in the plane that is folded five times, so many spacings thick and apart.
+pub fn folded_curve(n: usize, thickness: f64, seed: u64) -> Case {
+    let outline_of = |length: f64| folded_strip(1.0, 1.0, 6, length);
+    // Both sides of six layers, and the ends: n points with a spacing of 1.25 times length over n.
+    let wanted = n as f64 / (1.25 * thickness);
+    let ends = length_of(&outline_of(1.0)) - 12.0;
+    let outline = outline_of(((wanted - ends) / 12.0).max(1.0));
+    let n = (1.25 * thickness * length_of(&outline)) as usize;
+    Case::new(format!("folded strip, {thickness}"), along(&outline, n, &mut Random(seed)), thickness)
+}
+
+/// A ring whose section is a strip that is folded, in so many layers, so many spacings thick and apart.
+pub fn folded_sheet(n_layers: usize, thickness: f64, seed: u64) -> Case {
+    let mut outline = folded_strip(1.0, 1.0, n_layers, 2.0);
+    outline.iter_mut().for_each(|(x, _)| x[0] += 2.0);
+    let n = (revolved_area(&outline) * (0.82 * thickness).powi(2)) as usize;
+    let name = format!("folded sheet, {n_layers} layers, {thickness}");
+    Case::new(name, revolved(&outline, n, &mut Random(seed)), thickness)
+}
+
+/// A round plate with a round rim, so many spacings thick.
+pub fn plate(n: usize, thickness: f64, seed: u64) -> Case {
+    let spacing = surface_spacing(TAU, n);
+    let outline = half_plate(1.0, thickness * spacing);
+    Case::new(format!("plate, {thickness}"), revolved(&outline, n, &mut Random(seed)), thickness)
+}
+
+/// A thin torus, its tube so many spacings in radius.
+pub fn tube(n: usize, radius: f64, seed: u64) -> Case {
+    // h = 0.82 √(4π² R r / n) and r = radius h for R = 1.
+    let tube = (radius * 0.82 * TAU).powi(2) / n as f64;
+    let sided = revolved(&ring(1.0, tube), n, &mut Random(seed));
+    Case::new(format!("tube, {radius}"), sided, 2.0 * radius)
+}
+
+/// Two spheres that touch, or are so many spacings apart.
+pub fn two_spheres(n: usize, gap: f64, seed: u64) -> Case {
+    let mut random = Random(seed);
+    let spacing = surface_spacing(2.0 * TAU, n / 2);
+    let parts = [0.0, 2.0 + gap * spacing].map(|x| sphere([x, 0.0, 0.0], 1.0, n / 2, &mut random));
+    Case::new(format!("two spheres, {gap}"), Sided::together(&parts), gap)
+}
+
+/// A hollow ball: a sphere within a sphere, of this share of its radius, with normals into the cavity.
+pub fn nested_spheres(n: usize, share: f64, seed: u64) -> Case {
+    let mut random = Random(seed);
+    let n_inner = (n as f64 * share * share / (1.0 + share * share)) as usize;
+    let parts = [
+        sphere([0.0; 3], 1.0, n - n_inner, &mut random),
+        sphere([0.0; 3], share, n_inner, &mut random).inside_out(),
+    ];
+    let gap = (1.0 - share) / surface_spacing(2.0 * TAU, n - n_inner);
+    Case::new(format!("nested spheres, {share}"), Sided::together(&parts), gap)
+}

@@ -1,0 +1,66 @@
+//! What the sides of closed curves and surfaces must hold.
+
+use super::cases::{Case, curves, folded_sheet, nested_spheres, plate, tube, two_spheres};
+use super::tally::SideTally;
+
+/// What may be wrong without a flag: 0.1 % of the points where sheets are two spacings apart or more, 1 % of
+/// what has no flag elsewhere. Sides are in doubt on 1 % of the points where sheets are four spacings apart.
+fn check(case: &Case, way: &str, tally: SideTally) {
+    println!("{}, {way}: {tally:?}", case.name);
+    if case.thickness >= 2.0 {
+        assert!(tally.flipped_unflagged() <= 0.001, "{}, {way}: {tally:?}", case.name);
+    } else {
+        assert!(tally.wrong_of_unflagged() <= 0.01, "{}, {way}: {tally:?}", case.name);
+    }
+    if case.thickness >= 4.0 {
+        assert!(tally.ambiguous() <= 0.01, "{}, {way}: {tally:?}", case.name);
+    }
+}
+
+fn check_local(case: Case) {
+    check(&case, "local", SideTally::local(&case.sided));
+}
+
+fn check_both(case: Case) {
+    check(&case, "dense", SideTally::dense(&case.sided));
+    check_local(case);
+}
+
+#[test]
+fn plane_curves_have_no_piece_turned_over() {
+    curves(500, 1).into_iter().for_each(check_both);
+    curves(3000, 2).into_iter().for_each(check_local);
+}
+
+#[test]
+fn plates_have_right_sides_or_flags() {
+    for thickness in [0.75, 1.26, 1.84, 2.0, 4.0] {
+        check_both(plate(1000, thickness, 1));
+    }
+}
+
+#[test]
+fn tubes_have_right_sides_or_flags() {
+    for radius in [1.0, 1.5, 2.0, 4.0] {
+        check_both(tube(1000, radius, 1));
+    }
+}
+
+#[test]
+fn spheres_that_touch_are_outward_each() {
+    for gap in [0.0, 1.0, 4.0] {
+        check_both(two_spheres(1000, gap, 1));
+    }
+}
+
+#[test]
+fn normals_of_a_hollow_ball_point_out_of_its_wall() {
+    for share in [0.2, 0.5] {
+        check_both(nested_spheres(1000, share, 1));
+    }
+}
+
+#[test]
+fn folded_sheets_have_right_sides() {
+    check_local(folded_sheet(3, 4.0, 1));
+}
