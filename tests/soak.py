@@ -11,7 +11,8 @@ are new or known; before that it has done so beside factorizations of 16,400 poi
 - every request that was read to its end was answered within its deadline and two seconds, but for events;
 - there was no status of 500 and above but refusals, 503, and deadlines, 504;
 - the resident memory never exceeded the budget by more than a tenth, and was flat within 5 % over the second half;
-- beside the factorizations small requests took at most ten times as long, at the 99th percentile, as on the idle server.
+- beside the factorizations small requests took at most ten times as long, at the 99th percentile, as on the idle server,
+  or a few time slices of the scheduler: where every core computes, a thread that wakes waits for its turn.
 
 Needs nothing but the standard library. What was measured goes to standard output, as a table, and to the report, as JSON.
 """
@@ -51,7 +52,10 @@ FLAGS = [
 STORE_FLAGS = ["--store-bytes", str(4 << 20), "--store-factor-bytes", str(512 << 20)]
 GEOMETRY = ["/v1/normals", "/v1/curvatures", "/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"]
 VALUES = ["/v1/interpolation", "/v1/posterior", "/v1/surface-gradient", "/v1/laplace-beltrami"]
-N_PROBES_IDLE = 300
+# So many that the 99th percentile hangs on ten of them: on the third of 300 it went from 0.5 to 4.2 ms between two runs.
+N_PROBES_IDLE = 1000
+# A slice of Linux's scheduler is 3 to 4 ms where two threads share a core; there are up to three such threads before a probe.
+SECONDS_OF_SLICES = 0.012
 # Each takes more than ten seconds of both cores.
 N_LARGE, N_LARGE_POINTS, SECONDS_BESIDE = 4, 16_400, 30
 
@@ -358,7 +362,7 @@ def judge(soak, idle, beside, loaded):
                 round(1e3 * percentile(seconds[kind], share), 1) for share in (0.5, 0.99)
             ]
         ratio = percentile(beside[kind], 0.99) / percentile(idle[kind], 0.99)
-        if not ratio <= 10:
+        if not (ratio <= 10 or percentile(beside[kind], 0.99) <= SECONDS_OF_SLICES):
             failures.append(f"small requests, {kind}: {ratio:.1f} times as long beside large work")
     if peak > 1.1 * BUDGET:
         failures.append(f"the resident memory reached {peak / BUDGET:.2f} of the budget")

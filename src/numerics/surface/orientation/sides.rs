@@ -30,9 +30,9 @@ const MAX_OFF: f64 = 0.03;
 /// Share of the points of a piece in doubt from which parts of it may point to different sides.
 const SUSPICIOUS: f64 = 0.05;
 
-/// Points of a piece, and share of the points asked about of a part, below which its sign is not asked for:
+/// Points of a piece or a part, and share of the points asked about, below which its sign is not asked for:
 /// what it contributes to winding numbers is less than what they are off. Parts of 14 points of a noisy scan
-/// of 1,839 were turned over.
+/// of 1,839 were turned over, and single points of a noisy ellipse of 32.
 const LEAST_PIECE: usize = 12;
 const LEAST_PART: f64 = 0.02;
 
@@ -122,7 +122,8 @@ fn turn_parts(
     let mut wanted = parts.by_size();
     wanted.retain(|&part| parts.members[part].first().is_some_and(|&point| is_suspicious(point)));
     let n_wanted: usize = wanted.iter().map(|&part| parts.members[part].len()).sum();
-    let is_large = |part: &usize| parts.members[*part].len() as f64 >= LEAST_PART * n_wanted as f64;
+    let least = (LEAST_PART * n_wanted as f64).max(LEAST_PIECE as f64);
+    let is_large = |part: &usize| parts.members[*part].len() as f64 >= least;
     let large: Vec<usize> = wanted.iter().copied().filter(is_large).collect();
     let problem = Problem::of(field, &parts, &large, signs)?.with_springs(&parts, edges, signs);
     let turned = problem.turned(ON_PART);
