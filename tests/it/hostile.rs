@@ -119,11 +119,17 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
     // Beyond what is factorized, and well within.
     let large = HOSTILE.iter().map(|hostile| (hostile, 60_000));
     let small = HOSTILE.iter().step_by(4).map(|hostile| (hostile, 4000));
-    let mut n_ended = 0;
+    let (mut n_ended, mut n_unregistered) = (0, 0);
     for (hostile, n_points) in large.chain(small) {
         let (status, id) = register(&process, &client, &hostile.cloud(n_points)).await;
-        assert_eq!(status, 201, "{}", hostile.name);
-        let answers = ask_all(&process, &client, &id, n_points).await;
+        // Where others use this machine as well, looking at a cloud may take longer than the deadline by itself.
+        let is_registered = status == 201;
+        assert!(is_registered || status == 504, "{}: {status}", hostile.name);
+        n_unregistered += usize::from(!is_registered);
+        let answers = match is_registered {
+            true => ask_all(&process, &client, &id, n_points).await,
+            false => Vec::new(),
+        };
         n_ended += answers.iter().filter(|(status, _)| *status == 504).count();
         let expected = |status: &u16| matches!(status, 200 | 413 | 422 | 503 | 504);
         assert!(answers.iter().all(|(status, _)| expected(status)), "{}: {answers:?}", hostile.name);
@@ -132,6 +138,7 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
         assert!(seconds < 2.0, "{} of {n_points}: {seconds} s of work nobody waits for", hostile.name);
     }
     assert!(n_ended > 100, "{n_ended} requests were cut off, too few to see anything");
+    assert!(n_unregistered <= 2, "{n_unregistered} clouds were never asked about");
 }
 
 #[tokio::test]
