@@ -62,6 +62,7 @@ from .smoothness import Smoothness
 from .solver_choice import SolverChoice
 from .solver_used import SolverUsed
 from .spacing import Spacing
+from .stencils_used import StencilsUsed
 from .surface_choice import SurfaceChoice
 from .surface_gradient_matrix_request import SurfaceGradientMatrixRequest
 from .surface_gradient_matrix_response import SurfaceGradientMatrixResponse
@@ -138,6 +139,7 @@ __all__ = (
     "SolverChoice",
     "SolverUsed",
     "Spacing",
+    "StencilsUsed",
     "SurfaceChoice",
     "SurfaceGradientMatrixRequest",
     "SurfaceGradientMatrixResponse",

@@ -12,6 +12,7 @@ from ..types import UNSET, Unset, without_unset
 
 if TYPE_CHECKING:
     from ..models.kernel_used import KernelUsed
+    from ..models.stencils_used import StencilsUsed
     from ..models.warning import Warning_
 
 
@@ -49,6 +50,7 @@ class Diagnostics:
             asked at the points.
         noise_deviation (float | Unset): Standard deviation of the noise of the points across the surface, as estimated,
             length.
+        stencils (StencilsUsed | Unset): Rows of a sparse operator by how their weights came about.
         geometry (Diagnostics | Unset): What an answer says of itself: the numbers used, how the system was solved, and
             how well.
     """
@@ -71,6 +73,7 @@ class Diagnostics:
     mean_coefficients: list[float] | Unset = UNSET
     misfit: float | Unset = UNSET
     noise_deviation: float | Unset = UNSET
+    stencils: StencilsUsed | Unset = UNSET
     geometry: Diagnostics | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -118,6 +121,10 @@ class Diagnostics:
 
         noise_deviation = self.noise_deviation
 
+        stencils: dict[str, Any] | Unset = UNSET
+        if not isinstance(self.stencils, Unset):
+            stencils = self.stencils.to_dict()
+
         geometry: dict[str, Any] | Unset = UNSET
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
@@ -155,6 +162,8 @@ class Diagnostics:
             field_dict["misfit"] = misfit
         if noise_deviation is not UNSET:
             field_dict["noise_deviation"] = noise_deviation
+        if stencils is not UNSET:
+            field_dict["stencils"] = stencils
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
 
@@ -163,6 +172,7 @@ class Diagnostics:
     @classmethod
     def from_dict(cls, src_dict: Mapping[str, Any]) -> Self:
         from ..models.kernel_used import KernelUsed
+        from ..models.stencils_used import StencilsUsed
         from ..models.warning import Warning_
 
         d = dict(src_dict)
@@ -207,6 +217,13 @@ class Diagnostics:
 
         noise_deviation = d.pop("noise_deviation", UNSET)
 
+        _stencils = d.pop("stencils", UNSET)
+        stencils: StencilsUsed | Unset
+        if isinstance(_stencils, Unset):
+            stencils = UNSET
+        else:
+            stencils = StencilsUsed.from_dict(_stencils)
+
         _geometry = d.pop("geometry", UNSET)
         geometry: Diagnostics | Unset
         if isinstance(_geometry, Unset):
@@ -233,6 +250,7 @@ class Diagnostics:
             mean_coefficients=mean_coefficients,
             misfit=misfit,
             noise_deviation=noise_deviation,
+            stencils=stencils,
             geometry=geometry,
         )
 

@@ -130,10 +130,14 @@ def sync_detailed(
 ) -> Response[LaplaceBeltramiSparseMatrixResponse | Problem]:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
+    over the tangent plane: exact
+    for these, of third order for second derivatives. It needs no kernel for values and takes any number
+    of nodes. Over the nodes
+    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
+    at a rim are those of a
+    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
+    kind.
 
     Args:
         body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
@@ -168,10 +172,14 @@ def sync(
 ) -> LaplaceBeltramiSparseMatrixResponse | Problem | None:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
+    over the tangent plane: exact
+    for these, of third order for second derivatives. It needs no kernel for values and takes any number
+    of nodes. Over the nodes
+    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
+    at a rim are those of a
+    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
+    kind.
 
     Args:
         body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
@@ -201,10 +209,14 @@ async def asyncio_detailed(
 ) -> Response[LaplaceBeltramiSparseMatrixResponse | Problem]:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
+    over the tangent plane: exact
+    for these, of third order for second derivatives. It needs no kernel for values and takes any number
+    of nodes. Over the nodes
+    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
+    at a rim are those of a
+    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
+    kind.
 
     Args:
         body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
@@ -237,10 +249,14 @@ async def asyncio(
 ) -> LaplaceBeltramiSparseMatrixResponse | Problem | None:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
+    over the tangent plane: exact
+    for these, of third order for second derivatives. It needs no kernel for values and takes any number
+    of nodes. Over the nodes
+    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
+    at a rim are those of a
+    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
+    kind.
 
     Args:
         body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
