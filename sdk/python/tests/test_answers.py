@@ -132,7 +132,7 @@ def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
         assert_same(answer, again)
         if method in OPERATORS:
             surface = answer.diagnostics.geometry or answer.diagnostics
-            solver = {} if answer.diagnostics.geometry else {"solver": "local"}
+            solver = {"solver": arguments["solver"]} if "solver" in arguments else {}
             again = getattr(cloud, method)(**given, queries=MANY[:3], geometry=surface, **solver)
             assert again.diagnostics.to_dict() == answer.diagnostics.to_dict()
 
