@@ -76,7 +76,7 @@ async fn families_and_smoothness_are_compared() {
     let mut body = measured(60, 0.05);
     body["families"] = json!(["gauss", "matern"]);
     body["vary"] = json!([
-        {"parameter": "length_scale", "min": 0.1, "max": 10.0},
+        {"parameter": "length_scale", "min": 0.1, "max": 5.0},
         {"parameter": "nu", "min": 0.5, "max": 2.5},
         {"parameter": "alpha", "min": 1e-6, "max": 1.0},
     ]);

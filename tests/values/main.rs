@@ -9,15 +9,17 @@ mod sampling;
 #[path = "../error_bars/shapes.rs"]
 mod shapes;
 
+mod features;
 mod fields;
 mod flags;
 mod posterior;
 mod sweep;
 
+use features::{Bands, Feature, Measured};
 use fields::{FIELDS, Field};
 use flags::{Asked, Counts, Request};
 use gramian::numerics::kernel::Family;
-use posterior::Sensors;
+use posterior::{By, Sensors};
 use rayon::prelude::*;
 use sampling::Sampling;
 use shapes::Shape;
@@ -76,6 +78,31 @@ fn sensors_have_posteriors_whose_bands_cover() {
     assert!(short.iter().all(|(_, coverage)| *coverage > 70.0), "{short:?}");
     let all = rows.iter().map(|(_, coverage)| coverage).sum::<f64>() / rows.len() as f64;
     assert!((94.0..99.5).contains(&all), "{all}");
+}
+
+#[test]
+fn what_is_local_or_drowned_in_noise_is_learned() {
+    // From 256 values the bump was noise, 6 % of it covered; with noise beyond the field no kernel of less variance than the values was looked at.
+    let cases = [
+        (Feature::Bump(0.05), 1000, 0.01),
+        (Feature::Bump(0.1), 2000, 0.01),
+        (Feature::Spot(0.2), 3000, 0.01),
+        (Feature::Sine(3), 1000, 0.1),
+        (Feature::Sine(3), 300, 2.0),
+        (Feature::Sine(6), 300, 2.0),
+        (Feature::Draw(0.3), 1000, 1.0),
+        (Feature::Draw(0.1), 1000, 0.1),
+        (Feature::Clusters, 1000, 0.01),
+    ];
+    let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
+    let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
+    for (case, bands) in cases.iter().zip(bands) {
+        // Of ten seeds 85 to 97 % inside and 93 % and more all over; four scatter by some per cent.
+        assert!(
+            bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
+            "{case:?}: {bands:?}"
+        );
+    }
 }
 
 #[test]

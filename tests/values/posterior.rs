@@ -92,20 +92,25 @@ impl Sensors {
         let truth: Vec<f64> = truth.collect();
         let (cloud, at) = (Arc::new(Cloud::new(points, d).unwrap()), Cloud::new(queries, d).unwrap());
 
-        let (kernel, ratio, variance) = chosen(by, &cloud, &values);
-        let alpha = Regularization::uniform(ratio).unwrap();
-        let solver = System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved));
-        let u = Interpolant::fit_with_mean(Arc::new(solver.unwrap()), &values, Mean::Constant, &Unobserved)
-            .unwrap();
-        let found = u.at(&at, JetOrder::Value, &Unobserved).unwrap().values();
-        let trend = u.solution.trend.as_ref();
-        let variances = variances_with_mean(&u.solver, trend, &at, &Unobserved).unwrap();
-        let latent = variances.scaled(variance).latent;
+        let (found, latent) = posterior(by, cloud, &values, &at);
         let within = |((f, t), v): ((&f64, &f64), &f64)| (f - t).abs() <= 1.96 * v.sqrt();
         let n_within = found.iter().zip(&truth).zip(&latent).filter(|&entry| within(entry)).count();
         let unit = self.factor * spread;
         (n_within, found.iter().zip(&truth).map(|(f, t)| ((f - t) / unit).powi(2)).sum())
     }
+}
+
+/// Means and latent variances at queries.
+pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> (Vec<f64>, Vec<f64>) {
+    let (kernel, ratio, variance) = chosen(by, &cloud, values);
+    let alpha = Regularization::uniform(ratio).unwrap();
+    let solver = System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved));
+    let u = Interpolant::fit_with_mean(Arc::new(solver.unwrap()), values, Mean::Constant, &Unobserved);
+    let u = u.unwrap();
+    let means = u.at(at, JetOrder::Value, &Unobserved).unwrap().values();
+    let trend = u.solution.trend.as_ref();
+    let variances = variances_with_mean(&u.solver, trend, at, &Unobserved).unwrap();
+    (means, variances.scaled(variance).latent)
 }
 
 /// A kernel of variance 1, the noise in its units, and the variance.

@@ -8,7 +8,7 @@ use faer::Mat;
 
 use super::contraction::{PairWeights, contract};
 use super::criterion::{Criterion, Parts};
-use super::likelihood::remove_mean;
+use super::learning::remove_mean;
 use super::matrices::Matrices;
 use super::parameters::Hyperparameters;
 use super::space::Space;

@@ -6,7 +6,7 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use super::likelihood::remove_mean;
+use super::learning::remove_mean;
 use super::subject::Subject;
 use crate::numerics::error::NumericsError;
 use crate::numerics::kernel::Kernel;

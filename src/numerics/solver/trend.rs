@@ -144,6 +144,11 @@ impl Trend {
         Self { basis, coefficients, covariance: Vec::new() }
     }
 
+    /// With coefficients that were found, and their covariance `[p, p]` under the kernel that they were found with.
+    pub(crate) fn found(basis: Basis, coefficients: Vec<f64>, covariance: Vec<f64>) -> Self {
+        Self { basis, coefficients, covariance }
+    }
+
     /// How well the coefficients are known, unless they are given.
     pub(crate) fn uncertainty(&self) -> Option<TrendUncertainty<'_>> {
         let Self { basis, covariance, .. } = self;

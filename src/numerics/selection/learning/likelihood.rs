@@ -1,0 +1,158 @@
+//! The restricted likelihood of values in groups.
+
+use faer::Mat;
+use rayon::prelude::*;
+
+use super::group::{Group, Whitened};
+use super::order::Conditional;
+use super::values::Values;
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::Kernel;
+use crate::numerics::machine::vector::dot;
+use crate::numerics::observer::Observer;
+use crate::numerics::solver::trend::{Mean, Trend, solve_gram};
+
+/// Noise over variance that a mean is found with at least.
+const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
+
+/// How well a kernel explains values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Score {
+    /// `−ln` of the restricted likelihood, but for a constant.
+    pub(super) negative_log: f64,
+    /// Of the process, in units of the values.
+    pub(super) variance: f64,
+}
+
+/// Groups of values that kernels are compared on.
+pub(super) struct Evidence<'a> {
+    pub(super) values: &'a Values<'a>,
+    pub(super) groups: Vec<Group>,
+}
+
+/// What all groups together leave unexplained.
+struct Unexplained {
+    /// `[n, p + k]` column by column, group after group.
+    columns: Vec<f64>,
+    n_rows: usize,
+    log_determinant: f64,
+}
+
+impl<'a> Evidence<'a> {
+    pub(super) fn of(values: &'a Values<'a>, conditionals: &[Conditional]) -> Self {
+        Self { values, groups: conditionals.par_iter().map(|group| Group::of(values, group)).collect() }
+    }
+
+    /// The score of a kernel of variance 1 with so much noise for it; the variance of the process is the one given, or else the likeliest. `None` where
+    /// a matrix is not positive definite in float64.
+    ///
+    /// With K the covariances, `z = L⁻¹y` without its part in the range of `L⁻¹F` and s² the variance:
+    /// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45; Patterson and Thompson 1971), summed over
+    /// the lists of values, each with a mean of its own. With more groups than one, `L⁻¹` is that of Vecchia's approximation (order.rs).
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn score(
+        &self,
+        kernel: &Kernel,
+        ratio: f64,
+        variance: Option<f64>,
+        observer: &dyn Observer,
+    ) -> Result<Option<Score>, NumericsError> {
+        let Some(mut left) = self.unexplained(kernel, ratio, observer)? else { return Ok(None) };
+        let (n, p, n_lists) = (left.n_rows, self.n_functions(), self.values.n_lists());
+        let Some(of_mean) = remove_mean(&mut left.columns, n, p) else { return Ok(None) };
+        let energy = dot(&left.columns[p * n..], &left.columns[p * n..]);
+        let degrees = (n_lists * n.saturating_sub(p)) as f64;
+        let likeliest = || (energy / degrees).max(self.values.mean_square / (1.0 + ratio));
+        let variance = variance.unwrap_or_else(likeliest);
+        let of_determinants = n_lists as f64 * (left.log_determinant + of_mean);
+        let negative_log = 0.5 * (energy / variance + degrees * variance.ln() + of_determinants);
+        Ok(negative_log.is_finite().then_some(Score { negative_log, variance }))
+    }
+
+    /// The mean of the values, or of the first of several lists, under a kernel of variance 1 and a noise in its units.
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+    pub(super) fn trend(
+        &self,
+        kernel: &Kernel,
+        ratio: f64,
+        observer: &dyn Observer,
+    ) -> Result<Option<Trend>, NumericsError> {
+        if self.values.observed.mean == Mean::Zero {
+            return Ok(None);
+        }
+        // Enough for points that coincide: the mean is none the worse for it.
+        let ratio = ratio.max(LEAST_RATIO_OF_MEAN);
+        let undetermined = || NumericsError::MeanNotDetermined;
+        let left = self.unexplained(kernel, ratio, observer)?.ok_or_else(undetermined)?;
+        let p = self.n_functions();
+        let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
+        let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
+        let right = Mat::from_fn(p, p + 1, |a, b| match b < p {
+            true => f64::from(u8::from(a == b)),
+            false => dot(column(a), column(p)),
+        });
+        let solved = solve_gram(&gram, right).ok_or_else(undetermined)?;
+        let of_column = |b: usize| solved.col(b).iter().copied();
+        let unit = if self.values.unit > 0.0 { self.values.unit } else { 1.0 };
+        let mut coefficients: Vec<f64> = of_column(p).map(|coefficient| coefficient * unit).collect();
+        coefficients[0] += self.values.first_shared();
+        let covariance = (0..p).flat_map(of_column).collect();
+        Ok(Some(Trend::found(self.values.basis.clone(), coefficients, covariance)))
+    }
+
+    fn n_functions(&self) -> usize {
+        self.values.basis.n_functions()
+    }
+
+    fn unexplained(
+        &self,
+        kernel: &Kernel,
+        ratio: f64,
+        observer: &dyn Observer,
+    ) -> Result<Option<Unexplained>, NumericsError> {
+        let whitened = |group: &Group| {
+            observer.checkpoint()?;
+            Ok(group.whitened(kernel, ratio))
+        };
+        let whitened: Result<Vec<Option<Whitened>>, NumericsError> =
+            self.groups.par_iter().map(whitened).collect();
+        let Some(whitened) = whitened?.into_iter().collect::<Option<Vec<Whitened>>>() else {
+            return Ok(None);
+        };
+        let n_columns = self.n_functions() + self.values.n_lists();
+        let n_rows = self.groups.iter().map(|group| group.responses.len()).sum();
+        let mut columns = Vec::with_capacity(n_rows * n_columns);
+        for column in 0..n_columns {
+            for (group, whitened) in self.groups.iter().zip(&whitened) {
+                let r = group.responses.len();
+                columns.extend_from_slice(&whitened.columns[column * r..][..r]);
+            }
+        }
+        let log_determinant = whitened.iter().map(|group| group.log_determinant).sum();
+        Ok(Some(Unexplained { columns, n_rows, log_determinant }))
+    }
+}
+
+/// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt); says `ln det FᵀF` of the first.
+pub(in crate::numerics::selection) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
+    let mut log_determinant = 0.0;
+    for a in 0..p {
+        let (done, rest) = columns.split_at_mut((a + 1) * n);
+        let function = &mut done[a * n..];
+        let norm = dot(function, function).sqrt();
+        if norm.is_nan() || norm <= 0.0 {
+            return None;
+        }
+        function.iter_mut().for_each(|f| *f /= norm);
+        log_determinant += 2.0 * norm.ln();
+        for column in rest.chunks_exact_mut(n) {
+            let along = dot(function, column);
+            column.iter_mut().zip(&*function).for_each(|(c, f)| *c -= along * f);
+        }
+    }
+    Some(log_determinant)
+}

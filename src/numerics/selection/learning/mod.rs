@@ -1,0 +1,194 @@
+//! Kernel and noise from the values themselves, for whoever says nothing.
+//!
+//! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a grid: smoothness, length scale, and
+//! the ratio of noise to variance. Nothing finer than the grid is told apart by a few hundred values, and since a factorization depends on these
+//! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
+//! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
+//!
+//! The grid is searched on a sample first, then from there on all values: together while they are few, else in groups that explain each other
+//! (order.rs). A sample alone misses what is local: from 256 of 2,000 values a plane with a bump looks like a plane with noise.
+
+mod grid;
+mod group;
+mod likelihood;
+mod order;
+mod search;
+mod values;
+
+use crate::numerics::error::NumericsError;
+use crate::numerics::kernel::{Family, Kernel};
+use crate::numerics::observer::Observer;
+use crate::numerics::points::cloud::Cloud;
+use crate::numerics::points::sampling::Sampling;
+use crate::numerics::solver::trend::{Mean, Trend};
+use grid::Grid;
+use likelihood::Evidence;
+use order::{DEEP_GROUPS, GIVEN, GIVEN_DEEP, MAX_GROUPS, MAX_SAMPLE, MAX_TOGETHER, Order, RESPONSES};
+use search::Search;
+use values::Values;
+
+pub(super) use likelihood::remove_mean;
+
+/// What is known of the noise of values beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Noise<'a> {
+    /// Nothing.
+    Unknown,
+    /// Its variance, the same everywhere; unit V².
+    Uniform(f64),
+    /// Its variance at each point, `[n]`, unit V².
+    PerPoint(&'a [f64]),
+}
+
+/// Values at the points of a cloud, and what is known of them.
+#[derive(Clone, Copy)]
+pub struct Observed<'a> {
+    pub cloud: &'a Cloud,
+    pub sampling: &'a Sampling,
+    /// `[n]`, unit V; or `[k, n]`, k lists that have kernel and noise in common.
+    pub values: &'a [f64],
+    pub noise: Noise<'a>,
+    pub mean: Mean,
+}
+
+impl Observed<'_> {
+    /// # Errors
+    /// [`NumericsError::LengthMismatch`] for no list, or one that is not whole.
+    fn check(&self) -> Result<(), NumericsError> {
+        let n = self.cloud.n_points();
+        match self.values.len() >= n && self.values.len().is_multiple_of(n) {
+            true => Ok(()),
+            false => self.cloud.check_one_per_point(self.values),
+        }
+    }
+}
+
+/// What the values decide.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learned {
+    pub family: Family,
+    /// ℓ, unit L.
+    pub length_scale: f64,
+    /// Variance of the noise over that of the process, 0 if the noise is known to be 0; where it differs between points, of its mean.
+    pub ratio: f64,
+    /// The variance of the process as the sample has it, unit V²; exactly what it has to be for the ratio where the noise is known.
+    pub variance: f64,
+    /// The mean as the sample has it: for solvers that never see all values at once.
+    pub trend: Option<Trend>,
+}
+
+impl Learned {
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        self.trend.as_ref().map_or(0, Trend::n_bytes)
+    }
+}
+
+/// Fewer values decide nothing.
+const LEAST_VALUES: usize = 8;
+
+/// Learns kernel and noise from values.
+///
+/// Values that do not differ decide nothing, nor do few: Matérn 5/2 of the default length scale with the least noise.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`],
+/// [`NumericsError::WeightsOverflow`] of values whose square leaves float64.
+pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned, NumericsError> {
+    observed.check()?;
+    let values = Values::of(observed);
+    let order = Order::of(&observed, observer)?;
+    let decided = match observed.cloud.n_points() < LEAST_VALUES || values.is_constant() {
+        true => None,
+        false => search(&values, &order, observer)?,
+    };
+    let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
+    let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
+    let trend = Evidence::of(&values, &order.searched).trend(&kernel, learned.ratio, observer)?;
+    Ok(Learned { trend, ..learned })
+}
+
+/// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are given more contradict their variance.
+fn search(
+    values: &Values<'_>,
+    order: &Order,
+    observer: &dyn Observer,
+) -> Result<Option<Learned>, NumericsError> {
+    let grid = Grid::of(values);
+    let all = Evidence::of(values, &order.searched);
+    let mut search = Search::new(&all, &grid);
+    let [first, _, ..] = order.searched.as_slice() else {
+        let Some(best) = search.best(observer)? else { return Ok(None) };
+        let found = search.shortest(best, observer)?;
+        return search.learned(found, observer);
+    };
+    let sample = Evidence::of(values, std::slice::from_ref(first));
+    let Some(begin) = Search::new(&sample, &grid).best(observer)? else { return Ok(None) };
+    let deep = Evidence::of(values, &order.deep);
+    let mut deep = Search::new(&deep, &grid);
+    let of_families = search.best_from(begin, observer)?;
+    let best = search.best_with(&mut deep, of_families, observer)?;
+    let mut found = search.shortest(best, observer)?;
+    loop {
+        let learned = search.learned(found, observer)?;
+        let of_deep = deep.learned(found, observer)?;
+        let shorter = search.shorter(found, observer)?;
+        match (learned, of_deep, shorter) {
+            (Some(learned), Some(of_deep), shorter)
+                if shorter.is_none() || of_deep.variance <= DISAGREEING * learned.variance =>
+            {
+                return Ok(Some(Learned { variance: learned.variance.max(of_deep.variance), ..learned }));
+            }
+            (learned, _, None) => return Ok(learned),
+            (_, _, Some(shorter)) => found = shorter,
+        }
+    }
+}
+
+/// How many times the variance of all groups that of the deep ones may be.
+const DISAGREEING: f64 = 1.5;
+
+/// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep groups.
+const CELLS: f64 = 70.0;
+const CELLS_FROM_SAMPLE: f64 = 40.0;
+const CELLS_OF_DEEP: f64 = 4.0;
+
+/// Flops of [`learn`] for n values.
+pub fn learning_flops(n_points: usize) -> f64 {
+    let together = |n: usize| (n * n) as f64 * (n as f64 / 3.0 + 20.0);
+    let of_order = 500.0 * n_points as f64;
+    if n_points <= MAX_TOGETHER {
+        return CELLS * together(n_points) + of_order;
+    }
+    let n_levels = (n_points / MAX_SAMPLE).ilog2() as usize + 1;
+    let n_groups = n_points.div_ceil(RESPONSES).min(MAX_GROUPS * n_levels);
+    let of_groups = n_groups as f64 * together(GIVEN + RESPONSES) + together(MAX_SAMPLE);
+    let of_deep = DEEP_GROUPS as f64 * together(GIVEN_DEEP + RESPONSES);
+    CELLS * together(MAX_SAMPLE) + CELLS_FROM_SAMPLE * of_groups + CELLS_OF_DEEP * of_deep + of_order
+}
+
+/// The mean of values under a kernel and a noise that are given.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
+pub fn learn_mean(
+    observed: Observed<'_>,
+    kernel: &Kernel,
+    observer: &dyn Observer,
+) -> Result<Learned, NumericsError> {
+    observed.check()?;
+    let variance = kernel.variance();
+    let ratio = match observed.noise {
+        Noise::Unknown => 0.0,
+        Noise::Uniform(alpha) => alpha / variance,
+        Noise::PerPoint(all) => all.iter().sum::<f64>() / all.len() as f64 / variance,
+    };
+    let values = Values::of(observed);
+    let order = Order::of(&observed, observer)?;
+    let trend =
+        Evidence::of(&values, &order.searched).trend(&kernel.clone().of_variance_one(), ratio, observer)?;
+    Ok(Learned { family: kernel.family(), length_scale: kernel.length_scale(), ratio, variance, trend })
+}
+
+#[cfg(test)]
+mod tests;
