@@ -1,12 +1,8 @@
 //! Which kernel and how much noise values want.
 //!
-//! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a grid: smoothness, length scale, and
-//! the ratio of noise to variance. Nothing finer than the grid is told apart by a few hundred values, and since a factorization depends on these
-//! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
-//! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
-//!
-//! That is [`learn`], for whoever says nothing. [`select()`] searches the best hyperparameters of all values by a [`Criterion`], in n³ flops for every
-//! evaluation; [`alpha_path()`] looks at many α for one kernel, and [`leave_one_out()`] predicts each value from all others.
+//! [`learn`] is for whoever says nothing: a grid of kernels and noises, coarse enough for a cache. [`select()`] searches the best
+//! hyperparameters of all values by a [`Criterion`], in n³ flops for every evaluation; [`alpha_path()`] looks at many α for one
+//! kernel, and [`leave_one_out()`] predicts each value from all others.
 
 mod alpha_path;
 mod contraction;

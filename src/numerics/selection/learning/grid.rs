@@ -9,11 +9,13 @@ use crate::numerics::kernel::{Family, Kernel};
 /// From rough to smooth. All have second derivatives, which operators need.
 const FAMILIES: [Family; 3] = [Family::Matern { order: 2 }, Family::Matern { order: 4 }, Family::Gauss];
 
-/// By how many steps the length scale of a family is shorter than that of the one before for the same correlations.
+/// By how many steps the length scale of a family is shorter than that of the one before for the same
+/// correlations.
 const SHORTER: usize = 2;
 
-/// By how many steps the ratio falls where the length scale grows by one, along the ridge of the likelihood: near values tell `variance/ℓ^2ν` alone
-/// (Zhang 2004), and a step of half an octave multiplies that by a ν-th power of 2. For Gauss as steep as the search found it.
+/// By how many steps the ratio falls where the length scale grows by one, along the ridge of the likelihood:
+/// near values tell `variance/ℓ^2ν` alone (Zhang 2004), and a step of half an octave multiplies that by a
+/// ν-th power of 2. For Gauss as steep as the search found it.
 const RIDGES: [isize; 3] = [3, 5, 7];
 
 /// The least length scale in spacings, and the factor from one to the next.
@@ -35,11 +37,13 @@ const N_RATIOS: usize = 11 * RATIOS_PER_DECADE + 1;
 /// Ratios that are looked at first: every second decade.
 const COARSE_RATIOS: usize = 2 * RATIOS_PER_DECADE;
 
-/// The least ratio for every point: with less a factorization of many points does not leave a digit of a variance.
+/// The least ratio for every point: with less a factorization of many points does not leave a digit of a
+/// variance.
 const RATIO_PER_POINT: f64 = 1e-13;
 
-/// Noise beyond this share of the mean square of the values is unlikely from the start, by [`AGAINST_NOISE`] for the square of each decade more:
-/// values that no neighbours explain are as well a field too rough for them as noise, and the bars of the rough field cover both.
+/// Noise beyond this share of the mean square of the values is unlikely from the start, by [`AGAINST_NOISE`]
+/// for the square of each decade more: values that no neighbours explain are as well a field too rough for
+/// them as noise, and the bars of the rough field cover both.
 const LIKELY_SHARE: f64 = 0.1;
 const AGAINST_NOISE: f64 = 3.0;
 
@@ -140,7 +144,8 @@ impl Grid {
         })
     }
 
-    /// The kernel of a cell with variance 1, and the noise for it; `None` if there is no such kernel in float64.
+    /// The kernel of a cell with variance 1, and the noise for it; `None` if there is no such kernel in
+    /// float64.
     pub(super) fn kernel(&self, cell: Cell) -> Option<(Kernel, f64)> {
         let kernel = Kernel::new(FAMILIES[cell.family], self.length_scale(cell.length), 1.0).ok()?;
         Some((kernel, ratio(cell.ratio)))
@@ -151,7 +156,8 @@ impl Grid {
         self.known_variance(ratio(cell.ratio)).map(|variance| in_units(variance, 1.0 / unit))
     }
 
-    /// What the noise of a cell costs beforehand, in logarithms, its variance known, for values of a mean square.
+    /// What the noise of a cell costs beforehand, in logarithms, its variance known, for values of a mean
+    /// square.
     pub(super) fn against_noise(&self, cell: Cell, variance: f64, mean_square: f64) -> f64 {
         match self.noise {
             KnownNoise::Known(_) => 0.0,
@@ -216,8 +222,8 @@ fn ratio(index: usize) -> f64 {
     rounded(ratio, BITS_OF_RATIO)
 }
 
-/// Significant bits of ratios, and of variances: their product has all of its bits in float64, so that the noise over the variance is the
-/// ratio again, to the last bit, for whoever sends both back.
+/// Significant bits of ratios, and of variances: their product has all of its bits in float64, so that the
+/// noise over the variance is the ratio again, to the last bit, for whoever sends both back.
 const BITS_OF_RATIO: i32 = 20;
 const BITS_OF_VARIANCE: i32 = 32;
 

@@ -26,8 +26,8 @@ pub(super) struct Group {
     pub(super) responses: Vec<usize>,
 }
 
-/// The functions and values of the responses without what the given ones explain of them, in units of what is left of the process: rows of
-/// `L⁻¹[F Y]`, L the Cholesky factor of the group.
+/// The functions and values of the responses without what the given ones explain of them, in units of what is
+/// left of the process: rows of `L⁻¹[F Y]`, L the Cholesky factor of the group.
 pub(super) struct Whitened {
     /// `[r, p + k]`, column by column.
     pub(super) columns: Vec<f64>,

@@ -43,12 +43,13 @@ impl<'a> Evidence<'a> {
         Self { values, groups: conditionals.par_iter().map(|group| Group::of(values, group)).collect() }
     }
 
-    /// The score of a kernel of variance 1 with so much noise for it; the variance of the process is the one given, or else the likeliest. `None` where
-    /// a matrix is not positive definite in float64.
+    /// The score of a kernel of variance 1 with so much noise for it; the variance of the process is the one
+    /// given, or else the likeliest. `None` where a matrix is not positive definite in float64.
     ///
     /// With K the covariances, `z = L⁻¹y` without its part in the range of `L⁻¹F` and s² the variance:
-    /// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45; Patterson and Thompson 1971), summed over
-    /// the lists of values, each with a mean of its own. With more groups than one, `L⁻¹` is that of Vecchia's approximation (order.rs).
+    /// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45;
+    /// Patterson and Thompson 1971), summed over the lists of values, each with a mean of its own. With more
+    /// groups than one, `L⁻¹` is that of Vecchia's approximation (order.rs).
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -71,7 +72,8 @@ impl<'a> Evidence<'a> {
         Ok(negative_log.is_finite().then_some(Score { negative_log, variance }))
     }
 
-    /// The mean of the values, or of the first of several lists, under a kernel of variance 1 and a noise in its units.
+    /// The mean of the values, or of the first of several lists, under a kernel of variance 1 and a noise in
+    /// its units.
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
@@ -137,7 +139,8 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt); says `ln det FᵀF` of the first.
+/// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt);
+/// says `ln det FᵀF` of the first.
 pub(in crate::numerics::selection) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
     let mut log_determinant = 0.0;
     for a in 0..p {

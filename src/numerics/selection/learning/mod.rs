@@ -1,12 +1,14 @@
 //! Kernel and noise from the values themselves, for whoever says nothing.
 //!
-//! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a grid: smoothness, length scale, and
-//! the ratio of noise to variance. Nothing finer than the grid is told apart by a few hundred values, and since a factorization depends on these
-//! three alone, other values on the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off by
-//! three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
+//! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a
+//! grid: smoothness, length scale, and the ratio of noise to variance. Nothing finer than the grid is told
+//! apart by a few hundred values, and since a factorization depends on these three alone, other values on the
+//! same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off
+//! by three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
 //!
-//! The grid is searched on a sample first, then from there on all values: together while they are few, else in groups that explain each other
-//! (order.rs). A sample alone misses what is local: from 256 of 2,000 values a plane with a bump looks like a plane with noise.
+//! The grid is searched on a sample first, then from there on all values: together while they are few, else
+//! in groups that explain each other (order.rs). A sample alone misses what is local: from 256 of 2,000
+//! values a plane with a bump looks like a plane with noise.
 
 mod grid;
 mod group;
@@ -69,9 +71,11 @@ pub struct Learned {
     pub family: Family,
     /// ℓ, unit L.
     pub length_scale: f64,
-    /// Variance of the noise over that of the process, 0 if the noise is known to be 0; where it differs between points, of its mean.
+    /// Variance of the noise over that of the process, 0 if the noise is known to be 0; where it differs
+    /// between points, of its mean.
     pub ratio: f64,
-    /// The variance of the process as the sample has it, unit V²; exactly what it has to be for the ratio where the noise is known.
+    /// The variance of the process as the sample has it, unit V²; exactly what it has to be for the ratio
+    /// where the noise is known.
     pub variance: f64,
     /// The mean as the sample has it: for solvers that never see all values at once.
     pub trend: Option<Trend>,
@@ -89,7 +93,8 @@ const LEAST_VALUES: usize = 8;
 
 /// Learns kernel and noise from values.
 ///
-/// Values that do not differ decide nothing, nor do few: Matérn 5/2 of the default length scale with the least noise.
+/// Values that do not differ decide nothing, nor do few: Matérn 5/2 of the default length scale with the
+/// least noise.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`],
@@ -108,7 +113,8 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     Ok(Learned { trend, ..learned })
 }
 
-/// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are given more contradict their variance.
+/// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are
+/// given more contradict their variance.
 fn search(
     values: &Values<'_>,
     order: &Order,
@@ -148,7 +154,8 @@ fn search(
 /// How many times the variance of all groups that of the deep ones may be.
 const DISAGREEING: f64 = 1.5;
 
-/// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep groups.
+/// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep
+/// groups.
 const CELLS: f64 = 70.0;
 const CELLS_FROM_SAMPLE: f64 = 40.0;
 const CELLS_OF_DEEP: f64 = 4.0;

@@ -1,9 +1,10 @@
 //! In which order points explain each other.
 //!
-//! A likelihood of n values takes n³ flops. It is the product of that of each value given those before it, and of those before it the near ones say
-//! nearly all (Vecchia 1988): here values are taken in groups of near ones, each given the values nearest to it of those that come before (Stein, Chi,
-//! Welty 2004). The first group is a sample of near and far points. Each further level has as many points as all before it, spread over the cloud, so
-//! that every scale has its say.
+//! A likelihood of n values takes n³ flops. It is the product of that of each value given those before it,
+//! and of those before it the near ones say nearly all (Vecchia 1988): here values are taken in groups of
+//! near ones, each given the values nearest to it of those that come before (Stein, Chi, Welty 2004). The
+//! first group is a sample of near and far points. Each further level has as many points as all before it,
+//! spread over the cloud, so that every scale has its say.
 
 use super::Observed;
 use crate::numerics::error::NumericsError;
@@ -19,15 +20,17 @@ pub(super) const MAX_TOGETHER: usize = 384;
 /// Points of the sample at most, where more values are not taken together.
 pub(super) const MAX_SAMPLE: usize = 128;
 
-/// Points of the sample that lie together: what is noise shows between near points, what is not between far ones.
+/// Points of the sample that lie together: what is noise shows between near points, what is not between far
+/// ones.
 const TOGETHER: usize = 16;
 
 /// Values of a group of a level at most, and those that it is given.
 pub(super) const RESPONSES: usize = 32;
 pub(super) const GIVEN: usize = 32;
 
-/// Groups of the last level that are given many more: what a smooth kernel makes of near values alone says little about what it makes of all of them.
-/// From 32 of 2,000 exact values of a front, Gauss of ten spacings seemed right, whose deviations are a fourteenth of its errors.
+/// Groups of the last level that are given many more: what a smooth kernel makes of near values alone says
+/// little about what it makes of all of them. From 32 of 2,000 exact values of a front, Gauss of ten spacings
+/// seemed right, whose deviations are a fourteenth of its errors.
 pub(super) const DEEP_GROUPS: usize = 16;
 pub(super) const GIVEN_DEEP: usize = 256;
 
@@ -108,7 +111,8 @@ fn sample(observed: &Observed<'_>) -> Vec<usize> {
     points
 }
 
-/// Takes about so many points of those that are left, one of each of as many cells; all of them where hardly more are left.
+/// Takes about so many points of those that are left, one of each of as many cells; all of them where hardly
+/// more are left.
 fn take_level(cloud: &Cloud, left: &mut Vec<u32>, count: usize) -> Vec<u32> {
     if 2 * left.len() <= 3 * count {
         return std::mem::take(left);

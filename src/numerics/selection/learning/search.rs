@@ -87,8 +87,9 @@ impl<'a> Search<'a> {
         Ok(best.0)
     }
 
-    /// Of all kernels of a family that are [`AS_LIKELY`] as the best one, that with the shortest length scale: bands from the best alone are those of
-    /// a kernel that happens to fit, and where values leave the length scale open it is mostly too long. The noise is the likeliest for it.
+    /// Of all kernels of a family that are [`AS_LIKELY`] as the best one, that with the shortest length
+    /// scale: bands from the best alone are those of a kernel that happens to fit, and where values leave the
+    /// length scale open it is mostly too long. The noise is the likeliest for it.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -124,7 +125,8 @@ impl<'a> Search<'a> {
     /// What a cell says; `None` if it does not explain the values in float64.
     ///
     /// # Errors
-    /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64; [`NumericsError::Cancelled`].
+    /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64;
+    /// [`NumericsError::Cancelled`].
     pub(super) fn learned(
         &mut self,
         cell: Cell,
