@@ -26,7 +26,7 @@ const N_LENGTHS: usize = 15;
 /// Where a search begins: 14 spacings.
 const FIRST_LENGTH: usize = 9;
 
-/// That of a field that neighbours hardly explain: 1.25 spacings.
+/// The length scale of a field that neighbours hardly explain: 1.25 spacings.
 const ROUGH_LENGTH: usize = 2;
 
 /// Ratios of noise to variance: the least, and quarters of a decade up to 10.
@@ -108,7 +108,7 @@ impl Grid {
         }
     }
 
-    /// What is taken where the values do not say.
+    /// The kernel and noise that are taken where the values do not say.
     pub(super) fn undecided(&self, values: &Values<'_>) -> Learned {
         let observed = &values.observed;
         let family = FAMILIES[0];
@@ -125,7 +125,7 @@ impl Grid {
         }
     }
 
-    /// What a cell with its score says of values in units of the greatest.
+    /// The kernel and noise of a cell with its score, for values in units of the greatest.
     ///
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64.
@@ -199,7 +199,7 @@ impl Grid {
         matches!(self.noise, KnownNoise::Known(0.0))
     }
 
-    /// What a ratio makes of a noise that is known.
+    /// The variance of the process that a ratio leaves to a noise that is known.
     fn known_variance(&self, ratio: f64) -> Option<f64> {
         match self.noise {
             KnownNoise::Known(noise) if noise > 0.0 => Some((noise / ratio).clamp(1e-140, 1e140)),

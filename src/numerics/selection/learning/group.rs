@@ -22,8 +22,15 @@ pub(super) struct Group {
     columns: Vec<f64>,
     /// Variances of the noise in units of their mean, where they differ.
     noise: Option<Vec<f64>>,
-    /// Which points of the whole cloud its responses are.
-    pub(super) responses: Vec<usize>,
+}
+
+/// What is added to the variances of a process of variance 1.
+#[derive(Clone, Copy)]
+pub(super) struct Nugget {
+    /// Mean variance of the noise.
+    pub(super) ratio: f64,
+    /// At each point at least, so that points may coincide which have no noise.
+    pub(super) least: f64,
 }
 
 /// The functions and values of the responses without what the given ones explain of them, in units of what is
@@ -48,14 +55,17 @@ impl Group {
             n_given: *n_given,
             columns,
             noise: values.relative_noise(points),
-            responses: points[*n_given..].to_vec(),
         }
     }
 
+    pub(super) fn n_responses(&self) -> usize {
+        self.cloud.n_points() - self.n_given
+    }
+
     /// `None` where the matrix is not positive definite in float64.
-    pub(super) fn whitened(&self, kernel: &Kernel, ratio: f64) -> Option<Whitened> {
+    pub(super) fn whitened(&self, kernel: &Kernel, nugget: Nugget) -> Option<Whitened> {
         let (n, given) = (self.cloud.n_points(), self.n_given);
-        let mut gram = self.gram(kernel, ratio);
+        let mut gram = self.gram(kernel, nugget);
         let mut factor = MatMut::from_column_major_slice_mut(&mut gram, n, n);
         let requirement = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
         let mut scratch = MemBuffer::new(requirement);
@@ -77,12 +87,13 @@ impl Group {
     }
 
     /// The lower triangle of its covariances under a kernel of variance 1.
-    fn gram(&self, kernel: &Kernel, ratio: f64) -> Vec<f64> {
+    fn gram(&self, kernel: &Kernel, nugget: Nugget) -> Vec<f64> {
         let n = self.cloud.n_points();
         let mut gram = vec![0.0; n * n];
         for (j, column) in gram.chunks_exact_mut(n).enumerate() {
             fill_kernel_column(&self.nodes, kernel, self.cloud.point(j), j..n, &mut column[j..]);
-            column[j] += ratio * self.noise.as_ref().map_or(1.0, |noise| noise[j]);
+            let relative = self.noise.as_ref().map_or(1.0, |noise| noise[j]);
+            column[j] += (nugget.ratio * relative).max(nugget.least);
         }
         gram
     }

@@ -3,7 +3,7 @@
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::group::{Group, Whitened};
+use super::group::{Group, Nugget, Whitened};
 use super::order::Conditional;
 use super::values::Values;
 use crate::numerics::error::NumericsError;
@@ -20,17 +20,17 @@ const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
 pub(super) struct Score {
     /// `−ln` of the restricted likelihood, but for a constant.
     pub(super) negative_log: f64,
-    /// Of the process, in units of the values.
+    /// Variance of the process, in units of the values.
     pub(super) variance: f64,
 }
 
 /// Groups of values that kernels are compared on.
 pub(super) struct Evidence<'a> {
     pub(super) values: &'a Values<'a>,
-    pub(super) groups: Vec<Group>,
+    groups: Vec<Group>,
 }
 
-/// What all groups together leave unexplained.
+/// Functions and values without what the groups explain of them.
 struct Unexplained {
     /// `[n, p + k]` column by column, group after group.
     columns: Vec<f64>,
@@ -60,7 +60,8 @@ impl<'a> Evidence<'a> {
         variance: Option<f64>,
         observer: &dyn Observer,
     ) -> Result<Option<Score>, NumericsError> {
-        let Some(mut left) = self.unexplained(kernel, ratio, observer)? else { return Ok(None) };
+        let nugget = Nugget { ratio, least: 0.0 };
+        let Some(mut left) = self.unexplained(kernel, nugget, observer)? else { return Ok(None) };
         let (n, p, n_lists) = (left.n_rows, self.n_functions(), self.values.n_lists());
         let Some(of_mean) = remove_mean(&mut left.columns, n, p) else { return Ok(None) };
         let energy = dot(&left.columns[p * n..], &left.columns[p * n..]);
@@ -86,10 +87,10 @@ impl<'a> Evidence<'a> {
         if self.values.observed.mean == Mean::Zero {
             return Ok(None);
         }
-        // Enough for points that coincide: the mean is none the worse for it.
-        let ratio = ratio.max(LEAST_RATIO_OF_MEAN);
+        // The mean is none the worse for it.
+        let nugget = Nugget { ratio, least: LEAST_RATIO_OF_MEAN };
         let undetermined = || NumericsError::MeanNotDetermined;
-        let left = self.unexplained(kernel, ratio, observer)?.ok_or_else(undetermined)?;
+        let left = self.unexplained(kernel, nugget, observer)?.ok_or_else(undetermined)?;
         let p = self.n_functions();
         let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
         let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
@@ -113,12 +114,12 @@ impl<'a> Evidence<'a> {
     fn unexplained(
         &self,
         kernel: &Kernel,
-        ratio: f64,
+        nugget: Nugget,
         observer: &dyn Observer,
     ) -> Result<Option<Unexplained>, NumericsError> {
         let whitened = |group: &Group| {
             observer.checkpoint()?;
-            Ok(group.whitened(kernel, ratio))
+            Ok(group.whitened(kernel, nugget))
         };
         let whitened: Result<Vec<Option<Whitened>>, NumericsError> =
             self.groups.par_iter().map(whitened).collect();
@@ -126,11 +127,11 @@ impl<'a> Evidence<'a> {
             return Ok(None);
         };
         let n_columns = self.n_functions() + self.values.n_lists();
-        let n_rows = self.groups.iter().map(|group| group.responses.len()).sum();
+        let n_rows = self.groups.iter().map(Group::n_responses).sum();
         let mut columns = Vec::with_capacity(n_rows * n_columns);
         for column in 0..n_columns {
             for (group, whitened) in self.groups.iter().zip(&whitened) {
-                let r = group.responses.len();
+                let r = group.n_responses();
                 columns.extend_from_slice(&whitened.columns[column * r..][..r]);
             }
         }

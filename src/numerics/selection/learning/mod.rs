@@ -74,10 +74,9 @@ pub struct Learned {
     /// Variance of the noise over that of the process, 0 if the noise is known to be 0; where it differs
     /// between points, of its mean.
     pub ratio: f64,
-    /// The variance of the process as the sample has it, unit V²; exactly what it has to be for the ratio
-    /// where the noise is known.
+    /// The variance of the process, unit V²; exactly what it has to be for the ratio where the noise is known.
     pub variance: f64,
-    /// The mean as the sample has it: for solvers that never see all values at once.
+    /// The mean as all groups have it: for solvers that never see all values at once.
     pub trend: Option<Trend>,
 }
 
@@ -87,6 +86,9 @@ impl Learned {
         self.trend.as_ref().map_or(0, Trend::n_bytes)
     }
 }
+
+/// How many times the variance of all groups that of the deep ones may be.
+const DISAGREEING: f64 = 1.5;
 
 /// Fewer values decide nothing.
 const LEAST_VALUES: usize = 8;
@@ -103,26 +105,26 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     observed.check()?;
     let values = Values::of(observed);
     let order = Order::of(&observed, observer)?;
+    let all = Evidence::of(&values, &order.searched);
     let decided = match observed.cloud.n_points() < LEAST_VALUES || values.is_constant() {
         true => None,
-        false => search(&values, &order, observer)?,
+        false => search(&all, &order, observer)?,
     };
     let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
     let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
-    let trend = Evidence::of(&values, &order.searched).trend(&kernel, learned.ratio, observer)?;
+    let trend = all.trend(&kernel, learned.ratio, observer)?;
     Ok(Learned { trend, ..learned })
 }
 
 /// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are
 /// given more contradict their variance.
 fn search(
-    values: &Values<'_>,
+    all: &Evidence<'_>,
     order: &Order,
     observer: &dyn Observer,
 ) -> Result<Option<Learned>, NumericsError> {
-    let grid = Grid::of(values);
-    let all = Evidence::of(values, &order.searched);
-    let mut search = Search::new(&all, &grid);
+    let (values, grid) = (all.values, Grid::of(all.values));
+    let mut search = Search::new(all, &grid);
     let [first, _, ..] = order.searched.as_slice() else {
         let Some(best) = search.best(observer)? else { return Ok(None) };
         let found = search.shortest(best, observer)?;
@@ -136,23 +138,18 @@ fn search(
     let best = search.best_with(&mut deep, of_families, observer)?;
     let mut found = search.shortest(best, observer)?;
     loop {
-        let learned = search.learned(found, observer)?;
-        let of_deep = deep.learned(found, observer)?;
-        let shorter = search.shorter(found, observer)?;
-        match (learned, of_deep, shorter) {
-            (Some(learned), Some(of_deep), shorter)
-                if shorter.is_none() || of_deep.variance <= DISAGREEING * learned.variance =>
-            {
-                return Ok(Some(Learned { variance: learned.variance.max(of_deep.variance), ..learned }));
-            }
-            (learned, _, None) => return Ok(learned),
-            (_, _, Some(shorter)) => found = shorter,
+        let both = search.learned(found, observer)?.zip(deep.learned(found, observer)?);
+        let agreed = both.filter(|(all, deep)| deep.variance <= DISAGREEING * all.variance);
+        if let Some((all, deep)) = agreed {
+            return Ok(Some(Learned { variance: all.variance.max(deep.variance), ..all }));
+        }
+        match search.shorter(found, observer)? {
+            Some(shorter) => found = shorter,
+            // No length scale is short enough: the variance that the deep ones want is the greater.
+            None => return deep.learned(found, observer),
         }
     }
 }
-
-/// How many times the variance of all groups that of the deep ones may be.
-const DISAGREEING: f64 = 1.5;
 
 /// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep
 /// groups.

@@ -83,3 +83,20 @@ fn few_values_and_equal_ones_decide_nothing() {
     let values: Vec<f64> = (0..20).map(f64::from).collect();
     assert!(learned(&together, &values, Noise::Unknown).variance > 0.0);
 }
+
+#[test]
+fn points_that_coincide_have_a_mean_though_some_have_no_noise() {
+    // Twice the same points, every third exactly measured; alone, and in groups.
+    for n in [60, 500] {
+        let (half, values) = field(n, 0.0);
+        let cloud = Cloud::new(half.coordinates().repeat(2), 3).unwrap();
+        let values = values.repeat(2);
+        let noise: Vec<f64> = (0..2 * n).map(|i| if i % 3 == 0 { 0.0 } else { 1e-4 }).collect();
+        let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let (mean, noise) = (Mean::Constant, Noise::PerPoint(&noise));
+        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
+        assert!(learn_mean(observed, &kernel, &Unobserved).unwrap().trend.is_some(), "{n}");
+        assert!(learn(observed, &Unobserved).unwrap().trend.is_some(), "{n}");
+    }
+}
