@@ -1,4 +1,5 @@
-//! What a large cloud takes on its way in, and a large answer on its way out, as multiples of the bytes of their arrays.
+//! What a large cloud takes on its way in, and a large answer on its way out, as multiples of the bytes of their arrays; and
+//! what learning from values takes, beside its price.
 //!
 //! A process of its own, for the allocator that counts, and one test, since its count is everybody's. What is counted here for
 //! 100,000 points holds for a million: everything is in proportion.
@@ -18,7 +19,11 @@ use gramian::http::wire::read::points::Points;
 use gramian::http::wire::write::answer::{Answer, Member, Parts};
 use gramian::http::wire::write::array::Array;
 use gramian::http::wire::write::encode::Encoded;
+use gramian::numerics::observer::Unobserved;
 use gramian::numerics::points::cloud::Cloud;
+use gramian::numerics::points::sampling::Sampling;
+use gramian::numerics::selection::{Noise, Observed, learn, learning_price};
+use gramian::numerics::solver::trend::Mean;
 use gramian::store::Owner;
 use gramian::store::budget::Budget;
 use gramian::store::clouds::CloudStore;
@@ -120,6 +125,21 @@ fn register(format: Format, body: Vec<u8>) -> usize {
     stored.n_bytes()
 }
 
+fn learning_takes_what_it_is_priced() {
+    for (n, d) in [(300, 2), (2000, 3), (20_000, 6), (N, 2), (N, 3)] {
+        let cloud = Cloud::new(numbers(n * d), d).unwrap();
+        let values: Vec<f64> = cloud.points().map(|x| (3.0 * x[0]).sin() + x[1]).collect();
+        let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let (noise, mean) = (Noise::Unknown, Mean::Linear);
+        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let (_, taken) = peak_of(|| learn(observed, &Unobserved).unwrap());
+        let priced = learning_price(n, d).n_bytes;
+        println!("learning from {n} values in {d} dimensions: {taken} bytes at the peak, priced {priced}");
+        // Grids and scores take some kilobytes of each.
+        assert!(taken <= priced + BASE_BYTES && priced <= 8 * (taken + BASE_BYTES), "{taken}, {priced}");
+    }
+}
+
 struct Numbers(Array);
 
 impl Answer for Numbers {
@@ -164,6 +184,7 @@ async fn clouds_come_in_and_answers_go_out_within_three_times_their_arrays() {
         let counted = if is_binary { with } else { beside };
         assert!(counted <= 3.0 + ratio(BASE_BYTES) && beside < 1.5 + ratio(BASE_BYTES), "{name}: {counted}");
     }
+    learning_takes_what_it_is_priced();
     let compute = Arc::new(Compute::new(2, 8, 1, Duration::from_secs(600)).unwrap());
     let budget = Budget::new(usize::MAX / 4, 1);
     let one = 8 * 20 * N;

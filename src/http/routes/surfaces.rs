@@ -21,10 +21,10 @@ use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::sampling::Sampling;
-use crate::numerics::selection::learning_flops;
+use crate::numerics::selection::learning_price;
 use crate::numerics::solver::choose::{
     Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, kriged_operator_price,
-    n_entries_per_row, work_price,
+    n_entries_per_row, sampling_bytes, work_price,
 };
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::{
@@ -143,7 +143,9 @@ pub fn plan_applied(
             work_price(asked, n, m, d).and(judging)
         }
     };
-    work.flops += learning_flops(n);
+    work = work.and(learning_price(n, d));
+    // Where the kernel stretches the cloud or duplicates are merged, it is another cloud.
+    work.n_bytes = work.n_bytes.saturating_add(sampling_bytes(n, d));
     if has_deviations {
         if !main.is_moving() {
             work = work.and(deviations_price(n, of_operator, d));

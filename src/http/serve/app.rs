@@ -13,8 +13,10 @@ use crate::http::compute::Compute;
 use crate::http::jobs::{JobLimits, Jobs};
 use crate::http::metrics::Metrics;
 use crate::http::problem::Problem;
+use crate::http::problem::slug::Slug;
 use crate::memory::Memory;
-use crate::store::budget::Budget;
+use crate::store::Owner;
+use crate::store::budget::{BeyondBudget, Budget, Reservation};
 use crate::store::clouds::CloudStore;
 use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
@@ -92,5 +94,25 @@ impl App {
             draining: CancellationToken::new(),
             config,
         }))
+    }
+
+    /// Waits for so many bytes of memory for work, as long as they are wanted; `None` if they no longer are. Whoever waits
+    /// holds no other memory for work.
+    ///
+    /// # Errors
+    /// 413 `problem-too-large` if there will never be so many.
+    pub async fn reserve(
+        &self,
+        owner: Owner,
+        n_bytes: usize,
+        is_wanted: impl Fn() -> bool,
+    ) -> Result<Option<Reservation>, Problem> {
+        let beyond = |BeyondBudget { limit }| {
+            let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, \
+                          or raise GRAMIAN_MEMORY_BYTES";
+            Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(n_bytes))
+                .with_remedy(remedy)
+        };
+        self.prepared.reserve(owner, n_bytes, is_wanted).await.map_err(beyond)
     }
 }

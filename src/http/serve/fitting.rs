@@ -9,7 +9,6 @@ use super::report::Report;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
 use crate::http::problem::Problem;
-use crate::http::problem::slug::Slug;
 use crate::http::serve::app::App;
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::interpolant::Interpolant;
@@ -22,7 +21,7 @@ use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::local::LocalSurface;
 use crate::numerics::surface::signature::{Signature, SignatureSurface};
-use crate::store::budget::{BeyondBudget, Reservation};
+use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
 
@@ -128,10 +127,8 @@ impl Fitting<'_> {
         let work = n_bytes_of_work(wanted.cost);
         let total = counted.into_iter().fold(work, usize::saturating_add);
         let is_wanted = || self.count(wanted) == counted;
-        let reserved = self.app.prepared.reserve(self.admission.owner, total, is_wanted).await;
-        let Some(mut work) = reserved.map_err(|BeyondBudget { limit }| beyond(limit, total))? else {
-            return Ok(None);
-        };
+        let reserved = self.app.reserve(self.admission.owner, total, is_wanted).await?;
+        let Some(mut work) = reserved else { return Ok(None) };
         let [main, other, surface] = counted.map(|n_bytes| (n_bytes > 0).then(|| work.split(n_bytes)));
         Ok(Some(Memory { work, main, other, surface }))
     }
@@ -278,12 +275,6 @@ enum Extent {
 
 fn n_bytes_of_work(cost: Cost) -> usize {
     LEAST_BYTES.saturating_add(cost.n_bytes())
-}
-
-fn beyond(limit: usize, required: usize) -> Problem {
-    let remedy = "take fewer points or queries, regularize what is singular to rounding by a larger alpha, or raise \
-                  GRAMIAN_MEMORY_BYTES";
-    Problem::too_large(Slug::ProblemTooLarge, "bytes of memory", limit, Some(required)).with_remedy(remedy)
 }
 
 async fn prepare(

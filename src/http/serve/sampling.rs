@@ -9,14 +9,15 @@ use crate::http::problem::{Pointers, Problem};
 use crate::numerics::error::NumericsError;
 use crate::numerics::points::noise::estimate_noise;
 use crate::numerics::points::sampling::Sampling;
-use crate::numerics::selection::learning_flops;
+use crate::numerics::selection::learning_price;
 use crate::numerics::solver::choose::{noise_flops, sampling_flops};
 use crate::store::clouds::RegisteredCloud;
 
 /// Finds what a fit lacks of its cloud.
 ///
 /// # Errors
-/// 500 `internal` if the work was cancelled while somebody waits for it, which is a bug.
+/// 413 `problem-too-large` if it takes more memory than there is, 500 `internal` if the work was cancelled while
+/// somebody waits for it, which is a bug.
 pub async fn find_lacking(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -31,9 +32,18 @@ pub async fn find_lacking(
         app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
     } else if fit.lacks_learned() {
         let asked = fit.learning(sampling)?;
-        let flops = learning_flops(fit.n_points());
-        let learn = move |observer: &JobObserver| asked.learn(observer);
-        let looking = look_at(app, admission, flops, learn);
+        let price = learning_price(fit.n_points(), fit.stored.cloud.dimension());
+        let (shared, admitted) = (app.clone(), admission.clone());
+        let looking = async move {
+            let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;
+            // The memory goes with the job: it may run on for a moment when nobody waits any more.
+            let learn = move |observer: &JobObserver| {
+                let learned = asked.learn(observer);
+                drop(memory);
+                learned
+            };
+            look_at(&shared, &admitted, price.flops, learn).await
+        };
         if let Some(values) = &mut fit.values {
             values.learned = Some(app.learned.get_or_learn(values.key, || looking).await?);
         }

@@ -23,7 +23,7 @@ mod walk;
 pub use alpha_path::{alpha_path, default_alphas};
 pub use criterion::Criterion;
 pub use descent::Side;
-pub use learning::{Learned, Noise, Observed, learn, learn_mean, learning_flops};
+pub use learning::{Learned, Noise, Observed, learn, learn_mean, learning_price};
 pub use leave_one_out::{LeaveOneOut, leave_one_out, leave_one_out_with};
 pub use parameters::{Hyperparameters, Parameter, Variation};
 pub use price::{alpha_path_price, expected_evaluations, leave_one_out_price, selection_price};

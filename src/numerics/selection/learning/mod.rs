@@ -14,6 +14,7 @@ mod grid;
 mod group;
 mod likelihood;
 mod order;
+mod price;
 mod search;
 mod values;
 
@@ -25,11 +26,12 @@ use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::trend::{Mean, Trend};
 use grid::Grid;
 use likelihood::Evidence;
-use order::{DEEP_GROUPS, GIVEN, GIVEN_DEEP, MAX_GROUPS, MAX_SAMPLE, MAX_TOGETHER, Order, RESPONSES};
+use order::Order;
 use search::Search;
 use values::Values;
 
 pub(super) use likelihood::remove_mean;
+pub use price::learning_price;
 
 /// What is known of the noise of values beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,26 +151,6 @@ fn search(
             None => return deep.learned(found, observer),
         }
     }
-}
-
-/// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep
-/// groups.
-const CELLS: f64 = 70.0;
-const CELLS_FROM_SAMPLE: f64 = 40.0;
-const CELLS_OF_DEEP: f64 = 4.0;
-
-/// Flops of [`learn`] for n values.
-pub fn learning_flops(n_points: usize) -> f64 {
-    let together = |n: usize| (n * n) as f64 * (n as f64 / 3.0 + 20.0);
-    let of_order = 500.0 * n_points as f64;
-    if n_points <= MAX_TOGETHER {
-        return CELLS * together(n_points) + of_order;
-    }
-    let n_levels = (n_points / MAX_SAMPLE).ilog2() as usize + 1;
-    let n_groups = n_points.div_ceil(RESPONSES).min(MAX_GROUPS * n_levels);
-    let of_groups = n_groups as f64 * together(GIVEN + RESPONSES) + together(MAX_SAMPLE);
-    let of_deep = DEEP_GROUPS as f64 * together(GIVEN_DEEP + RESPONSES);
-    CELLS * together(MAX_SAMPLE) + CELLS_FROM_SAMPLE * of_groups + CELLS_OF_DEEP * of_deep + of_order
 }
 
 /// The mean of values under a kernel and a noise that are given.

@@ -4,7 +4,7 @@ use super::{Noise, Observed};
 use crate::numerics::solver::trend::Basis;
 
 /// Lists of values that are looked at, at most: with one noise and one kernel for all, more say nothing new.
-const MAX_LISTS: usize = 16;
+pub(super) const MAX_LISTS: usize = 16;
 
 /// Lists of values without what all values of a list share, in units of the greatest that is left.
 pub(super) struct Values<'a> {
