@@ -233,3 +233,34 @@ async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
     let refused = server.post("/v1/model-selection", &many).await.expect_problem(413, "problem-too-large");
     assert_eq!((&refused["limit"], &refused["required"]), (&json!(5000), &json!(5001)));
 }
+
+/// Smooth values without noise want matrices that are singular to rounding.
+#[tokio::test]
+async fn what_is_selected_is_served_when_it_is_sent_back() {
+    let server = Server::start().await;
+    for (n, dimension) in [(30, 1), (120, 2), (300, 3)] {
+        let mut random = Random(n as u64);
+        let points: Vec<Vec<f64>> =
+            (0..n).map(|_| (0..dimension).map(|_| random.uniform()).collect()).collect();
+        let value = |x: &Vec<f64>| (3.0 * x[0]).sin() + x.last().unwrap_or(&0.0) * x[0];
+        let values: Vec<f64> = points.iter().map(value).collect();
+        for criterion in ["marginal_likelihood", "leave_one_out", "generalized_cross_validation"] {
+            let asked = json!({
+                "cloud": {"points": points}, "values": values, "criterion": criterion, "mean": "constant",
+                "kernel": {"family": "gauss", "length_scale": 0.1}, "alpha": 1e-3, "families": ["gauss", "matern"],
+                "vary": [
+                    {"parameter": "length_scale", "min": 0.01, "max": 100.0},
+                    {"parameter": "variance", "min": 1e-3, "max": 1e3},
+                    {"parameter": "alpha", "min": 1e-20, "max": 1.0},
+                ],
+            });
+            let selected = server.post("/v1/model-selection", &asked).await.expect_ok();
+            let sent_back = json!({
+                "cloud": {"points": points}, "values": values, "mean": "constant",
+                "include": ["variance", "log_marginal_likelihood"],
+                "kernel": selected["kernel"], "alpha": selected["alpha"], "queries": [points[0]],
+            });
+            server.post("/v1/posterior", &sent_back).await.expect_ok();
+        }
+    }
+}

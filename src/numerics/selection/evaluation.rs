@@ -24,16 +24,16 @@ pub(super) const UNDETERMINED: f64 = 1e-12;
 
 /// Evaluates a criterion.
 pub(super) struct Evaluator<'a> {
-    subject: &'a Subject<'a>,
+    pub(super) subject: &'a Subject<'a>,
     criterion: Criterion,
-    matrices: Matrices,
+    pub(super) matrices: Matrices,
 }
 
 /// What a factorization says; the evaluator holds the factor.
 pub(super) struct State {
     kernel: Kernel,
     /// Λ, `[n]`.
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     /// T, `L⁻ᵀ` times an orthonormal basis of `L⁻¹F`, `[n, p]`: `P = W − TTᵀ`.
     of_mean: Vec<f64>,
     /// `P_ii`, `[n]`, 0 where the mean leaves nothing of it; empty where it does not count.

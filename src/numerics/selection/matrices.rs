@@ -14,7 +14,7 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::{factorize_in_place, parallelism};
+use crate::numerics::solver::{estimate_norm1, factorize_in_place, parallelism};
 use crate::numerics::sums::gram::{fill_kernel_column, fill_lower_gram};
 use crate::numerics::sums::nodes::Nodes;
 use crate::numerics::sums::regularization::Regularization;
@@ -31,6 +31,17 @@ fn blocks(n: usize) -> impl Iterator<Item = (usize, usize)> {
     firsts.map(move |first| (first, COLUMNS_PER_CHECKPOINT.min(n - first)))
 }
 
+/// `‖A‖₁` of a symmetric matrix, from its lower triangle.
+fn norm1_of_lower(matrix: &[f64], n: usize) -> f64 {
+    let mut sums = vec![0.0; n];
+    for (j, column) in matrix.chunks_exact(n).enumerate() {
+        let (of_diagonal, below) = sums[j..].split_at_mut(1);
+        of_diagonal[0] += column[j..].iter().map(|entry| entry.abs()).sum::<f64>();
+        below.iter_mut().zip(&column[j + 1..]).for_each(|(sum, entry)| *sum += entry.abs());
+    }
+    sums.into_iter().fold(0.0, f64::max)
+}
+
 /// L with `K + N = LLᵀ`, and two matrices that are made from it; column by column, lower triangles.
 pub(super) struct Matrices {
     n: usize,
@@ -38,6 +49,8 @@ pub(super) struct Matrices {
     pub(super) is_alone: bool,
     par: Par,
     factor: Vec<f64>,
+    /// `‖K + N‖₁`.
+    norm1: f64,
     /// L⁻¹, and then what is multiplied by its own transpose.
     inverse_factor: Vec<f64>,
     has_inverse_factor: bool,
@@ -56,6 +69,7 @@ impl Matrices {
             is_alone,
             par,
             factor: Vec::new(),
+            norm1: 0.0,
             inverse_factor: Vec::new(),
             has_inverse_factor: false,
             product: Vec::new(),
@@ -85,6 +99,7 @@ impl Matrices {
         } else {
             fill_lower_gram(cloud, kernel, noise, &mut self.factor, n, observer)?;
         }
+        self.norm1 = norm1_of_lower(&self.factor, n);
         let mut factor = MatMut::from_column_major_slice_mut(&mut self.factor, n, n);
         let least = SMALLEST_PIVOT * kernel.at_zero();
         let Some(scratch) = &mut self.scratch else {
@@ -98,6 +113,22 @@ impl Matrices {
 
     fn factor(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.factor, self.n, self.n)
+    }
+
+    /// `‖K + N‖₁`.
+    pub(super) fn norm1(&self) -> f64 {
+        self.norm1
+    }
+
+    /// `1/(‖K + N‖₁ ‖(K + N)⁻¹‖₁)`, estimated.
+    pub(super) fn reciprocal_condition(&self) -> f64 {
+        let solve = |mut columns: MatMut<'_, f64>| {
+            solve_lower_triangular_in_place(self.factor(), columns.rb_mut(), self.par);
+            solve_upper_triangular_in_place(self.factor().transpose(), columns, self.par);
+        };
+        let (of_inverse, _) = estimate_norm1(self.n, solve, solve);
+        let product = self.norm1 * of_inverse;
+        if product.is_finite() { 1.0 / product } else { 0.0 }
     }
 
     /// `ln det LLᵀ`.

@@ -15,6 +15,7 @@ mod matrices;
 mod parameters;
 mod price;
 mod select;
+mod served;
 mod space;
 mod spectrum;
 mod subject;

@@ -2,6 +2,7 @@
 
 use faer::Mat;
 
+use super::learning::remove_mean;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::points::cloud::Cloud;
@@ -60,6 +61,16 @@ impl<'a> Subject<'a> {
             true => Err(NumericsError::MeanNotDetermined),
             false => Ok(()),
         }
+    }
+
+    /// The norm of what the mean leaves of the values at least: what it leaves where all of them weigh the same.
+    pub(super) fn rest(&self) -> f64 {
+        let n = self.n_points();
+        let mut columns = self.functions.clone();
+        columns.extend_from_slice(&self.values);
+        let found = remove_mean(&mut columns, n, self.n_functions);
+        let rest = &columns[self.n_functions * n..];
+        found.map_or(0.0, |_| dot(rest, rest).sqrt())
     }
 
     pub(super) fn n_points(&self) -> usize {

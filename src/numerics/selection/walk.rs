@@ -51,7 +51,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
     }
 
-    /// Minus the merit and its slopes; infinite where the matrix is not positive definite. After an error everything is flat, so that the
+    /// Minus the merit and its slopes; infinite where no solver serves the hyperparameters. After an error everything is flat, so that the
     /// optimizer ends without any work.
     pub(super) fn objective(&mut self, numbers: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         let logarithms: Vec<f64> = numbers.iter().zip(&self.units).map(|(x, unit)| x * unit).collect();
@@ -83,13 +83,14 @@ impl<'a, 'b> Walk<'a, 'b> {
         Ok(value)
     }
 
-    /// The merit at a point; `None` where the matrix is not positive definite.
+    /// The merit at a point; `None` where no solver serves it.
     pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>, NumericsError> {
         if self.at.as_ref().is_none_or(|at| at.logarithms != x) {
             self.observer.checkpoint()?;
             let hyperparameters = self.space.at(x);
             self.at = None;
             let state = self.evaluator.score(&hyperparameters, self.observer)?;
+            let state = state.filter(|state| self.evaluator.is_served(&hyperparameters, state));
             self.evaluations += 1;
             self.at = Some(Point { logarithms: x.to_vec(), hyperparameters, state, gradient: None });
         }

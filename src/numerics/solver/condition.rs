@@ -7,7 +7,7 @@ use faer::{Mat, MatMut};
 /// One step of Hager's algorithm with Higham's safeguard (Higham 2002, "Accuracy and Stability of Numerical Algorithms", algorithm
 /// 15.1): the gradient of `‖Wx‖₁` at the mean of all columns names a large one. More steps seldom find a column that is
 /// twice as large, and each costs two more applications. A bound that is not finite means the map overflows.
-pub(super) fn estimate_norm1(
+pub(in crate::numerics) fn estimate_norm1(
     n: usize,
     apply: impl Fn(MatMut<'_, f64>),
     apply_transposed: impl Fn(MatMut<'_, f64>),

@@ -21,11 +21,13 @@ use super::observer::Observer;
 use super::points::cloud::Cloud;
 use super::sums::expansion::Expansion;
 use super::sums::regularization::Regularization;
+pub(in crate::numerics) use condition::estimate_norm1;
 use dense::Dense;
 pub(in crate::numerics) use dense::factorize_in_place;
 pub(crate) use dense::parallelism;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
 use kind::{Quantity, SolverKind};
+pub(in crate::numerics) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;
 pub use system::System;
 

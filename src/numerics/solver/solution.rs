@@ -20,7 +20,7 @@ const REFINE_ABOVE: f64 = 1e-12;
 const ROUNDING: f64 = f64::EPSILON;
 
 /// Beyond these no honest answer exists (numerics.md, Fit 3).
-pub(super) const MAX_RELATIVE_RESIDUAL: f64 = 1e-5;
+pub(in crate::numerics) const MAX_RELATIVE_RESIDUAL: f64 = 1e-5;
 const MAX_BACKWARD_ERROR: f64 = 1e-13;
 
 /// `Λ = (K + αI)⁻¹ Y` with its residual and norms. Where the function has a mean, Y is what the mean leaves of the values.
