@@ -8,6 +8,7 @@ use gramian::numerics::observer::Unobserved;
 use gramian::numerics::patches::Patches;
 use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::sampling::Sampling as Spacings;
+use gramian::numerics::surface::sure::least_ratio;
 
 use crate::common::random::Random;
 use crate::sampling::{Sampling, sample};
@@ -17,9 +18,6 @@ pub const NOISES: [f64; 5] = [0.0, 0.002, 0.005, 0.01, 0.02];
 
 /// Deviations within which 95 % of the errors lie, were they normal.
 const BAND: f64 = 1.96;
-
-/// What the service flags beyond, beside what is bent: deviation of a principal curvature over the larger one.
-const FLAGGED: f64 = 1.0 / 6.0;
 
 /// What a row asks: a surface, how it is sampled, and the deviation of the noise of its points over its radius.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +69,9 @@ impl Row {
     pub fn take(&mut self, patches: &Patches, cloud: &Cloud, truths: &[Truth]) {
         let found = patches.at(cloud, true, true, &Unobserved).unwrap();
         let deviations = found.curvatures.as_ref().unwrap();
+        // What is not known, or bent, is not sure either.
+        let mut ratios = vec![0.0; truths.len()];
+        let first = self.errors.len();
         for (i, truth) in truths.iter().enumerate().filter(|&(i, _)| found.is_known[i]) {
             let normal = <[f64; 3]>::try_from(&found.normals[3 * i..3 * i + 3]).unwrap();
             let form = std::array::from_fn(|a| std::array::from_fn(|b| found.shapes[9 * i + 3 * a + b]));
@@ -81,18 +82,20 @@ impl Row {
                 bars.reverse();
             }
             let bars = [found.normal_deviations[i], deviations.mean[i], bars[0], bars[1]];
-            self.take_point(normal, curvatures, bars, deviations.is_bent[i], truth);
+            if !deviations.is_bent[i] {
+                ratios[i] = larger(curvatures) / bars[2].max(bars[3]);
+            }
+            self.take_point(normal, curvatures, bars, truth);
+        }
+        let least = least_ratio(&ratios);
+        let known = ratios.iter().zip(&found.is_known).filter(|(_, is_known)| **is_known);
+        for ((ratio, _), error) in known.zip(&self.errors[first..]) {
+            self.n_flagged += usize::from(*ratio < least);
+            self.n_off += usize::from(*ratio >= least && *error > 0.5);
         }
     }
 
-    fn take_point(
-        &mut self,
-        normal: [f64; 3],
-        curvatures: [f64; 2],
-        bars: [f64; 4],
-        is_bent: bool,
-        truth: &Truth,
-    ) {
+    fn take_point(&mut self, normal: [f64; 3], curvatures: [f64; 2], bars: [f64; 4], truth: &Truth) {
         let across = cross(normal, truth.normal);
         let angle = dot(across, across).sqrt().min(1.0).asin();
         let off = [0, 1].map(|i| (curvatures[i] - truth.curvatures[i]).abs());
@@ -102,15 +105,9 @@ impl Row {
         {
             slot.push(error / (BAND * bar));
         }
-        let larger = |pair: [f64; 2]| pair[0].abs().max(pair[1].abs());
         let error = larger(off) / larger(truth.curvatures);
         self.angles.push(angle);
         self.errors.push(error);
-        if is_bent || bars[2].max(bars[3]) > FLAGGED * larger(curvatures) {
-            self.n_flagged += 1;
-        } else if error > 0.5 {
-            self.n_off += 1;
-        }
     }
 
     /// Shares of true values within the bars, per cent: normal, mean and principal curvatures.
@@ -138,6 +135,10 @@ impl Row {
         let range = if noise > 0.0 { 90.0..=99.5 } else { 85.0..=100.0 };
         self.coverages().iter().all(|coverage| range.contains(coverage))
     }
+}
+
+fn larger(pair: [f64; 2]) -> f64 {
+    pair[0].abs().max(pair[1].abs())
 }
 
 pub fn patches(cloud: &Arc<Cloud>) -> Patches {

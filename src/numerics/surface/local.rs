@@ -10,6 +10,7 @@ use super::degeneracy::{DegeneracyReason, is_far};
 use super::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
 use super::request::{GeometryRequest, Orientation};
 use super::served::{Deviations, Served, ServedBy, Verdict};
+use super::sure::least_ratio;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::numerics::machine::vector::{dot, norm};
@@ -22,10 +23,6 @@ use crate::numerics::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 
 /// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
 const SAYS_SIGN: f64 = 0.2;
-
-/// Deviation of a principal curvature over the largest one beyond which it is flagged: three deviations are half of it. Of those that pass,
-/// and are not bent, less than 1 % are off by half, at any noise (docs/error-bars.md).
-const RESOLVED: f64 = 1.0 / 6.0;
 
 /// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
 /// that are off by 30°.
@@ -45,6 +42,8 @@ pub struct LocalSurface {
     /// Whether what is known of the side of a point contradicts itself, `[n]`.
     is_ambiguous: Vec<bool>,
     radius: f64,
+    /// What a curvature is of its deviation at least where it is known well enough to be used.
+    least_ratio: f64,
 }
 
 impl LocalSurface {
@@ -67,7 +66,11 @@ impl LocalSurface {
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
         let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius })
+        // What is not known, or bent, is not sure either.
+        let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
+        let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
+        let least_ratio = least_ratio(&ratios);
+        Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius, least_ratio })
     }
 
     pub fn cloud(&self) -> &Cloud {
@@ -174,16 +177,8 @@ impl LocalSurface {
 
     /// Whether the curvatures are known well enough to be used.
     fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
-        let d = self.cloud.dimension();
-        let Some(deviations) = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query]) else {
-            return false;
-        };
-        let (normal, shape) =
-            (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
-        let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
-        let largest = curvatures.iter().fold(FLAT / self.radius, |a: f64, k| a.max(k.abs()));
-        let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
-        deviations.iter().all(|deviation| *deviation <= RESOLVED * largest)
+        let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
+        ratio.is_some_and(|ratio| ratio >= self.least_ratio)
     }
 
     /// Turns normals to the side of those of the points nearby.
@@ -205,6 +200,19 @@ impl LocalSurface {
             if along < 0.0 { -1.0 } else { 1.0 }
         });
     }
+}
+
+/// The largest principal curvature over the largest deviation of one, infinite for deviations of 0; `None` where nothing is
+/// known, and where the surface bends more than deviations say.
+fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Option<f64> {
+    let deviations = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query])?;
+    let (normal, shape) = (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
+    let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
+    let largest = curvatures.iter().fold(FLAT / radius, |a: f64, k| a.max(k.abs()));
+    let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
+    let deviation = deviations.iter().fold(0.0, |a: f64, &deviation| a.max(deviation));
+    let ratio = if deviation > 0.0 { largest / deviation } else { f64::INFINITY };
+    (geometry.is_known[query] && !ratio.is_nan()).then_some(ratio)
 }
 
 /// Signs of the normals of patches: those of a coarse signature function, by whole regions.

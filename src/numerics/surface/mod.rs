@@ -6,6 +6,7 @@ pub mod local;
 pub mod operators;
 pub mod served;
 pub mod signature;
+pub mod sure;
 
 mod coarse;
 mod curvature;
