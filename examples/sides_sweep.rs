@@ -8,24 +8,27 @@ mod common;
 #[path = "../tests/scans/sides/mod.rs"]
 mod sides;
 
-use sides::cases::{Case, curves, folded_curve, folded_sheet, nested_spheres, plate, tube, two_spheres};
+use sides::cases::{
+    Case, curves, folded_curve, folded_sheet, lens, nested_spheres, plate, tube, two_spheres,
+};
 use sides::tally::SideTally;
 
 /// Points beyond which the signature function, of cubic cost, is left out.
 const MAX_DENSE: usize = 3000;
 
 const HEADER: &str = "\
-| cloud | n | surface | flipped | without a flag | flagged | for its side |
-|---|---|---|---|---|---|---|";
+| cloud | n | surface | flipped | without a flag | flagged | for its side | off by 30° without a flag |
+|---|---|---|---|---|---|---|---|";
 
 fn main() {
     let n_most: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(3000);
     println!("{HEADER}");
-    for n in [500, 1500, 3000, 10_000].into_iter().filter(|n| *n <= n_most) {
+    for n in [200, 500, 1500, 3000, 10_000, 20_000].into_iter().filter(|n| *n <= n_most) {
         curves(n, 1).iter().for_each(print_rows);
         print_rows(&folded_curve(n, 4.0, 1));
         [0.5, 0.75, 1.0, 1.26, 1.84, 2.0, 3.0, 4.0].into_iter().for_each(|t| print_rows(&plate(n, t, 1)));
-        [1.0, 1.5, 2.0, 3.0, 4.0].into_iter().for_each(|r| print_rows(&tube(n, r, 1)));
+        [0.5, 1.0, 1.5, 2.0, 3.0, 4.0].into_iter().for_each(|t| print_rows(&lens(n, t, 1)));
+        [0.5, 1.0, 1.5, 2.0, 3.0, 4.0].into_iter().for_each(|r| print_rows(&tube(n, r, 1)));
         [0.0, 0.5, 1.0, 2.0, 4.0].into_iter().for_each(|gap| print_rows(&two_spheres(n, gap, 1)));
         [0.2, 0.5, 0.8, 0.9].into_iter().for_each(|share| print_rows(&nested_spheres(n, share, 1)));
     }
@@ -41,7 +44,13 @@ fn print_rows(case: &Case) {
 }
 
 fn print_row(case: &Case, way: &str, tally: &SideTally) {
-    let shares = [tally.flipped(), tally.flipped_unflagged(), tally.flagged(), tally.ambiguous()];
+    let shares = [
+        tally.flipped(),
+        tally.flipped_unflagged(),
+        tally.flagged(),
+        tally.ambiguous(),
+        tally.off_unflagged(),
+    ];
     let shares = shares.map(|share| format!("{:.2} %", 100.0 * share)).join(" | ");
     println!("| {} | {} | {way} | {shares} |", case.name, tally.n_points);
 }

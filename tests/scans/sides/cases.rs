@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::clouds::{
-    Sided, along, cassini, folded_strip, half_plate, length_of, polar, revolved, revolved_area, ring, sphere,
-    surface_spacing,
+    Sided, along, cassini, folded_strip, half_lens, half_plate, length_of, polar, revolved, revolved_area,
+    ring, sphere, surface_spacing,
 };
 use crate::common::random::Random;
 
@@ -64,6 +64,13 @@ pub fn plate(n: usize, thickness: f64, seed: u64) -> Case {
     let spacing = surface_spacing(TAU, n);
     let outline = half_plate(1.0, thickness * spacing);
     Case::new(format!("plate, {thickness}"), revolved(&outline, n, &mut Random(seed)), thickness)
+}
+
+/// Two caps of spheres that meet in an edge, so many spacings thick in the middle.
+pub fn lens(n: usize, thickness: f64, seed: u64) -> Case {
+    let spacing = surface_spacing(TAU, n);
+    let outline = half_lens(1.0, thickness * spacing);
+    Case::new(format!("lens, {thickness}"), revolved(&outline, n, &mut Random(seed)), thickness)
 }
 
 /// A thin torus, its tube so many spacings in radius.

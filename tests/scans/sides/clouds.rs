@@ -118,6 +118,18 @@ pub fn half_plate(radius: f64, thickness: f64) -> Vec<Place> {
     below.chain(rim).chain(above).collect()
 }
 
+/// Half the section of a lens of a radius whose caps are spheres, so thick in the middle; from the axis on.
+pub fn half_lens(radius: f64, thickness: f64) -> Vec<Place> {
+    let half = 0.5 * thickness;
+    let of_cap = (radius * radius + half * half) / (2.0 * half);
+    let widest = (radius / of_cap).asin();
+    let cap = |i: i32, up: f64| {
+        let (s, c) = (widest * f64::from(i) / 4000.0).sin_cos();
+        ([of_cap * s, up * (half - of_cap * (1.0 - c))], [s, up * c])
+    };
+    (0..=4000).map(|i| cap(i, -1.0)).chain((0..=4000).rev().map(|i| cap(i, 1.0))).collect()
+}
+
 /// A circle of a radius about (at, 0).
 pub fn ring(at: f64, radius: f64) -> Vec<Place> {
     let place = |i: i32| {

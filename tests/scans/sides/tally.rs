@@ -24,7 +24,12 @@ pub struct SideTally {
     /// Points with a flag, for any reason and for their sides.
     pub n_flagged: usize,
     pub n_ambiguous: usize,
+    /// Normals without a flag that are off by 30° and more, whatever their side.
+    pub n_off_unflagged: usize,
 }
+
+/// Cosine of 30°.
+const OFF: f64 = 0.866;
 
 impl SideTally {
     /// Sides of the signature function, by default.
@@ -56,6 +61,7 @@ impl SideTally {
             n_flipped: flipped.len(),
             n_flipped_unflagged: flipped.iter().filter(|&&point| !is_flagged[point]).count(),
             n_flagged: geometry.degenerate().len(),
+            n_off_unflagged: (0..n).filter(|&point| !is_flagged[point] && along(point).abs() < OFF).count(),
             n_ambiguous: geometry.degenerate().iter().filter(is_ambiguous).count(),
         }
     }
@@ -72,6 +78,11 @@ impl SideTally {
     /// The share of what has no flag that is wrong.
     pub fn wrong_of_unflagged(&self) -> f64 {
         self.n_flipped_unflagged as f64 / (self.n_points - self.n_flagged).max(1) as f64
+    }
+
+    /// The share of all points that are off without a flag.
+    pub fn off_unflagged(&self) -> f64 {
+        self.n_off_unflagged as f64 / self.n_points as f64
     }
 
     pub fn flagged(&self) -> f64 {
