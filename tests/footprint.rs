@@ -105,6 +105,7 @@ async fn keep_weights(store: &Factors, k: usize) {
         refined: false,
         energy: 0.0,
         trend: None,
+        outlier: None,
     };
     store.keep_solution(key, ValuesKey::of(&[k as f64]), Arc::new(solution));
 }

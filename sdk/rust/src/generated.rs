@@ -2941,6 +2941,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         FarFromCloud,
         #[serde(rename = "neighbours_not_enough")]
         NeighboursNotEnough,
+        #[serde(rename = "misfit")]
+        Misfit,
     }
     impl ::std::fmt::Display for WarningCode {
         fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
@@ -2956,6 +2958,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 Self::DisagreesWithNeighbours => f.write_str("disagrees_with_neighbours"),
                 Self::FarFromCloud => f.write_str("far_from_cloud"),
                 Self::NeighboursNotEnough => f.write_str("neighbours_not_enough"),
+                Self::Misfit => f.write_str("misfit"),
             }
         }
     }
@@ -2976,6 +2979,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 "disagrees_with_neighbours" => Ok(Self::DisagreesWithNeighbours),
                 "far_from_cloud" => Ok(Self::FarFromCloud),
                 "neighbours_not_enough" => Ok(Self::NeighboursNotEnough),
+                "misfit" => Ok(Self::Misfit),
                 _ => Err("invalid value".into()),
             }
         }

@@ -7,6 +7,7 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
+use crate::numerics::solver::{Disagreement, Outlier};
 use crate::numerics::surface::operators::{RowKind, Stencils};
 
 /// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
@@ -52,7 +53,7 @@ pub enum WarningCode {
     Refined,
     /// Points that coincide were merged.
     DuplicatesMerged,
-    /// Variances that came out negative within rounding are served as 0.
+    /// Variances that came out negative within rounding are served as 0, that of values whose squares leave float64 as 1e-290.
     VarianceClamped,
     /// The offset model served where the signature function could not.
     OffsetModelUsed,
@@ -68,6 +69,8 @@ pub enum WarningCode {
     FarFromCloud,
     /// Values from the points nearest to a query still change with how many of them are taken.
     NeighboursNotEnough,
+    /// Values contradict kernel and noise: deviations are too short, where one value is named perhaps around it alone.
+    Misfit,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.
@@ -183,6 +186,23 @@ impl Diagnostics {
             queries.len()
         );
         self.warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
+    }
+}
+
+impl Diagnostics {
+    /// Says how values contradict kernel and noise, with what helps.
+    pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
+        let spread = found.mean_square.sqrt();
+        let detail = match found.outlier {
+            Some(Outlier { point, deviations }) => format!(
+                "the value of point {point} is {deviations:.1} deviations from what others say of it, and all are {spread:.1} in root mean \
+                 square; {remedy}"
+            ),
+            None => format!(
+                "values are {spread:.1} deviations from what others say of them in root mean square; {remedy}"
+            ),
+        };
+        self.warnings.push(Warning { code: WarningCode::Misfit, detail });
     }
 }
 

@@ -201,6 +201,8 @@ impl Operation for LaplaceBeltramiRequest {
             .map_err(|error| fits.main.refused(error))?;
         let m = geometry.n_queries();
         let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
+        let has_deviations = work.request.has_deviations;
+        fits.main.warn_of_misfit(&mut diagnostics, Some(&interpolant.solution), has_deviations);
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         let (factor, queries) = (fits.main.plan.scale, &*work.queries);
         let interpolant = &interpolant;

@@ -143,7 +143,7 @@ pub fn plan_applied(
             work_price(asked, n, m, d).and(judging)
         }
     };
-    work = work.and(learning_price(n, d));
+    work = work.and(learning_price(n, d, 1));
     // Where the kernel stretches the cloud or duplicates are merged, it is another cloud.
     work.n_bytes = work.n_bytes.saturating_add(sampling_bytes(n, d));
     if has_deviations {
@@ -268,12 +268,13 @@ impl AppliedWork {
         let Some(moving) = fits.main.stored.of_queries() else { return Ok(None) };
         let refused = |error| fits.main.refused(error);
         let (plan, values) = (&fits.main.plan, fits.main.merged(&self.values));
-        let function = Kriged { moving, values: &values, trend: plan.trend.as_ref(), factor: plan.scale };
+        let function = Kriged { moving, values: &values, trend: plan.trend(), factor: plan.scale };
         let found = operator(&surface.geometry, function, &self.queries, observer).map_err(refused)?;
         let mut degenerate = surface.degenerate();
         surface.flag_uncertain(Ok(found.uncertain), &mut degenerate).map_err(refused)?;
         let m = self.queries.n_points();
         let mut diagnostics = fits.main.moving_diagnostics((m, found.n_dependent), moving.n_neighbours())?;
+        fits.main.warn_of_misfit(&mut diagnostics, None, self.request.has_deviations);
         diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
         let deviations = self.request.has_deviations.then_some(found.deviations);
         Ok(Some(KrigedAnswer { values: found.values, deviations, degenerate, diagnostics }))

@@ -22,7 +22,7 @@ use crate::numerics::points::sampling::Sampling;
 use crate::numerics::selection::{Learned, Noise, Observed, learn};
 use crate::numerics::solver::choose::AutoLocal;
 use crate::numerics::solver::trend::{Mean, Trend};
-use crate::numerics::solver::{Method, Solution, Solver};
+use crate::numerics::solver::{Disagreement, Method, Outlier, Solution, Solver};
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
@@ -265,14 +265,40 @@ impl Fitted {
             let detail = format!("refined to a relative residual of {:.1e}", solution.relative_residual);
             warn(WarningCode::Refined, detail);
         }
-        warnings.extend(self.warnings_of_merging());
+        warnings.extend(self.warnings_beforehand());
         warnings
     }
 
-    fn warnings_of_merging(&self) -> Vec<Warning> {
-        let Some(merge) = &self.plan.merge else { return Vec::new() };
-        let detail = format!("points merged into an earlier one: {}", merge.n_merged());
-        vec![Warning { code: WarningCode::DuplicatesMerged, detail }]
+    /// Says how values contradict kernel and noise: those of a function that was solved, or else what was learned of them. Where these are
+    /// given nobody is told unless deviations are asked for, since the values that are answered only depend on the ratio of the two.
+    pub fn warn_of_misfit(
+        &self,
+        diagnostics: &mut Diagnostics,
+        solution: Option<&Solution>,
+        has_deviations: bool,
+    ) {
+        let plan = &self.plan;
+        let of_solution = |solution: &Solution| solution.disagreement(plan.fitted.n_points(), plan.scale);
+        let found = solution.map_or_else(|| plan.disagreement(), of_solution);
+        let Some(found) = found.filter(|_| plan.is_learned || has_deviations) else { return };
+        let as_sent = |point: usize| plan.merge.as_ref().map_or(point, |merge| merge.first_point(point));
+        let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });
+        let remedy = if plan.is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
+        diagnostics.warn_of_misfit(Disagreement { outlier, ..found }, remedy);
+    }
+
+    /// What is known before anything is solved.
+    fn warnings_beforehand(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if let Some(merge) = &self.plan.merge {
+            let detail = format!("points merged into an earlier one: {}", merge.n_merged());
+            warnings.push(Warning { code: WarningCode::DuplicatesMerged, detail });
+        }
+        if self.plan.has_least_variance() {
+            let detail = TOO_SMALL.to_owned();
+            warnings.push(Warning { code: WarningCode::VarianceClamped, detail });
+        }
+        warnings
     }
 
     /// What the answer says of values from the points nearest to each query.
@@ -287,14 +313,14 @@ impl Fitted {
         let FitModel::Moving { kernel, regularization, reason } = &self.plan.model else {
             return Err(Problem::internal());
         };
-        let mut warnings = self.warnings_of_merging();
+        let mut warnings = self.warnings_beforehand();
         if n_dependent > 0 {
             let detail = format!(
                 "points that follow from nearer ones to rounding are left out of the {n_neighbours} nearest (queries: {n_dependent} of {m})"
             );
             warnings.push(Warning { code: WarningCode::IllConditioned, detail });
         }
-        let (scale, trend) = (self.plan.scale, self.plan.trend.as_ref());
+        let (scale, trend) = (self.plan.scale, self.plan.trend());
         Ok(Diagnostics {
             kernel: KernelUsed::scaled(kernel, scale),
             alpha: uniform(regularization).map(|alpha| alpha * scale),
@@ -342,6 +368,10 @@ fn uniform(regularization: &Regularization) -> Option<f64> {
     }
 }
 
+const TOO_SMALL: &str = "squares of the values leave float64: their variance is taken to be 1e-290, and deviations are too long; scale the values";
+const MISFIT_OF_LEARNED: &str =
+    "deviations there may be too short: look at these values, or give a kernel that is shorter or rougher";
+const MISFIT_OF_GIVEN: &str = "deviations are too short: leave out kernel and alpha, so that they are learned, or raise variance and alpha";
 const BEYOND_DENSE: &str = "the cloud has more points than are factorized densely";
 const MANY_POINTS: &str =
     "regressions from the nearest points take time linear in the points, of which there are many";

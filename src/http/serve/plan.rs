@@ -15,6 +15,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::duplicates::Merge;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
+use crate::numerics::solver::Disagreement;
 use crate::numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
 use crate::numerics::solver::kind::SolverKind;
 use crate::numerics::solver::trend::{Mean, Trend};
@@ -99,6 +100,11 @@ impl PlannedFit {
     /// Points that are factorized at most: without the duplicates that may be merged.
     pub fn n_points(&self) -> usize {
         self.stored.cloud.n_points()
+    }
+
+    /// Lists of values, each with one for every point.
+    pub fn n_lists(&self) -> usize {
+        self.values.as_ref().map_or(0, |values| values.values.len() / self.n_points())
     }
 
     /// Length scales of the kernel: 1, or one for each axis.
@@ -189,7 +195,7 @@ impl PlannedFit {
         if let Way::Regressions(reason) = way {
             let (key, fitted) = (FitKey::of_local(owner, stored.id), stored.cloud.clone());
             let model = FitModel::Local(reason);
-            let (scale, is_learned, mean, trend) = (1.0, false, Mean::Zero, None);
+            let (scale, is_learned, mean) = (1.0, false, Mean::Zero);
             return Ok(FitPlan {
                 stored,
                 fitted,
@@ -200,7 +206,7 @@ impl PlannedFit {
                 scale,
                 is_learned,
                 mean,
-                trend,
+                learned: None,
             });
         }
         let refuse = |error| Problem::from_numerics(error, pointers);
@@ -235,8 +241,7 @@ impl PlannedFit {
             Way::Dense | Way::Regressions(_) => FitModel::Dense { kernel, regularization },
         };
         let is_learned = self.kernel.is_none() && learned.is_some();
-        let trend = learned.filter(|_| is_moving).and_then(|learned| learned.trend.clone());
-        Ok(FitPlan { stored, fitted, merge, model, key, pointers, scale, is_learned, mean, trend })
+        Ok(FitPlan { stored, fitted, merge, model, key, pointers, scale, is_learned, mean, learned })
     }
 }
 
@@ -293,8 +298,8 @@ pub struct FitPlan {
     /// Whether the values decided kernel and noise.
     pub is_learned: bool,
     pub mean: Mean,
-    /// The mean of values that are never seen all at once.
-    pub trend: Option<Trend>,
+    /// What was learned of the values, of their mean alone where kernel and noise are given.
+    learned: Option<Arc<Learned>>,
 }
 
 /// What is fitted.
@@ -315,6 +320,26 @@ pub enum FitModel {
 }
 
 impl FitPlan {
+    /// What was learned of values that are never seen all at once.
+    fn learned_of_moving(&self) -> Option<&Learned> {
+        self.learned.as_deref().filter(|_| matches!(self.model, FitModel::Moving { .. }))
+    }
+
+    /// The mean of such values.
+    pub fn trend(&self) -> Option<&Trend> {
+        self.learned_of_moving()?.trend.as_ref()
+    }
+
+    /// How such values contradict kernel and noise.
+    pub fn disagreement(&self) -> Option<Disagreement> {
+        self.learned_of_moving()?.disagreement
+    }
+
+    /// Whether the values are so small that their variance is taken to be greater than it is.
+    pub fn has_least_variance(&self) -> bool {
+        self.is_learned && self.learned.as_ref().is_some_and(|learned| learned.has_least_variance())
+    }
+
     /// The client's normals at the points that are factorized: means over merged duplicates.
     pub fn fitted_normals(&self) -> Option<Cow<'_, Cloud>> {
         let normals = self.stored.normals.as_ref()?;

@@ -32,7 +32,7 @@ pub async fn find_lacking(
         app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
     } else if fit.lacks_learned() {
         let asked = fit.learning(sampling)?;
-        let price = learning_price(fit.n_points(), fit.stored.cloud.dimension());
+        let price = learning_price(fit.n_points(), fit.stored.cloud.dimension(), fit.n_lists());
         let (shared, admitted) = (app.clone(), admission.clone());
         let looking = async move {
             let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;

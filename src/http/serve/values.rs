@@ -1,6 +1,7 @@
 //! Values at queries, from whichever solver the fit has.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use super::fitted::Fits;
 use crate::http::compute::JobObserver;
@@ -13,6 +14,7 @@ use crate::numerics::function::interpolant::Interpolant;
 use crate::numerics::function::moving::{Moving, MovingRequest};
 use crate::numerics::function::posterior::{Variances, variances_with_mean};
 use crate::numerics::points::cloud::Cloud;
+use crate::numerics::solver::Solution;
 use crate::numerics::solver::trend::Trend;
 use crate::numerics::sums::jets::{JetOrder, Jets};
 
@@ -62,6 +64,10 @@ pub struct ValuesRequest<'a> {
     pub deviations: Option<JetOrder>,
 }
 
+fn has_deviations(asked: ValuesRequest<'_>) -> bool {
+    asked.has_variances || asked.deviations.is_some()
+}
+
 impl Fits {
     /// The function with these values at queries.
     ///
@@ -100,6 +106,12 @@ impl Fits {
         let any = batch.interpolants().next().ok_or_else(Problem::internal)?;
         let deviations = self.deviations(&any, asked, observer)?;
         let mut diagnostics = self.main.diagnostics(worst, asked.queries.n_points())?;
+        let disagrees = |solution: &&Arc<Solution>| {
+            solution.disagreement(batch.solver.n_points(), self.main.plan.scale).is_some()
+        };
+        if let Some(solution) = batch.solutions.iter().find(disagrees) {
+            self.main.warn_of_misfit(&mut diagnostics, Some(solution), has_deviations(asked));
+        }
         // Each list has its own.
         (diagnostics.native_norm_squared, diagnostics.misfit) = (None, None);
         diagnostics.mean_coefficients = None;
@@ -114,10 +126,14 @@ impl Fits {
     ) -> Result<ValuesAt, Problem> {
         // It has deviations of what it finds.
         let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
-        let has_deviations = asked.deviations.is_some();
         let plan = &self.main.plan;
-        let trend = plan.trend.as_ref();
-        let request = MovingRequest { order, has_variances: asked.has_variances, has_deviations, trend };
+        let trend = plan.trend();
+        let request = MovingRequest {
+            order,
+            has_variances: asked.has_variances,
+            has_deviations: asked.deviations.is_some(),
+            trend,
+        };
         let values = self.main.merged(asked.values);
         let found =
             moving.at(&values, asked.queries, request, observer).map_err(|error| self.main.refused(error))?;
@@ -128,6 +144,7 @@ impl Fits {
             .main
             .moving_diagnostics((found.jets.n_queries(), found.n_dependent), moving.n_neighbours())?;
         diagnostics.warn_of_unsettled(unsettled);
+        self.main.warn_of_misfit(&mut diagnostics, None, has_deviations(asked));
         let variances = found.variances.map(|variances| variances.scaled(plan.scale));
         let deviations = found.deviations.map(|deviations| deviations.scaled(plan.scale));
         Ok(ValuesAt { jets: found.jets, variances, deviations, diagnostics, interpolant: None })
@@ -146,7 +163,8 @@ impl Fits {
             }
         };
         let deviations = self.deviations(&interpolant, asked, observer)?;
-        let diagnostics = self.main.diagnostics(&interpolant.solution, jets.n_queries())?;
+        let mut diagnostics = self.main.diagnostics(&interpolant.solution, jets.n_queries())?;
+        self.main.warn_of_misfit(&mut diagnostics, Some(&interpolant.solution), has_deviations(asked));
         Ok(ValuesAt { jets, variances, deviations, diagnostics, interpolant: Some(interpolant) })
     }
 

@@ -8,6 +8,7 @@ pub mod trend;
 mod condition;
 mod dense;
 mod many;
+mod residuals;
 mod solution;
 
 use std::sync::Arc;
@@ -27,6 +28,7 @@ pub(in crate::numerics) use dense::factorize_in_place;
 pub(crate) use dense::parallelism;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
 use kind::{Quantity, SolverKind};
+pub use residuals::{Disagreement, Outlier};
 pub(in crate::numerics) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;
 pub use system::System;

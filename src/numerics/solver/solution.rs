@@ -2,6 +2,7 @@
 
 use faer::MatMut;
 
+use super::residuals::Outlier;
 use super::trend::{Mean, Trend};
 use super::{Method, Solver};
 use crate::numerics::error::{NotDefinite, NumericsError};
@@ -42,6 +43,8 @@ pub struct Solution {
     pub refined: bool,
     /// The mean, if there is one.
     pub trend: Option<Trend>,
+    /// The value that the others explain worst, under the variance of the solver's kernel, if it was looked for.
+    pub outlier: Option<Outlier>,
 }
 
 impl Solution {
@@ -55,7 +58,7 @@ impl Solution {
         Ok(Self::solve(solver, values, None, observer)?.0)
     }
 
-    /// [`Solution::of`] for a function with a mean.
+    /// [`Solution::of`] for a function with a mean, and with the value that the others explain worst.
     ///
     /// # Errors
     /// Those of [`Solution::of`], and [`NumericsError::MeanNotDetermined`].
@@ -67,11 +70,15 @@ impl Solution {
     ) -> Result<Self, NumericsError> {
         solver.cloud().check_one_per_point(values)?;
         observer.enter(Stage::Solve);
-        let Some(trend) = Trend::fit(solver, values, mean)? else {
-            return Self::of(solver, values, observer);
+        let found = match Trend::fit(solver, values, mean)? {
+            None => Self::of(solver, values, observer)?,
+            Some(trend) => {
+                let rest = trend.removed_from(values, solver.cloud());
+                Self { trend: Some(trend), ..Self::of(solver, &rest, observer)? }
+            }
         };
-        let rest = trend.removed_from(values, solver.cloud());
-        Ok(Self { trend: Some(trend), ..Self::of(solver, &rest, observer)? })
+        let outlier = Outlier::of(solver, &found.weights, observer)?;
+        Ok(Self { outlier, ..found })
     }
 
     /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
@@ -212,6 +219,7 @@ impl Candidate {
             energy,
             refined,
             trend: None,
+            outlier: None,
         };
         Ok((solution, self.jets))
     }

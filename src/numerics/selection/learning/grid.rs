@@ -122,6 +122,7 @@ impl Grid {
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance: self.known_variance(ratio).unwrap_or(by_values),
             trend: None,
+            disagreement: None,
         }
     }
 
@@ -141,6 +142,7 @@ impl Grid {
             ratio: if self.is_exact() { 0.0 } else { ratio },
             variance,
             trend: None,
+            disagreement: None,
         })
     }
 
@@ -236,6 +238,11 @@ fn rounded(x: f64, bits: i32) -> f64 {
 /// The greatest variance that is served, and the least, below which bars are too long rather than too short.
 const GREATEST_VARIANCE: f64 = 1e300;
 const LEAST_VARIANCE: f64 = 1e-290;
+
+/// Whether values were too small for a variance of their size.
+pub(super) fn is_least_variance(variance: f64) -> bool {
+    variance <= rounded(LEAST_VARIANCE, BITS_OF_VARIANCE)
+}
 
 /// A variance in other units.
 fn in_units(variance: f64, unit: f64) -> f64 {

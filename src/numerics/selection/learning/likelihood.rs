@@ -3,6 +3,7 @@
 use faer::Mat;
 use rayon::prelude::*;
 
+use super::Learned;
 use super::group::{Group, Nugget, Whitened};
 use super::order::Conditional;
 use super::values::Values;
@@ -11,6 +12,7 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
 use crate::numerics::solver::trend::{Mean, Trend, solve_gram};
+use crate::numerics::solver::{Disagreement, Outlier};
 
 /// Noise over variance that a mean is found with at least.
 const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
@@ -28,6 +30,8 @@ pub(super) struct Score {
 pub(super) struct Evidence<'a> {
     pub(super) values: &'a Values<'a>,
     groups: Vec<Group>,
+    /// Those that are explained, group after group.
+    points: Vec<usize>,
 }
 
 /// Functions and values without what the groups explain of them.
@@ -40,7 +44,9 @@ struct Unexplained {
 
 impl<'a> Evidence<'a> {
     pub(super) fn of(values: &'a Values<'a>, conditionals: &[Conditional]) -> Self {
-        Self { values, groups: conditionals.par_iter().map(|group| Group::of(values, group)).collect() }
+        let groups = conditionals.par_iter().map(|group| Group::of(values, group)).collect();
+        let points = conditionals.iter().flat_map(|group| &group.points[group.n_given..]).copied().collect();
+        Self { values, groups, points }
     }
 
     /// The score of a kernel of variance 1 with so much noise for it; the variance of the process is the one
@@ -73,24 +79,31 @@ impl<'a> Evidence<'a> {
         Ok(negative_log.is_finite().then_some(Score { negative_log, variance }))
     }
 
-    /// The mean of the values, or of the first of several lists, under a kernel of variance 1 and a noise in
-    /// its units.
+    /// What was decided, with the mean of the values, or of the first of several lists, and how the values
+    /// contradict it; `kernel` is the one that was decided, of variance 1.
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
-    pub(super) fn trend(
+    pub(super) fn concluded(
         &self,
         kernel: &Kernel,
-        ratio: f64,
+        decided: Learned,
         observer: &dyn Observer,
-    ) -> Result<Option<Trend>, NumericsError> {
-        if self.values.observed.mean == Mean::Zero {
-            return Ok(None);
-        }
+    ) -> Result<Learned, NumericsError> {
         // The mean is none the worse for it.
-        let nugget = Nugget { ratio, least: LEAST_RATIO_OF_MEAN };
-        let undetermined = || NumericsError::MeanNotDetermined;
-        let left = self.unexplained(kernel, nugget, observer)?.ok_or_else(undetermined)?;
+        let nugget = Nugget { ratio: decided.ratio, least: LEAST_RATIO_OF_MEAN };
+        match (self.unexplained(kernel, nugget, observer)?, self.values.observed.mean) {
+            (None, Mean::Zero) => Ok(decided),
+            (None, _) => Err(NumericsError::MeanNotDetermined),
+            (Some(left), mean) => {
+                let trend = (mean != Mean::Zero).then(|| self.trend(&left)).transpose()?;
+                let disagreement = self.disagreement(left, decided.variance);
+                Ok(Learned { trend, disagreement, ..decided })
+            }
+        }
+    }
+
+    fn trend(&self, left: &Unexplained) -> Result<Trend, NumericsError> {
         let p = self.n_functions();
         let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
         let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
@@ -98,13 +111,27 @@ impl<'a> Evidence<'a> {
             true => f64::from(u8::from(a == b)),
             false => dot(column(a), column(p)),
         });
-        let solved = solve_gram(&gram, right).ok_or_else(undetermined)?;
+        let solved = solve_gram(&gram, right).ok_or(NumericsError::MeanNotDetermined)?;
         let of_column = |b: usize| solved.col(b).iter().copied();
         let unit = if self.values.unit > 0.0 { self.values.unit } else { 1.0 };
         let mut coefficients: Vec<f64> = of_column(p).map(|coefficient| coefficient * unit).collect();
         coefficients[0] += self.values.first_shared();
         let covariance = (0..p).flat_map(of_column).collect();
-        Ok(Some(Trend::found(self.values.basis.clone(), coefficients, covariance)))
+        Ok(Trend::found(self.values.basis.clone(), coefficients, covariance))
+    }
+
+    /// Each value measured by the deviation that the earlier ones leave it, under a process of this variance.
+    fn disagreement(&self, mut left: Unexplained, variance: f64) -> Option<Disagreement> {
+        let (n, p) = (left.n_rows, self.n_functions());
+        remove_mean(&mut left.columns, n, p)?;
+        let rest = &left.columns[p * n..];
+        let in_deviations = self.values.unit / variance.sqrt();
+        let n_degrees = n.checked_sub(p).filter(|&n| n > 0)? * self.values.n_lists();
+        let mean_square = dot(rest, rest) * in_deviations.powi(2) / n_degrees as f64;
+        let (at, largest) =
+            rest.iter().map(|z| z.abs()).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let outlier = Outlier { point: self.points[at % n], deviations: largest * in_deviations };
+        Disagreement::of(Some(outlier), mean_square, n_degrees)
     }
 
     fn n_functions(&self) -> usize {

@@ -23,8 +23,9 @@ use crate::numerics::kernel::{Family, Kernel};
 use crate::numerics::observer::Observer;
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::sampling::Sampling;
+use crate::numerics::solver::Disagreement;
 use crate::numerics::solver::trend::{Mean, Trend};
-use grid::Grid;
+use grid::{Grid, is_least_variance};
 use likelihood::Evidence;
 use order::Order;
 use search::Search;
@@ -80,9 +81,16 @@ pub struct Learned {
     pub variance: f64,
     /// The mean as all groups have it: for solvers that never see all values at once.
     pub trend: Option<Trend>,
+    /// How the groups contradict kernel and noise, for the same solvers.
+    pub disagreement: Option<Disagreement>,
 }
 
 impl Learned {
+    /// Whether values are so small that the variance is greater than they say.
+    pub fn has_least_variance(&self) -> bool {
+        is_least_variance(self.variance)
+    }
+
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
         self.trend.as_ref().map_or(0, Trend::n_bytes)
@@ -114,8 +122,7 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     };
     let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
     let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
-    let trend = all.trend(&kernel, learned.ratio, observer)?;
-    Ok(Learned { trend, ..learned })
+    all.concluded(&kernel, learned, observer)
 }
 
 /// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are
@@ -171,9 +178,15 @@ pub fn learn_mean(
     };
     let values = Values::of(observed);
     let order = Order::of(&observed, observer)?;
-    let trend =
-        Evidence::of(&values, &order.searched).trend(&kernel.clone().of_variance_one(), ratio, observer)?;
-    Ok(Learned { family: kernel.family(), length_scale: kernel.length_scale(), ratio, variance, trend })
+    let given = Learned {
+        family: kernel.family(),
+        length_scale: kernel.length_scale(),
+        ratio,
+        variance,
+        trend: None,
+        disagreement: None,
+    };
+    Evidence::of(&values, &order.searched).concluded(&kernel.clone().of_variance_one(), given, observer)
 }
 
 #[cfg(test)]

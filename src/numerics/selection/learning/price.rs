@@ -13,17 +13,18 @@ const CELLS_OF_DEEP: f64 = 4.0;
 /// Flops for the order of a point.
 const FLOPS_OF_ORDER: f64 = 500.0;
 
-/// Of [`super::learn`] for n points of d dimensions, beside the sampling of the cloud.
+/// Of [`super::learn`] for so many lists of values at n points of d dimensions, beside the sampling of the cloud.
 ///
 /// Bytes are those of the order (the points that come earlier with their tree, and indices), of the groups
 /// with what the mean and the lists of values leave of them, and of the matrices of groups side by side.
-pub fn learning_price(n_points: usize, dimension: usize) -> Price {
+pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Price {
     let together = |n: usize| (n * n) as f64 * (n as f64 / 3.0 + 20.0);
     let square = |n: usize| n.saturating_mul(n);
     let (given, deep) = (GIVEN + RESPONSES, GIVEN_DEEP + RESPONSES);
     // Position twice, variance of the noise, functions of a linear mean and lists, these once more whitened and
     // once more in one piece.
-    let of_member = dimension.saturating_mul(2).saturating_add(1 + 3 * (dimension + 1 + MAX_LISTS));
+    let of_member =
+        dimension.saturating_mul(2).saturating_add(1 + 3 * (dimension + 1 + n_lists.min(MAX_LISTS)));
     if n_points <= MAX_TOGETHER {
         let n_numbers = square(n_points) + n_points.saturating_mul(of_member);
         let flops = CELLS * together(n_points) + FLOPS_OF_ORDER * n_points as f64;

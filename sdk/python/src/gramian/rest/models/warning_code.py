@@ -7,6 +7,7 @@ class WarningCode(StrEnum):
     FAR_FROM_CLOUD = "far_from_cloud"
     ILL_CONDITIONED = "ill_conditioned"
     KERNEL_TOO_ROUGH = "kernel_too_rough"
+    MISFIT = "misfit"
     NEIGHBOURS_NOT_ENOUGH = "neighbours_not_enough"
     OFFSET_MODEL_USED = "offset_model_used"
     OPEN_CLOUD = "open_cloud"

@@ -1,0 +1,97 @@
+//! Values that contradict kernel and noise are answered with a warning.
+
+use serde_json::{Value, json};
+
+use crate::common::random::Random;
+use crate::support::{Server, fibonacci_sphere, numbers};
+
+/// x₃ on the unit sphere with noise of 1 %, and one value that is off by this much.
+fn measured(n: usize, shift: f64) -> Value {
+    let (points, mut random) = (fibonacci_sphere(n), Random(5));
+    let mut values: Vec<f64> = points.iter().map(|x| x[2] + 0.01 * random.normal()).collect();
+    values[n / 3] += shift;
+    json!({"cloud": {"points": points}, "values": values, "queries": [[1.0, 0.0, 0.0]]})
+}
+
+fn with(body: &Value, more: Value) -> Value {
+    let mut body = body.clone();
+    let members = more.as_object().unwrap().clone();
+    body.as_object_mut().unwrap().extend(members);
+    body
+}
+
+/// The details of the warnings of misfit.
+fn misfits(answer: &Value) -> Vec<String> {
+    let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
+    let of_misfit = warnings.iter().filter(|warning| warning["code"] == "misfit");
+    of_misfit.map(|warning| warning["detail"].as_str().unwrap().to_owned()).collect()
+}
+
+#[tokio::test]
+async fn values_that_are_explained_have_no_warning() {
+    let server = Server::start().await;
+    let body = with(&measured(300, 0.0), json!({"include": ["variance"]}));
+    for more in [json!({}), json!({"solver": "local"}), json!({"mean": "linear"})] {
+        let answer = server.post("/v1/posterior", &with(&body, more.clone())).await.expect_ok();
+        assert_eq!(misfits(&answer), Vec::<String>::new(), "{more}");
+    }
+}
+
+#[tokio::test]
+async fn one_wrong_value_is_named_whichever_solver_answers() {
+    let server = Server::start().await;
+    let body = measured(600, 1.0);
+    for route in ["/v1/posterior", "/v1/interpolation"] {
+        for solver in ["dense", "local"] {
+            let answer = server.post(route, &with(&body, json!({"solver": solver}))).await.expect_ok();
+            let found = misfits(&answer);
+            assert_eq!(found.len(), 1, "{route}, {solver}: {answer}");
+            assert!(found[0].contains("point 200 "), "{route}, {solver}: {}", found[0]);
+        }
+    }
+    let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
+    assert!(misfits(&answer)[0].contains("point 200 "));
+}
+
+#[tokio::test]
+async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
+    let server = Server::start().await;
+    let given = json!({"kernel": {"family": "gauss", "length_scale": 1.0}, "alpha": 1e-8});
+    let body = with(&measured(300, 0.0), given);
+    // Values of noise a hundred times that of alpha.
+    let means = server.post("/v1/interpolation", &body).await.expect_ok();
+    assert_eq!(misfits(&means), Vec::<String>::new());
+    let answer = server.post("/v1/posterior", &with(&body, json!({"include": ["variance"]}))).await;
+    assert!(misfits(&answer.expect_ok())[0].contains("leave out kernel and alpha"));
+    let fitting = with(&body, json!({"alpha": 1e-4, "include": ["variance"]}));
+    let answer = server.post("/v1/posterior", &fitting).await.expect_ok();
+    assert_eq!(misfits(&answer), Vec::<String>::new());
+    // Lists together, of which one is contradicted.
+    let (wrong, right) = (&measured(300, 1.0)["values"], &body["values"]);
+    let lists = with(&fitting, json!({"values": [right, wrong]}));
+    let answer = server.post("/v1/posterior/batch", &lists).await.expect_ok();
+    assert_eq!(misfits(&answer).len(), 1);
+}
+
+#[tokio::test]
+async fn values_whose_squares_leave_float64_have_longer_bars_and_a_warning() {
+    let server = Server::start().await;
+    let posterior = async |factor: f64| {
+        let mut body = with(&measured(100, 0.0), json!({"include": ["variance"]}));
+        let values: Vec<f64> = numbers(&body["values"]).iter().map(|value| factor * value).collect();
+        body["values"] = json!(values);
+        server.post("/v1/posterior", &body).await.expect_ok()
+    };
+    let deviation = |answer: &Value| numbers(&answer["variances"])[0].sqrt();
+    let ordinary = posterior(1.0).await;
+    for (factor, is_clamped) in [(1e-100, false), (1e-140, false), (1e-150, true), (1e-200, true)] {
+        let answer = posterior(factor).await;
+        let codes: Vec<&Value> =
+            answer["diagnostics"]["warnings"].as_array().unwrap().iter().map(|w| &w["code"]).collect();
+        assert_eq!(codes.contains(&&json!("variance_clamped")), is_clamped, "{factor}: {answer}");
+        let ratio = deviation(&answer) / factor / deviation(&ordinary);
+        assert!(if is_clamped { ratio > 1.0 } else { (ratio - 1.0).abs() < 1e-6 }, "{factor}: {ratio}");
+        let mean = numbers(&answer["means"])[0] / factor;
+        assert!((mean - numbers(&ordinary["means"])[0]).abs() < 0.1, "{factor}: {mean}");
+    }
+}
