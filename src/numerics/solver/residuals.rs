@@ -75,7 +75,7 @@ fn suspects(solver: &Solver, weights: &[f64]) -> Vec<usize> {
 /// How values contradict kernel and noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disagreement {
-    /// The value that is farthest off, if one is by more than [`OUTLYING`] deviations.
+    /// The value that is farthest off, if one is by more than six deviations.
     pub outlier: Option<Outlier>,
     /// Mean square of the values, each without what those before it say of it, in units of the deviations that
     /// these leave: 1 where kernel and noise are right.

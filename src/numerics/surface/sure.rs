@@ -30,7 +30,7 @@ const MAX_RATIOS: usize = 4096;
 ///
 /// With true ratios z, a measured one is z + ε. It passes a bound t, and is off by half of what is true, for ε
 /// beyond both t − z and z/2. The ratios that were measured stand for the true ones. Of 243 noisy clouds of
-/// docs/error-bars.md 77 had more than 2 % that were off by half without a flag by the bound [`SURE`] alone, and 3
+/// docs/error-bars.md 77 had more than 2 % that were off by half without a flag by the bound of 6 alone, and 3
 /// have by this one.
 pub fn least_ratio(ratios: &[f64]) -> f64 {
     let share =
