@@ -96,8 +96,8 @@ impl App {
         }))
     }
 
-    /// Waits for so many bytes of memory for work, as long as they are wanted; `None` if they no longer are. Whoever waits
-    /// holds no other memory for work.
+    /// Memory for work, so many bytes of it, as soon as they are free; `None` if they are no longer wanted. Whoever
+    /// waits for it holds no other memory for work.
     ///
     /// # Errors
     /// 413 `problem-too-large` if there will never be so many.

@@ -269,8 +269,9 @@ impl Fitted {
         warnings
     }
 
-    /// Says how values contradict kernel and noise: those of a function that was solved, or else what was learned of them. Where these are
-    /// given nobody is told unless deviations are asked for, since the values that are answered only depend on the ratio of the two.
+    /// Warns where values contradict kernel and noise: those of a function that was solved, or else those that were learned
+    /// from. Where kernel and noise are given, only answers with deviations have the warning: the values alone depend on
+    /// nothing but the ratio of the two.
     pub fn warn_of_misfit(
         &self,
         diagnostics: &mut Diagnostics,
@@ -281,13 +282,15 @@ impl Fitted {
         let of_solution = |solution: &Solution| solution.disagreement(plan.fitted.n_points(), plan.scale);
         let found = solution.map_or_else(|| plan.disagreement(), of_solution);
         let Some(found) = found.filter(|_| plan.is_learned || has_deviations) else { return };
-        let as_sent = |point: usize| plan.merge.as_ref().map_or(point, |merge| merge.first_point(point));
+        // Learning sees the points as they were sent, a solver sees them merged.
+        let merge = plan.merge.as_ref().filter(|_| solution.is_some());
+        let as_sent = |point: usize| merge.map_or(point, |merge| merge.first_point(point));
         let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });
         let remedy = if plan.is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
         diagnostics.warn_of_misfit(Disagreement { outlier, ..found }, remedy);
     }
 
-    /// What is known before anything is solved.
+    /// Warnings that are known before anything is solved.
     fn warnings_beforehand(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if let Some(merge) = &self.plan.merge {
