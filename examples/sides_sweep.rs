@@ -17,40 +17,58 @@ use sides::tally::SideTally;
 const MAX_DENSE: usize = 3000;
 
 const HEADER: &str = "\
-| cloud | n | surface | flipped | without a flag | flagged | for its side | off by 30° without a flag |
-|---|---|---|---|---|---|---|---|";
+| cloud | surface | points | flipped | without a flag | of what has none | flagged | for its side | off by 30° without a flag |
+|---|---|---|---|---|---|---|---|---|";
 
 fn main() {
     let n_most: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(3000);
+    let sizes: Vec<usize> =
+        [200, 500, 1500, 3000, 10_000, 20_000].into_iter().filter(|n| *n <= n_most).collect();
+    let over_sizes = |case: &dyn Fn(usize) -> Case| sizes.iter().map(|&n| case(n)).collect::<Vec<_>>();
     println!("{HEADER}");
-    for n in [200, 500, 1500, 3000, 10_000, 20_000].into_iter().filter(|n| *n <= n_most) {
-        curves(n, 1).iter().for_each(print_rows);
-        print_rows(&folded_curve(n, 4.0, 1));
-        [0.5, 0.75, 1.0, 1.26, 1.84, 2.0, 3.0, 4.0].into_iter().for_each(|t| print_rows(&plate(n, t, 1)));
-        [0.5, 1.0, 1.5, 2.0, 3.0, 4.0].into_iter().for_each(|t| print_rows(&lens(n, t, 1)));
-        [0.5, 1.0, 1.5, 2.0, 3.0, 4.0].into_iter().for_each(|r| print_rows(&tube(n, r, 1)));
-        [0.0, 0.5, 1.0, 2.0, 4.0].into_iter().for_each(|gap| print_rows(&two_spheres(n, gap, 1)));
-        [0.2, 0.5, 0.8, 0.9].into_iter().for_each(|share| print_rows(&nested_spheres(n, share, 1)));
+    print_rows("curves", &sizes.iter().flat_map(|&n| curves(n, 1)).collect::<Vec<_>>());
+    print_rows("folded strip, 4", &over_sizes(&|n| folded_curve(n, 4.0, 1)));
+    for thickness in [0.5, 0.75, 1.0, 1.26, 1.84, 2.0, 3.0, 4.0] {
+        print_rows(&format!("plate, {thickness}"), &over_sizes(&|n| plate(n, thickness, 1)));
+    }
+    for thickness in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0] {
+        print_rows(&format!("lens, {thickness}"), &over_sizes(&|n| lens(n, thickness, 1)));
+    }
+    for radius in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0] {
+        print_rows(&format!("tube, radius {radius}"), &over_sizes(&|n| tube(n, radius, 1)));
+    }
+    for gap in [0.0, 0.5, 1.0, 2.0, 4.0] {
+        print_rows(&format!("two spheres, {gap} apart"), &over_sizes(&|n| two_spheres(n, gap, 1)));
+    }
+    for share in [0.2, 0.5, 0.8, 0.9] {
+        print_rows(&format!("nested spheres, {share}"), &over_sizes(&|n| nested_spheres(n, share, 1)));
     }
     let n_layers = if n_most > 3000 { 6 } else { 3 };
-    [4.0, 2.0].into_iter().for_each(|thickness| print_rows(&folded_sheet(n_layers, thickness, 1)));
-}
-
-fn print_rows(case: &Case) {
-    if case.sided.cloud.n_points() <= MAX_DENSE {
-        print_row(case, "dense", &SideTally::dense(&case.sided));
+    for thickness in [4.0, 2.0] {
+        print_rows(&format!("folded sheet, {thickness}"), &[folded_sheet(n_layers, thickness, 1)]);
     }
-    print_row(case, "local", &SideTally::local(&case.sided));
 }
 
-fn print_row(case: &Case, way: &str, tally: &SideTally) {
+/// The rows of some clouds together.
+fn print_rows(name: &str, cases: &[Case]) {
+    let is_small = |case: &&Case| case.sided.cloud.n_points() <= MAX_DENSE;
+    print_row(name, "dense", cases.iter().filter(is_small).map(|case| SideTally::dense(&case.sided)));
+    print_row(name, "local", cases.iter().map(|case| SideTally::local(&case.sided)));
+}
+
+fn print_row(name: &str, way: &str, tallies: impl Iterator<Item = SideTally>) {
+    let tally = tallies.fold(SideTally::default(), |sum, tally| sum.with(&tally));
+    if tally.n_points == 0 {
+        return;
+    }
     let shares = [
         tally.flipped(),
         tally.flipped_unflagged(),
+        tally.wrong_of_unflagged(),
         tally.flagged(),
         tally.ambiguous(),
         tally.off_unflagged(),
     ];
     let shares = shares.map(|share| format!("{:.2} %", 100.0 * share)).join(" | ");
-    println!("| {} | {} | {way} | {shares} |", case.name, tally.n_points);
+    println!("| {name} | {way} | {} | {shares} |", tally.n_points);
 }

@@ -15,7 +15,7 @@ use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
 
 const NORMALS: GeometryRequest = GeometryRequest { checks_curvatures: false, ..GeometryRequest::CURVATURES };
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct SideTally {
     pub n_points: usize,
     /// Normals that point to the other side, with a flag or without.
@@ -63,6 +63,18 @@ impl SideTally {
             n_flagged: geometry.degenerate().len(),
             n_off_unflagged: (0..n).filter(|&point| !is_flagged[point] && along(point).abs() < OFF).count(),
             n_ambiguous: geometry.degenerate().iter().filter(is_ambiguous).count(),
+        }
+    }
+
+    /// Of both clouds together.
+    pub fn with(&self, other: &Self) -> Self {
+        Self {
+            n_points: self.n_points + other.n_points,
+            n_flipped: self.n_flipped + other.n_flipped,
+            n_flipped_unflagged: self.n_flipped_unflagged + other.n_flipped_unflagged,
+            n_flagged: self.n_flagged + other.n_flagged,
+            n_ambiguous: self.n_ambiguous + other.n_ambiguous,
+            n_off_unflagged: self.n_off_unflagged + other.n_off_unflagged,
         }
     }
 

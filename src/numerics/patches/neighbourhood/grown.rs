@@ -2,8 +2,9 @@
 
 use super::growth::Growth;
 use super::quadric::{Sums, largest_curvature, principal_axes};
+use super::sheet::Sheet;
 use super::{Batch, Neighbourhood, Scratch, Support};
-use crate::numerics::machine::vector::{norm, tangent_basis};
+use crate::numerics::machine::vector::{dot, norm, tangent_basis};
 use crate::numerics::points::neighbours::Neighbour;
 
 /// Cosine of 75°, and distance in units of the radius below which points have no direction.
@@ -35,8 +36,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
             let point = support.cloud().point(found.point);
             (0..D).for_each(|c| scratch.arms.push(point[c] - x[c]));
         }
-        let mut grown = Self::start(support, nearest, scratch)?;
-        grown.grow(support, nearest, scratch);
+        let (mut grown, reach) = Self::start(support, nearest, scratch)?;
+        grown.grow(reach, support, nearest, scratch);
         grown.entail(support, nearest, scratch)?;
         grown.put_into(support, nearest, batch, lane, scratch);
         let radius = grown.radius;
@@ -45,8 +46,14 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         Some(Neighbourhood { frame, radius, is_at_rim })
     }
 
-    /// The frame of the principal axes of the nearest points, turned to the tangent plane of their quadric.
-    fn start(support: &Support, nearest: &[Neighbour], scratch: &mut Scratch) -> Option<Self> {
+    /// The frame of the principal axes of the nearest points, or of the sheet of the query where there are two, whose
+    /// points then come first; turned to the tangent plane of their quadric. With the height up to which points are of
+    /// that sheet.
+    fn start(
+        support: &Support,
+        nearest: &mut [Neighbour],
+        scratch: &mut Scratch,
+    ) -> Option<(Self, Option<f64>)> {
         let n_used = (P + 3).min(nearest.len());
         if n_used < P {
             return None;
@@ -58,6 +65,13 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         let axes = principal_axes(&scratch.arms[..n_used * D], D, radius);
         let mut frame = [[0.0; D]; D];
         frame.as_flattened_mut().copy_from_slice(&axes);
+        let two = Sheet::of_two(&scratch.arms, &frame[D - 1]);
+        let sheet = two.filter(|sheet| bring_forward(sheet, nearest, &mut scratch.arms) >= n_used);
+        if let Some(sheet) = &sheet {
+            frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&sheet.normal));
+            frame[D - 1] = sheet.normal;
+        }
+        let radius = nearest[n_used - 1].squared_distance.sqrt();
         let mut grown = Self { n_used, radius, frame, quadric: [0.0; P] };
         grown.look(support, nearest, scratch);
         let mut sums = Sums::<P>::default();
@@ -66,15 +80,21 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         }
         grown.quadric = sums.fit()?.0;
         grown.turn();
-        Some(grown)
+        Some((grown, sheet.map(|sheet| sheet.reach)))
     }
 
     /// Takes in more points while the surface that is known bends little over them, without those of other sheets.
-    fn grow(&mut self, support: &Support, nearest: &mut [Neighbour], scratch: &mut Scratch) {
-        let unit = nearest[nearest.len() - 1].squared_distance.sqrt();
+    fn grow(
+        &mut self,
+        reach: Option<f64>,
+        support: &Support,
+        nearest: &mut [Neighbour],
+        scratch: &mut Scratch,
+    ) {
+        let unit = nearest.iter().fold(0.0, |unit: f64, found| unit.max(found.squared_distance)).sqrt();
         (self.n_used, self.radius) = (nearest.len(), unit);
         self.look(support, nearest, scratch);
-        let mut growth = Growth::<D, P>::default();
+        let mut growth = Growth::<D, P>::up_to(reach.map_or(f64::INFINITY, |reach| reach / unit));
         for count in [P + 3, 8 * P / 3, 4 * P, 5 * P, 6 * P, nearest.len()] {
             if growth.take(count.min(nearest.len()), unit, support, nearest, scratch).is_none() {
                 break;
@@ -188,4 +208,20 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         }
         batch.keep(lane, terms.len());
     }
+}
+
+/// Brings the points of a sheet to the front, both parts ascending by their distance; says how many there are.
+fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], arms: &mut [f64]) -> usize {
+    let is_of_sheet = |arm: &[f64; D]| dot(arm, &sheet.normal).abs() <= sheet.reach;
+    let mut order: Vec<(bool, Neighbour, [f64; D])> = nearest
+        .iter()
+        .zip(arms.as_chunks::<D>().0)
+        .map(|(found, arm)| (!is_of_sheet(arm), *found, *arm))
+        .collect();
+    // Stable: the order of distances stays.
+    order.sort_by_key(|(is_of_other, ..)| *is_of_other);
+    for ((slot, place), (_, found, arm)) in nearest.iter_mut().zip(arms.as_chunks_mut::<D>().0).zip(&order) {
+        (*slot, *place) = (*found, *arm);
+    }
+    order.iter().filter(|(is_of_other, ..)| !is_of_other).count()
 }

@@ -28,10 +28,13 @@ pub(super) struct Growth<const D: usize, const P: usize> {
     n_seen: usize,
     /// Places that are taken, ascending.
     taken: SmallVec<[u32; 64]>,
+    /// Height above the quadric beyond which a point is not of the same sheet in any case.
+    reach: f64,
 }
 
-impl<const D: usize, const P: usize> Default for Growth<D, P> {
-    fn default() -> Self {
+impl<const D: usize, const P: usize> Growth<D, P> {
+    /// Nothing yet.
+    pub(super) fn up_to(reach: f64) -> Self {
         Self {
             sums: Sums::default(),
             quadric: [0.0; P],
@@ -39,11 +42,10 @@ impl<const D: usize, const P: usize> Default for Growth<D, P> {
             curvature: 0.0,
             n_seen: 0,
             taken: SmallVec::new(),
+            reach,
         }
     }
-}
 
-impl<const D: usize, const P: usize> Growth<D, P> {
     /// Takes in the points up to `count`; `None` if the surface bends too much over them, or is not determined.
     pub(super) fn take(
         &mut self,
@@ -94,7 +96,8 @@ impl<const D: usize, const P: usize> Growth<D, P> {
     fn is_of_sheet(&self, terms: &[f64; P], height: f64) -> bool {
         let expected: f64 = self.quadric.iter().zip(terms).map(|(q, t)| q * t).sum();
         let distance = (terms[1..D].iter().map(|t| t * t).sum::<f64>() + height * height).sqrt();
-        (height - expected).abs() <= OTHER_SHEET * distance + RESIDUALS * self.residual
+        let most = (OTHER_SHEET * distance).min(self.reach) + RESIDUALS * self.residual;
+        (height - expected).abs() <= most
     }
 
     /// Keeps what was taken in; the number of points.

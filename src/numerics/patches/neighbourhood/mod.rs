@@ -4,6 +4,7 @@ mod entailed;
 mod grown;
 mod growth;
 mod quadric;
+mod sheet;
 
 use super::means::Support;
 use super::regression::{Batch, n_terms};

@@ -57,6 +57,25 @@ pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
     (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
 }
 
+/// The edges of a point, of edges that are by their first points.
+pub(super) fn edges_of(edges: &[Edge], point: usize) -> &[Edge] {
+    let start = edges.partition_point(|edge| edge.a < point);
+    let rest = &edges[start..];
+    &rest[..rest.partition_point(|edge| edge.a == point)]
+}
+
+/// Means of values `[n]` over each point and its neighbours on the sheet, `[n]`.
+pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
+    let mut means = values.to_vec();
+    let mut counts = vec![1.0; values.len()];
+    for edge in edges {
+        means[edge.a] += values[edge.b];
+        counts[edge.a] += 1.0;
+    }
+    means.iter_mut().zip(&counts).for_each(|(mean, count)| *mean /= count);
+    means
+}
+
 /// The share of the edges, by weight, across which normals with these signs are opposite.
 pub(super) fn contradiction(edges: &[Edge], signs: &[f64]) -> f64 {
     let total: f64 = edges.iter().map(|edge| edge.weight).sum();

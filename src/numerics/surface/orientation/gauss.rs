@@ -35,8 +35,12 @@ const LEAST_GAIN: f64 = 0.05;
 const WITNESS: f64 = 0.2;
 const LEAST_WITNESSES: usize = 3;
 
-/// The part of the squares of witnesses that may remain.
-const CLEARLY: f64 = 0.5;
+/// The part of the squares of witnesses that may remain: signs that fit what is random in the winding numbers of a
+/// thin body leave more.
+const CLEARLY: f64 = 0.3;
+
+/// The part of the squares of its witnesses from which the sign of a single part is unclear.
+const UNCLEAR: f64 = 0.5;
 
 /// `W s = b` for the signs of some parts against their present ones, b = ½ less what all other points
 /// contribute.
@@ -53,7 +57,7 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    /// The problem of the largest of these parts, given largest first.
+    /// The problem of these parts, or of as many of them as can be asked, the first ones.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -142,15 +146,19 @@ impl Problem {
 
     /// Whether the rows that see a difference between two choices of signs are clearly for the first one.
     fn is_clearly_better(&self, signs: &[f64], present: &[f64]) -> bool {
-        let (after, before) = (self.residual(signs), self.residual(present));
-        let witnesses = after.iter().zip(&before).filter(|(a, b)| (*a - *b).abs() > WITNESS);
-        let (mut sum_after, mut sum_before, mut count) = (0.0, 0.0, 0);
-        for (a, b) in witnesses {
-            sum_after += (a * a).min(1.0);
-            sum_before += (b * b).min(1.0);
-            count += 1;
-        }
-        count >= LEAST_WITNESSES && sum_after <= CLEARLY * sum_before
+        remaining(&self.residual(signs), &self.residual(present)).is_some_and(|part| part <= CLEARLY)
+    }
+
+    /// The parts whose signs are not clearly better than the opposite ones, once some are turned.
+    pub(super) fn unclear(&self, turned: &[usize]) -> Vec<usize> {
+        let sign = |part: &usize| if turned.contains(part) { -1.0 } else { 1.0 };
+        let signs: Vec<f64> = self.unknown.iter().map(sign).collect();
+        let residual = self.residual(&signs);
+        let is_unclear = |&at: &usize| {
+            let opposite = self.rows().zip(&residual).map(|(row, r)| r + 2.0 * signs[at] * row[at]);
+            remaining(&residual, &opposite.collect::<Vec<f64>>()).is_some_and(|part| part > UNCLEAR)
+        };
+        (0..signs.len()).filter(is_unclear).map(|at| self.unknown[at]).collect()
     }
 
     /// The median magnitude of the residual on each part.
@@ -205,6 +213,19 @@ impl Problem {
         solve(&mut normal, &mut s);
         s
     }
+}
+
+/// The part of the squares of residuals that remains of those before, on the witnesses of the difference; none of
+/// them counts for more than a wrong side.
+fn remaining(after: &[f64], before: &[f64]) -> Option<f64> {
+    let witnesses = after.iter().zip(before).filter(|(a, b)| (*a - *b).abs() > WITNESS);
+    let (mut sum_after, mut sum_before, mut count) = (0.0, 0.0, 0);
+    for (a, b) in witnesses {
+        sum_after += (a * a).min(1.0);
+        sum_before += (b * b).min(1.0);
+        count += 1;
+    }
+    (count >= LEAST_WITNESSES).then(|| sum_after / sum_before)
 }
 
 /// A point at which winding numbers are looked at, and the unknown part that it is on.

@@ -10,7 +10,7 @@
 //! 2. Each piece gets the sign of most of its gradients or, if they disagree and the piece is closed, or it is
 //!    bulky, the sign that gives it a positive volume (`pieces`).
 //! 3. Pieces are turned where winding numbers, which are ½ on a closed surface, clearly contradict: a linear
-//!    problem that sees all of them together (`gauss`). So are parts of a piece that no sure edge joins (`sides`).
+//!    problem that sees all of them together (`gauss`). So are parts of a piece that they contradict (`turns`).
 //! 4. Points whose winding numbers or neighbours still contradict have an ambiguous side.
 
 mod areas;
@@ -25,6 +25,7 @@ mod pieces;
 mod sides;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::vector::{dot, unit};

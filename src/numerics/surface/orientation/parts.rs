@@ -1,16 +1,16 @@
 //! A cloud as disjoint parts.
 
-use super::edges::Edge;
-use super::forest::{Found, SignedForest};
+use super::edges::{Edge, edges_of};
+use super::forest::Found;
 
-/// Weight from which an edge cannot be cut: the surface leads from one of its points to the other.
+/// Weight from which an edge is sure: the surface leads from one of its points to the other.
 const SURE: f64 = 0.5;
 
 /// The points of a cloud, part by part.
 pub(super) struct Parts {
     /// The part of each point, `[n]`.
     pub of_point: Vec<usize>,
-    /// The points of each part, ascending; parts in the order of their first points.
+    /// The points of each part; parts in the order of their first points.
     pub members: Vec<Vec<usize>>,
 }
 
@@ -31,13 +31,48 @@ impl Parts {
         Self { of_point, members }
     }
 
-    /// Points that edges join which are sure and do not contradict the signs of their ends.
-    pub(super) fn along_sure(edges: &[Edge], signs: &[f64]) -> Self {
-        let mut forest = SignedForest::new(signs.len());
-        for edge in edges.iter().filter(|edge| edge.agreement(signs) > SURE) {
-            forest.join(edge.a, edge.b, 1.0);
+    /// Patches of at most so many points, each grown from its first one along edges that are sure and do not
+    /// contradict the signs of their ends; edges are by their first points.
+    pub(super) fn along_sure(edges: &[Edge], signs: &[f64], most: usize) -> Self {
+        let mut patches = Self { of_point: vec![usize::MAX; signs.len()], members: Vec::new() };
+        for first in 0..signs.len() {
+            if patches.of_point[first] != usize::MAX {
+                continue;
+            }
+            patches.of_point[first] = patches.members.len();
+            let (mut patch, mut at) = (vec![first], 0);
+            while let Some(&point) = patch.get(at) {
+                for edge in edges_of(edges, point) {
+                    let is_free = patches.of_point[edge.b] == usize::MAX;
+                    if is_free && patch.len() < most && edge.agreement(signs) > SURE {
+                        patches.of_point[edge.b] = patches.members.len();
+                        patch.push(edge.b);
+                    }
+                }
+                at += 1;
+            }
+            patches.members.push(patch);
         }
-        Self::of(&forest.find_all())
+        patches
+    }
+
+    /// The points of some parts.
+    pub(super) fn points_of(&self, parts: &[usize]) -> impl Iterator<Item = usize> {
+        parts.iter().flat_map(|&part| &self.members[part]).copied()
+    }
+
+    /// Multiplies the signs of the points of some parts with −1.
+    pub(super) fn turn(&self, turned: &[usize], signs: &mut [f64]) {
+        self.points_of(turned).for_each(|point| signs[point] = -signs[point]);
+    }
+
+    /// The share of the points of each part with such magnitudes of their misfits, `[n]`.
+    pub(super) fn shares(&self, misfits: &[f64], is_such: impl Fn(f64) -> bool) -> Vec<f64> {
+        let share = |points: &Vec<usize>| {
+            let count = points.iter().filter(|&&point| is_such(misfits[point].abs())).count();
+            count as f64 / points.len() as f64
+        };
+        self.members.iter().map(share).collect()
     }
 
     /// All parts, largest first.
