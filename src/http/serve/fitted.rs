@@ -269,9 +269,9 @@ impl Fitted {
         warnings
     }
 
-    /// Warns where values contradict kernel and noise: those of a function that was solved, or else those that were learned
-    /// from. Where kernel and noise are given, only answers with deviations have the warning: the values alone depend on
-    /// nothing but the ratio of the two.
+    /// Warns where values contradict kernel and noise: those of a function that was solved, or else those that were
+    /// learned from. Where kernel and noise are given, only answers with deviations have the warning: the values
+    /// alone depend on nothing but the ratio of the two.
     pub fn warn_of_misfit(
         &self,
         diagnostics: &mut Diagnostics,

@@ -298,7 +298,7 @@ pub struct FitPlan {
     /// Whether the values decided kernel and noise.
     pub is_learned: bool,
     pub mean: Mean,
-    /// What was learned of the values, of their mean alone where kernel and noise are given.
+    /// Kernel, noise and mean as learned from the values; their mean alone where kernel and noise are given.
     learned: Option<Arc<Learned>>,
 }
 
@@ -320,7 +320,7 @@ pub enum FitModel {
 }
 
 impl FitPlan {
-    /// What was learned of values that are never seen all at once.
+    /// Kernel, noise and mean as learned from values that are never seen all at once.
     fn learned_of_moving(&self) -> Option<&Learned> {
         self.learned.as_deref().filter(|_| matches!(self.model, FitModel::Moving { .. }))
     }

@@ -65,9 +65,10 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         let axes = principal_axes(&scratch.arms[..n_used * D], D, radius);
         let mut frame = [[0.0; D]; D];
         frame.as_flattened_mut().copy_from_slice(&axes);
-        let two = Sheet::of_two(&scratch.arms, &frame[D - 1]);
-        let sheet = two.filter(|sheet| bring_forward(sheet, nearest, &mut scratch.arms) >= n_used);
+        let sheet = Sheet::of_two(&scratch.arms, &frame[D - 1]);
         if let Some(sheet) = &sheet {
+            // A sheet has more than half of the points that are looked at: enough to start from.
+            bring_forward(sheet, nearest, &mut scratch.arms);
             frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&sheet.normal));
             frame[D - 1] = sheet.normal;
         }
@@ -210,8 +211,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
     }
 }
 
-/// Brings the points of a sheet to the front, both parts ascending by their distance; says how many there are.
-fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], arms: &mut [f64]) -> usize {
+/// Brings the points of a sheet to the front, both parts ascending by their distance.
+fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], arms: &mut [f64]) {
     let is_of_sheet = |arm: &[f64; D]| dot(arm, &sheet.normal).abs() <= sheet.reach;
     let mut order: Vec<(bool, Neighbour, [f64; D])> = nearest
         .iter()
@@ -223,5 +224,4 @@ fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], ar
     for ((slot, place), (_, found, arm)) in nearest.iter_mut().zip(arms.as_chunks_mut::<D>().0).zip(&order) {
         (*slot, *place) = (*found, *arm);
     }
-    order.iter().filter(|(is_of_other, ..)| !is_of_other).count()
 }
