@@ -84,7 +84,7 @@ mod tests {
 
     fn of(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64) {
         let sampling = Sampling::of(cloud, &Unobserved).unwrap();
-        let noise = || estimate_noise(cloud, sampling.neighbours(), &Unobserved).unwrap();
+        let noise = || estimate_noise(cloud, &sampling, &Unobserved).unwrap();
         default_fit(sampling.scales(), purpose, noise).unwrap()
     }
 

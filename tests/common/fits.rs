@@ -25,7 +25,7 @@ pub fn kernel(family: Family, length_scale: f64) -> Kernel {
 /// The kernel and the α that the service chooses for a cloud if the client says nothing.
 pub fn default_kernel_and_alpha(cloud: &Cloud, purpose: Purpose) -> (Kernel, f64) {
     let sampling = Sampling::of(cloud, &Unobserved).unwrap();
-    let noise = || estimate_noise(cloud, sampling.neighbours(), &Unobserved).unwrap();
+    let noise = || estimate_noise(cloud, &sampling, &Unobserved).unwrap();
     default_fit(sampling.scales(), purpose, noise).unwrap()
 }
 

@@ -13,7 +13,7 @@ use gramian::numerics::surface::operators::{laplace_beltrami, laplace_beltrami_m
 
 use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle, waves};
 use crate::common::fits::{factorize, fit, geometry};
-use crate::support::{distance, families, largest, rounding, width};
+use crate::support::{distance, families, largest, rotation, rounding, width};
 
 /// `x ↦ s R x + t` together with a new order of the points: point i of the image is the image of point
 /// `order[i]`.
@@ -64,21 +64,6 @@ impl Similarity {
     fn reorder(&self, rows: &[f64]) -> Vec<f64> {
         rows.chunks(self.order.len()).flat_map(|row| self.order.iter().map(|&i| row[i])).collect()
     }
-}
-
-/// The product of rotations in the planes of the coordinate axes, by one angle each.
-fn rotation(d: usize, angles: &[f64]) -> Vec<f64> {
-    let mut matrix: Vec<f64> = (0..d * d).map(|at| f64::from(u8::from(at / d == at % d))).collect();
-    let planes = (0..d).flat_map(|a| (a + 1..d).map(move |b| (a, b)));
-    for ((a, b), angle) in planes.zip(angles) {
-        let (sin, cos) = angle.sin_cos();
-        for column in 0..d {
-            let (x, y) = (matrix[a * d + column], matrix[b * d + column]);
-            matrix[a * d + column] = cos * x - sin * y;
-            matrix[b * d + column] = sin * x + cos * y;
-        }
-    }
-    matrix
 }
 
 /// What the numerics says of a cloud, values at its points and queries.

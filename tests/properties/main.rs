@@ -8,6 +8,7 @@
 mod common;
 
 mod axes;
+mod choices;
 mod fit;
 mod invariance;
 mod operators;

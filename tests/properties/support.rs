@@ -96,3 +96,18 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     largest(a.iter().zip(b).map(|(a, b)| a - b))
 }
+
+/// The product of rotations in the planes of the coordinate axes, by one angle each.
+pub fn rotation(d: usize, angles: &[f64]) -> Vec<f64> {
+    let mut matrix: Vec<f64> = (0..d * d).map(|at| f64::from(u8::from(at / d == at % d))).collect();
+    let planes = (0..d).flat_map(|a| (a + 1..d).map(move |b| (a, b)));
+    for ((a, b), angle) in planes.zip(angles) {
+        let (sin, cos) = angle.sin_cos();
+        for column in 0..d {
+            let (x, y) = (matrix[a * d + column], matrix[b * d + column]);
+            matrix[a * d + column] = cos * x - sin * y;
+            matrix[b * d + column] = sin * x + cos * y;
+        }
+    }
+    matrix
+}

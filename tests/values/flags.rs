@@ -159,7 +159,7 @@ impl Request {
         let scales = spacings.scales();
         let (kernel, alpha) = match self.asked {
             Asked::Nothing => {
-                let noise = estimate_noise(cloud, spacings.neighbours(), &Unobserved)?;
+                let noise = estimate_noise(cloud, spacings, &Unobserved)?;
                 default_fit(scales, Purpose::Curvatures, || noise)?
             }
             Asked::Family(family) => (Kernel::new(family, family.default_length_scale(scales), 1.0)?, ALPHA),

@@ -84,9 +84,12 @@ fn sensors_have_posteriors_whose_bands_cover() {
 fn what_is_local_or_drowned_in_noise_is_learned() {
     // From 256 values the bump was noise, 6 % of it covered; with noise beyond the field no kernel of less variance than the values was looked at.
     let cases = [
+        (Feature::Bump(0.03), 2000, 0.01),
         (Feature::Bump(0.05), 1000, 0.01),
         (Feature::Bump(0.1), 2000, 0.01),
+        (Feature::Spot(0.1), 3000, 0.01),
         (Feature::Spot(0.2), 3000, 0.01),
+        (Feature::Kink(2), 3000, 0.01),
         (Feature::Sine(3), 1000, 0.1),
         (Feature::Sine(3), 300, 2.0),
         (Feature::Sine(6), 300, 2.0),
@@ -97,7 +100,8 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
-        // Of ten seeds 85 to 97 % inside and 93 % and more all over; four scatter by some per cent.
+        // Of ten seeds 86 to 98 % inside and 93 % and more all over; four scatter by some per cent. By likelihood alone
+        // 42 to 55 % were covered within the narrow bump and spot, and at the kink.
         assert!(
             bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
             "{case:?}: {bands:?}"

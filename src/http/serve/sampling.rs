@@ -27,7 +27,7 @@ pub async fn find_lacking(
     if fit.lacks_noise() {
         let cloud = fit.stored.cloud.clone();
         let flops = noise_flops(cloud.n_points(), cloud.dimension());
-        let look = move |observer: &JobObserver| estimate_noise(&cloud, sampling.neighbours(), observer);
+        let look = move |observer: &JobObserver| estimate_noise(&cloud, &sampling, observer);
         let looking = look_at(app, admission, flops, look);
         app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
     } else if fit.lacks_learned() {

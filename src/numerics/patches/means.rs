@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::numerics::error::NumericsError;
 use crate::numerics::machine::heap::vec_bytes;
 use crate::numerics::observer::Observer;
-use crate::numerics::points::cells::Cells;
+use crate::numerics::points::cells::{Cells, mean, second_moments};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::sampling::Sampling;
@@ -36,11 +36,17 @@ impl Support {
     /// [`NumericsError::Cancelled`].
     pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let d = cloud.dimension();
-        let mut found = Gathered::default();
-        Cells::of_all(cloud, group).iter().for_each(|cell| gather(cloud, cell, &mut found));
-        let cloud = Cloud::new(found.coordinates, d)?;
+        let (mut coordinates, mut counts, mut moments) = (Vec::new(), Vec::new(), Vec::new());
+        for cell in Cells::of_all(cloud, group).iter() {
+            let mean = mean(cloud, cell);
+            let second = second_moments(cloud, cell, &mean);
+            moments.extend((0..d).flat_map(|a| (a..d).map(move |b| a * d + b)).map(|at| second[at]));
+            coordinates.extend_from_slice(&mean);
+            counts.push(cell.len() as f64);
+        }
+        let cloud = Cloud::new(coordinates, d)?;
         let neighbours = Neighbours::of(&cloud, observer)?;
-        Ok(Self::Means(Means { cloud, neighbours, counts: found.counts, moments: found.moments }))
+        Ok(Self::Means(Means { cloud, neighbours, counts, moments }))
     }
 
     pub(crate) fn cloud(&self) -> &Cloud {
@@ -99,33 +105,4 @@ impl Support {
             }
         }
     }
-}
-
-#[derive(Default)]
-struct Gathered {
-    coordinates: Vec<f64>,
-    counts: Vec<f64>,
-    moments: Vec<f64>,
-}
-
-fn gather(cloud: &Cloud, points: &[u32], found: &mut Gathered) {
-    let (d, count) = (cloud.dimension(), points.len() as f64);
-    let start = found.coordinates.len();
-    // About the first point, so that no digit is lost far from the origin.
-    let origin = cloud.point(points[0] as usize);
-    let arms =
-        || points.iter().map(|&point| cloud.point(point as usize).iter().zip(origin).map(|(x, o)| x - o));
-    found.coordinates.extend(std::iter::repeat_n(0.0, d));
-    for arm in arms() {
-        found.coordinates[start..].iter_mut().zip(arm).for_each(|(mean, x)| *mean += x / count);
-    }
-    let mean: Vec<f64> = found.coordinates[start..].to_vec();
-    for a in 0..d {
-        for b in a..d {
-            let product = |arm: Vec<f64>| (arm[a] - mean[a]) * (arm[b] - mean[b]);
-            found.moments.push(arms().map(|arm| product(arm.collect())).sum::<f64>() / count);
-        }
-    }
-    found.coordinates[start..].iter_mut().zip(origin).for_each(|(mean, o)| *mean += o);
-    found.counts.push(count);
 }

@@ -75,6 +75,7 @@ impl Patches {
         if cloud.dimension() < 2 {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
+        let sites = cloud.select(&sampling.of_every_spacing(N_SAMPLES));
         let mut best: Option<(f64, Self)> = None;
         for group in GROUPS {
             if group > 1 && cloud.n_points() / group < LEAST_MEANS {
@@ -84,7 +85,7 @@ impl Patches {
                 1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
                 _ => Support::means(&cloud, group, observer)?,
             };
-            let (deviation, patches) = Self::over(&cloud, support, group, observer)?;
+            let (deviation, patches) = Self::over(&sites, support, group, observer)?;
             let is_exact = patches.noise == 0.0;
             let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
             if is_better {
@@ -97,17 +98,15 @@ impl Patches {
         best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
     }
 
-    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise.
+    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise at sites.
     fn over(
-        cloud: &Cloud,
+        sites: &Cloud,
         support: Support,
         group: usize,
         observer: &dyn Observer,
     ) -> Result<(f64, Self), NumericsError> {
-        let d = cloud.dimension();
+        let d = sites.dimension();
         let count = n_neighbours(d, support.cloud().n_points());
-        let stride = (cloud.n_points() / N_SAMPLES).max(1);
-        let sites: Vec<usize> = (0..cloud.n_points()).step_by(stride).collect();
         let mut patches = Self {
             support,
             models: Vec::new(),
@@ -120,10 +119,9 @@ impl Patches {
         if count < n_terms(d) + 2 {
             return Ok((f64::INFINITY, patches));
         }
-        let queries = cloud.select(&sites);
-        patches.models = patches.pooled(LENGTH_SCALE, &queries, observer)?;
+        patches.models = patches.pooled(LENGTH_SCALE, sites, observer)?;
         let chosen: Vec<Model> = patches.models.iter().map(|weighted| weighted.model).collect();
-        let whole = patches.krige_each(&queries, &chosen, Purpose::Prediction, observer)?;
+        let whole = patches.krige_each(sites, &chosen, Purpose::Prediction, observer)?;
         let estimates: Vec<(f64, f64, f64, f64)> =
             whole.iter().flatten().filter_map(|(at, kriged)| patches.summary(at, kriged, d)).collect();
         let middle = |of: fn(&(f64, f64, f64, f64)) -> f64| median(estimates.iter().map(of).collect());
@@ -134,7 +132,7 @@ impl Patches {
             variance: middle(|e| e.3).unwrap_or(1.0),
         };
         if patches.noise > 0.0 {
-            patches.stiff = patches.pooled(STIFF, &queries, observer)?;
+            patches.stiff = patches.pooled(STIFF, sites, observer)?;
         }
         Ok((deviation, patches))
     }

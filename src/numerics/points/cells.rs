@@ -1,9 +1,9 @@
 //! A cloud in cells of near points.
 
-use super::cloud::Cloud;
-use super::thinning::widest_axis;
+use super::cloud::{Cloud, squared_distance};
+use crate::numerics::machine::small::{Small, zeros};
 
-/// Points in cells: halves of halves across their widest side, until none has more than a number of points.
+/// Points in cells: halves of halves, each across where its points reach farthest, until none has more than a number of points.
 ///
 /// All cells have nearly as many points. Neighbours in the list of cells are mostly neighbours in space.
 pub(crate) struct Cells {
@@ -17,7 +17,7 @@ impl Cells {
     /// Cells of at most `most` points each, of some points of a cloud.
     pub(crate) fn of(cloud: &Cloud, mut points: Vec<u32>, most: usize) -> Self {
         let mut ends = Vec::with_capacity(2 * points.len() / most.max(1) + 1);
-        halve(cloud, &mut points, most.max(1), &mut ends);
+        split(cloud, &mut points, most.max(1), &mut ends);
         Self { points, ends }
     }
 
@@ -37,19 +37,77 @@ impl Cells {
     }
 }
 
-fn halve(cloud: &Cloud, points: &mut [u32], most: usize, ends: &mut Vec<u32>) {
+fn split(cloud: &Cloud, points: &mut [u32], most: usize, ends: &mut Vec<u32>) {
     if points.len() <= most {
         let before = ends.last().copied().unwrap_or(0);
         ends.push(before + points.len() as u32);
         return;
     }
-    let axis = widest_axis(cloud, points);
-    let coordinate = |point: u32| cloud.point(point as usize)[axis];
-    let middle = points.len() / 2;
-    points.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)).then(a.cmp(&b)));
-    let (left, right) = points.split_at_mut(middle);
-    halve(cloud, left, most, ends);
-    halve(cloud, right, most, ends);
+    let (left, right) = halve(cloud, points, points.len() / 2);
+    split(cloud, left, most, ends);
+    split(cloud, right, most, ends);
+}
+
+/// The first `middle` of some points and the others, in the order in which they come along the line between two that
+/// are far apart. Where several lie at `middle`, by index.
+///
+/// The first end of the line is the point farthest from their mean, the second the one farthest from that. Unlike sides
+/// parallel to the axes, these turn with the cloud, so that nothing that is computed from halves depends on the axes.
+pub(crate) fn halve<'a>(
+    cloud: &Cloud,
+    points: &'a mut [u32],
+    middle: usize,
+) -> (&'a mut [u32], &'a mut [u32]) {
+    let position = |point: u32| cloud.point(point as usize);
+    let start = farthest(cloud, points, &mean(cloud, points));
+    let end = farthest(cloud, points, &start);
+    let along = |point: u32| -> f64 {
+        position(point).iter().zip(&start).zip(&end).map(|((x, from), to)| (x - from) * (to - from)).sum()
+    };
+    if middle < points.len() {
+        points.select_nth_unstable_by(middle, |&a, &b| along(a).total_cmp(&along(b)).then(a.cmp(&b)));
+    }
+    points.split_at_mut(middle)
+}
+
+/// Where the one of some points lies that is farthest from x; x where there is none.
+fn farthest(cloud: &Cloud, points: &[u32], x: &[f64]) -> Small {
+    let mut found = (-1.0, x);
+    for &point in points {
+        let position = cloud.point(point as usize);
+        let distance = squared_distance(position, x);
+        if distance > found.0 {
+            found = (distance, position);
+        }
+    }
+    Small::from_slice(found.1)
+}
+
+/// The mean of some points of a cloud, `[d]`, unit L.
+pub(crate) fn mean(cloud: &Cloud, points: &[u32]) -> Small {
+    let mut mean = zeros(cloud.dimension());
+    let Some(&first) = points.first() else { return mean };
+    // About the first point, so that no digit is lost far from the origin.
+    let origin = cloud.point(first as usize);
+    for &point in points {
+        let position = cloud.point(point as usize);
+        mean.iter_mut().zip(position).zip(origin).for_each(|((sum, x), o)| *sum += x - o);
+    }
+    mean.iter_mut().zip(origin).for_each(|(mean, o)| *mean = o + *mean / points.len() as f64);
+    mean
+}
+
+/// The second moments of some points about their mean, over their number: `[d, d]`, unit L².
+pub(crate) fn second_moments(cloud: &Cloud, points: &[u32], mean: &[f64]) -> Small {
+    let d = mean.len();
+    let mut moments = zeros(d * d);
+    for &point in points {
+        let arm: Small = cloud.point(point as usize).iter().zip(mean).map(|(x, mean)| x - mean).collect();
+        for (at, moment) in moments.iter_mut().enumerate() {
+            *moment += arm[at / d] * arm[at % d] / points.len() as f64;
+        }
+    }
+    moments
 }
 
 #[cfg(test)]

@@ -3,10 +3,9 @@
 use rayon::prelude::*;
 
 use super::cloud::Cloud;
-use super::neighbours::Neighbours;
 use super::patch::Patch;
 use super::quadric::{Quadric, n_coefficients};
-use super::sampling::median;
+use super::sampling::{Sampling, median};
 use crate::numerics::error::NumericsError;
 use crate::numerics::observer::Observer;
 
@@ -29,7 +28,7 @@ pub(crate) const MAX_SITES: usize = 1000;
 /// [`NumericsError::Cancelled`].
 pub fn estimate_noise(
     cloud: &Cloud,
-    neighbours: &Neighbours,
+    sampling: &Sampling,
     observer: &dyn Observer,
 ) -> Result<f64, NumericsError> {
     let (n, d) = (cloud.n_points(), cloud.dimension());
@@ -44,7 +43,7 @@ pub fn estimate_noise(
     let growth = 2f64.powf(6.0 / (d - 1) as f64);
     let variance_at = |point: usize| {
         let x = cloud.point(point);
-        let nearest = neighbours.nearest_positions(x, n_large);
+        let nearest = sampling.neighbours().nearest_positions(x, n_large);
         let variance = |count: usize| {
             let nearest = nearest.get(..count)?;
             let patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
@@ -52,13 +51,13 @@ pub fn estimate_noise(
         };
         Some((growth * variance(n_small)? - variance(n_large)?) / (growth - 1.0))
     };
-    let stride = (n / MAX_SITES).max(1);
-    let look_around = |k: usize| {
+    let look_around = |site: usize| {
         observer.checkpoint()?;
-        Ok(variance_at(k * stride))
+        Ok(variance_at(site))
     };
+    let sites = sampling.of_every_spacing(MAX_SITES);
     let variances: Vec<Option<f64>> =
-        (0..n.div_ceil(stride)).into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
+        sites.into_par_iter().map(look_around).collect::<Result<_, NumericsError>>()?;
     let correction = (1.0 - 2.0 / (9.0 * DEGREES_OF_FREEDOM as f64)).powi(3);
     let variance = median(variances.into_iter().flatten().collect());
     Ok(variance.map_or(0.0, |variance| (variance.max(0.0) / correction).sqrt()))
@@ -71,7 +70,7 @@ mod tests {
     use crate::numerics::testing::{circle, fibonacci_sphere};
 
     fn noise_of(cloud: &Cloud) -> f64 {
-        estimate_noise(cloud, &Neighbours::of(cloud, &Unobserved).unwrap(), &Unobserved).unwrap()
+        estimate_noise(cloud, &Sampling::of(cloud, &Unobserved).unwrap(), &Unobserved).unwrap()
     }
 
     /// The cloud with every coordinate moved by a number of mean 0 and this standard deviation: cosines of large angles.

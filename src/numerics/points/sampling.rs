@@ -64,6 +64,15 @@ impl Sampling {
         &self.scales
     }
 
+    /// So many points, or fewer than twice as many, of every spacing: at equal steps in the order of
+    /// [`Sampling::spacing`], which neither the order of the points nor the axes change. Where spacings tie, by index.
+    pub fn of_every_spacing(&self, count: usize) -> Vec<usize> {
+        let n = self.spacings.len();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.par_sort_unstable_by(|&a, &b| self.spacings[a].total_cmp(&self.spacings[b]).then(a.cmp(&b)));
+        order.into_iter().step_by((n / count).max(1)).collect()
+    }
+
     /// Bytes held on the heap.
     pub fn n_bytes(&self) -> usize {
         self.neighbours.n_bytes() + vec_bytes(&self.spacings)
@@ -135,6 +144,23 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::testing::Random;
+
+    #[test]
+    fn points_of_every_spacing_are_the_same_in_any_order() {
+        let mut random = Random(3);
+        let xs: Vec<f64> = (0..900).map(|_| random.uniform().powi(2)).collect();
+        let chosen = |xs: &[f64]| -> Vec<f64> {
+            let cloud = Cloud::new(xs.to_vec(), 1).unwrap();
+            let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+            sampling.of_every_spacing(100).into_iter().map(|point| xs[point]).collect()
+        };
+        let (found, turned) = (chosen(&xs), xs.iter().rev().copied().collect::<Vec<_>>());
+        assert_eq!(found.len(), 100);
+        assert_eq!(found, chosen(&turned));
+        assert_eq!(chosen(&xs[..150]).len(), 150);
+    }
 
     #[test]
     fn the_median_is_the_middle() {

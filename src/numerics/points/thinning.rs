@@ -1,9 +1,10 @@
 //! Fewer points, spread as the cloud is.
 
+use super::cells::halve;
 use super::cloud::Cloud;
 
-/// Points of the coarse cloud at most: their factorization takes a second and a half on two cores. With 4,000 thin parts of a scan have a third
-/// more normals on the wrong side.
+/// Points of the coarse cloud at most: their factorization takes a second and a half on two cores. With 4,000 thin
+/// parts of a scan have a third more normals on the wrong side.
 const MAX_COARSE: usize = 6000;
 
 /// Points of the cloud per point of the coarse one, where that leaves more than [`LEAST_COARSE`].
@@ -15,8 +16,8 @@ pub(crate) fn n_coarse(n_points: usize) -> usize {
     (n_points / POINTS_PER_COARSE).clamp(LEAST_COARSE, MAX_COARSE).min(n_points)
 }
 
-/// At most `count` points of a cloud, one for each of as many parts with equally many points: parts by halving the cloud across its
-/// widest side, of each the point in the middle of its last halving.
+/// At most `count` points of a cloud, one for each of as many parts with equally many points: halves of halves of the
+/// cloud, of each the point in the middle of its last halving.
 pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
     if count >= cloud.n_points() {
         return cloud.clone();
@@ -42,30 +43,15 @@ fn choose(cloud: &Cloud, points: &mut [u32], count: usize, chosen: &mut Vec<usiz
     if count == 0 || points.is_empty() {
         return;
     }
-    let axis = widest_axis(cloud, points);
-    let coordinate = |point: u32| cloud.point(point as usize)[axis];
-    let middle = (points.len() - 1) / 2;
-    points.select_nth_unstable_by(middle, |&a, &b| coordinate(a).total_cmp(&coordinate(b)).then(a.cmp(&b)));
     if count == 1 {
-        chosen.push(points[middle] as usize);
+        let middle = (points.len() - 1) / 2;
+        chosen.extend(halve(cloud, points, middle).1.first().map(|&point| point as usize));
         return;
     }
-    let (left, right) = points.split_at_mut(points.len().div_ceil(2));
+    let middle = points.len().div_ceil(2);
+    let (left, right) = halve(cloud, points, middle);
     choose(cloud, left, count.div_ceil(2), chosen);
     choose(cloud, right, count / 2, chosen);
-}
-
-/// The axis along which some points of a cloud spread most; the first of several.
-pub(crate) fn widest_axis(cloud: &Cloud, points: &[u32]) -> usize {
-    let extent = |axis: usize| {
-        let along = || points.iter().map(|&point| cloud.point(point as usize)[axis]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    };
-    let wider = |best: (usize, f64), axis: usize| match extent(axis) {
-        extent if extent > best.1 => (axis, extent),
-        _ => best,
-    };
-    (0..cloud.dimension()).fold((0, f64::NEG_INFINITY), wider).0
 }
 
 #[cfg(test)]

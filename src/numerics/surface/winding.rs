@@ -10,7 +10,6 @@ use smallvec::SmallVec;
 use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::machine::vector::norm;
 use crate::numerics::points::cloud::{Cloud, squared_distance};
-use crate::numerics::points::thinning::widest_axis;
 
 /// Points per leaf, whose terms are summed one by one.
 const LEAF_SIZE: usize = 16;
@@ -123,6 +122,20 @@ pub(crate) fn ball_volume(k: usize) -> f64 {
         1 => 2.0,
         _ => ball_volume(k - 2) * std::f64::consts::TAU / k as f64,
     }
+}
+
+/// The axis along which some points of a cloud spread most; the first of several. Sides that are in doubt may
+/// come out otherwise for a cloud that is turned: halves that turn with the cloud cost more wrong ones on folded strips.
+fn widest_axis(cloud: &Cloud, points: &[u32]) -> usize {
+    let extent = |axis: usize| {
+        let along = || points.iter().map(|&point| cloud.point(point as usize)[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let wider = |best: (usize, f64), axis: usize| match extent(axis) {
+        extent if extent > best.1 => (axis, extent),
+        _ => best,
+    };
+    (0..cloud.dimension()).fold((0, f64::NEG_INFINITY), wider).0
 }
 
 struct Builder<'a> {

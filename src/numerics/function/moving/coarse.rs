@@ -7,9 +7,8 @@ use super::{Moving, MovingRequest};
 use crate::numerics::error::NumericsError;
 use crate::numerics::function::functionals::{JetFunctional, has_variance};
 use crate::numerics::kernel::Kernel;
-use crate::numerics::machine::small::{Small, zeros};
 use crate::numerics::observer::Observer;
-use crate::numerics::points::cells::Cells;
+use crate::numerics::points::cells::{Cells, mean, second_moments};
 use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::neighbours::Neighbours;
 use crate::numerics::points::thinning::thinned_points;
@@ -90,7 +89,8 @@ impl Moving {
         observer.checkpoint()?;
         let (mut coordinates, mut noise) = (Vec::new(), Vec::with_capacity(cells.n_cells()));
         for cell in cells.iter() {
-            let (mean, moments) = moments(cloud, cell);
+            let mean = mean(cloud, cell);
+            let moments = second_moments(cloud, cell, &mean);
             coordinates.extend_from_slice(&mean);
             let count = cell.len() as f64;
             let of_points = cell.iter().map(|&point| self.system.regularization().at(point as usize));
@@ -123,28 +123,6 @@ impl Moving {
         let squares = highest.iter().map(|deviation| (deviation / unit).powi(2)).sum::<f64>();
         Ok(unit * (squares / highest.len() as f64).sqrt())
     }
-}
-
-/// The mean of some points, and their second moments about it over their number, `[d, d]`.
-fn moments(cloud: &Cloud, cell: &[u32]) -> (Small, Small) {
-    let (d, count) = (cloud.dimension(), cell.len() as f64);
-    // About the first point, so that no digit is lost far from the origin.
-    let origin = cloud.point(cell[0] as usize);
-    let arms =
-        || cell.iter().map(|&point| cloud.point(point as usize).iter().zip(origin).map(|(x, o)| x - o));
-    let mut mean = zeros(d);
-    for arm in arms() {
-        mean.iter_mut().zip(arm).for_each(|(mean, x)| *mean += x / count);
-    }
-    let mut moments = zeros(d * d);
-    for arm in arms() {
-        let arm: Small = arm.zip(&mean).map(|(x, mean)| x - mean).collect();
-        for (at, moment) in moments.iter_mut().enumerate() {
-            *moment += arm[at / d] * arm[at % d] / count;
-        }
-    }
-    mean.iter_mut().zip(origin).for_each(|(mean, o)| *mean += o);
-    (mean, moments)
 }
 
 /// The variance of `½ M : D²u`.

@@ -1,6 +1,5 @@
 //! A grid of kernels and noises: smoothness, length scale, and the ratio of noise to variance.
 
-use super::likelihood::Score;
 use super::values::Values;
 use super::{Learned, Noise};
 use crate::numerics::error::NumericsError;
@@ -28,6 +27,9 @@ const FIRST_LENGTH: usize = 9;
 
 /// The length scale of a field that neighbours hardly explain: 1.25 spacings.
 const ROUGH_LENGTH: usize = 2;
+
+/// The shortest length scale that is taken for what is local: 3.5 spacings. A shorter one explains single outliers.
+const LEAST_LOCAL: usize = 5;
 
 /// Ratios of noise to variance: the least, and quarters of a decade up to 10.
 const LEAST_RATIO: f64 = 1e-10;
@@ -126,13 +128,13 @@ impl Grid {
         }
     }
 
-    /// The kernel and noise of a cell with its score, for values in units of the greatest.
+    /// The kernel and noise of a cell with its variance, for values in units of the greatest.
     ///
     /// # Errors
     /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64.
-    pub(super) fn learned(&self, cell: Cell, score: Score, unit: f64) -> Result<Learned, NumericsError> {
+    pub(super) fn learned(&self, cell: Cell, variance: f64, unit: f64) -> Result<Learned, NumericsError> {
         let ratio = ratio(cell.ratio);
-        let variance = self.known_variance(ratio).unwrap_or(in_units(score.variance, unit));
+        let variance = self.known_variance(ratio).unwrap_or(in_units(variance, unit));
         if variance > GREATEST_VARIANCE {
             return Err(NumericsError::WeightsOverflow);
         }
@@ -180,6 +182,11 @@ impl Grid {
     /// A rough field without noise.
     pub(super) fn rough(&self, family: usize) -> Cell {
         Cell { family, length: ROUGH_LENGTH, ratio: self.least_ratio }
+    }
+
+    /// Whether its length scale is too long to make a feature of an outlier.
+    pub(super) fn is_longer_than_outliers(&self, cell: Cell) -> bool {
+        cell.length >= LEAST_LOCAL
     }
 
     /// The cell of another family with about the same correlations.

@@ -8,8 +8,10 @@
 //!
 //! The grid is searched on a sample first, then from there on all values: together while they are few, else
 //! in groups that explain each other (order.rs). A sample alone misses what is local: from 256 of 2,000
-//! values a plane with a bump looks like a plane with noise.
+//! values a plane with a bump looks like a plane with noise. Even the likelihood of all values outvotes a small
+//! place, so what was found has to agree with every place (agreement.rs).
 
+mod agreement;
 mod grid;
 mod group;
 mod likelihood;
@@ -25,6 +27,7 @@ use crate::numerics::points::cloud::Cloud;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::solver::Disagreement;
 use crate::numerics::solver::trend::{Mean, Trend};
+use agreement::Agreement;
 use grid::{Grid, is_least_variance};
 use likelihood::Evidence;
 use order::Order;
@@ -97,9 +100,6 @@ impl Learned {
     }
 }
 
-/// How many times the variance of all groups that of the deep ones may be.
-const DISAGREEING: f64 = 1.5;
-
 /// Fewer values decide nothing.
 const LEAST_VALUES: usize = 8;
 
@@ -125,39 +125,31 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     all.concluded(&kernel, learned, observer)
 }
 
-/// On a sample, then on all values in groups; then length scales get shorter for as long as groups that are
-/// given more contradict their variance.
+/// On all values, or on a sample and from there on all values in groups.
 fn search(
     all: &Evidence<'_>,
     order: &Order,
     observer: &dyn Observer,
 ) -> Result<Option<Learned>, NumericsError> {
     let (values, grid) = (all.values, Grid::of(all.values));
-    let mut search = Search::new(all, &grid);
-    let [first, _, ..] = order.searched.as_slice() else {
-        let Some(best) = search.best(observer)? else { return Ok(None) };
-        let found = search.shortest(best, observer)?;
-        return search.learned(found, observer);
-    };
-    let sample = Evidence::of(values, std::slice::from_ref(first));
-    let Some(begin) = Search::new(&sample, &grid).best(observer)? else { return Ok(None) };
     let deep = Evidence::of(values, &order.deep);
-    let mut deep = Search::new(&deep, &grid);
-    let of_families = search.best_from(begin, observer)?;
-    let best = search.best_with(&mut deep, of_families, observer)?;
-    let mut found = search.shortest(best, observer)?;
-    loop {
-        let both = search.learned(found, observer)?.zip(deep.learned(found, observer)?);
-        let agreed = both.filter(|(all, deep)| deep.variance <= DISAGREEING * all.variance);
-        if let Some((all, deep)) = agreed {
-            return Ok(Some(Learned { variance: all.variance.max(deep.variance), ..all }));
+    let mut agreement = Agreement {
+        all: Search::new(all, &grid),
+        deep: (!order.deep.is_empty()).then(|| Search::new(&deep, &grid)),
+        grid: &grid,
+        unit: values.unit,
+    };
+    let best = match order.searched.as_slice() {
+        [first, _, ..] => {
+            let sample = Evidence::of(values, std::slice::from_ref(first));
+            let mut on_sample = Search::new(&sample, &grid);
+            let Some(best) = on_sample.best(observer)? else { return Ok(None) };
+            let Some(begin) = on_sample.least_of(best.into_iter(), observer)? else { return Ok(None) };
+            Some(agreement.all.best_from(begin, observer)?)
         }
-        match search.shorter(found, observer)? {
-            Some(shorter) => found = shorter,
-            // No length scale is short enough: the variance that the deep ones want is the greater.
-            None => return deep.learned(found, observer),
-        }
-    }
+        _ => agreement.all.best(observer)?,
+    };
+    best.map_or(Ok(None), |best| agreement.decided(best, observer))
 }
 
 /// The mean of values under a kernel and a noise that are given.

@@ -30,8 +30,7 @@ pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Pric
         let flops = CELLS * together(n_points) + FLOPS_OF_ORDER * n_points as f64;
         return Price { n_bytes: n_numbers.saturating_mul(size_of::<f64>()), flops };
     }
-    let n_levels = (n_points / MAX_SAMPLE).ilog2() as usize + 1;
-    let n_groups = n_points.div_ceil(RESPONSES).min(MAX_GROUPS * n_levels);
+    let n_groups = n_points.div_ceil(RESPONSES).min(2 * MAX_GROUPS);
     let n_members = MAX_SAMPLE + n_groups * given + DEEP_GROUPS * deep;
     let n_numbers = n_members.saturating_mul(of_member) + DEEP_GROUPS * square(deep);
     // Earlier points are copied for their tree; five lists of indices.

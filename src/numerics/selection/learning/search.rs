@@ -1,6 +1,5 @@
 //! The likeliest cell of the grid.
 
-use super::Learned;
 use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
 use super::likelihood::{Evidence, Score};
 use crate::numerics::error::NumericsError;
@@ -30,24 +29,26 @@ impl<'a> Search<'a> {
         Self { evidence, grid, scores: vec![None; N_CELLS] }
     }
 
-    /// The best cell. `None` if no kernel explains the values in float64.
+    /// The best cell of each family. `None` if no kernel explains the values in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn best(&mut self, observer: &dyn Observer) -> Result<Option<Cell>, NumericsError> {
+    pub(super) fn best(
+        &mut self,
+        observer: &dyn Observer,
+    ) -> Result<Option<[Cell; N_FAMILIES]>, NumericsError> {
         let Some(mut from) = self.least_of(self.grid.beginnings(), observer)? else { return Ok(None) };
-        let mut found = vec![from];
-        for family in 0..N_FAMILIES {
+        let mut best = [from; N_FAMILIES];
+        for (family, best) in best.iter_mut().enumerate() {
             from = self.descend(self.grid.of_family(from, family), &STRIDES, observer)?;
-            found.push(from);
             if family == 0 && self.is_mostly_noise(from, observer)? {
                 let rough = self.descend(self.grid.rough(family), &STRIDES, observer)?;
                 from = self.least_of([from, rough].into_iter(), observer)?.unwrap_or(from);
-                found.push(from);
             }
+            *best = from;
         }
-        let best = self.least_of(found.into_iter(), observer)?;
-        Ok(best.filter(|&cell| self.scores[cell.slot()].flatten().is_some()))
+        let is_explained = best.iter().any(|cell| self.scores[cell.slot()].flatten().is_some());
+        Ok(is_explained.then_some(best))
     }
 
     /// The best cell of each family near one that was found on some of the values.
@@ -65,26 +66,6 @@ impl<'a> Search<'a> {
             *best = self.descend(self.grid.of_family(first, family), &FINE, observer)?;
         }
         Ok(best)
-    }
-
-    /// The best of some cells by these values and others together.
-    ///
-    /// # Errors
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn best_with(
-        &mut self,
-        others: &mut Search<'_>,
-        cells: [Cell; N_FAMILIES],
-        observer: &dyn Observer,
-    ) -> Result<Cell, NumericsError> {
-        let mut best = (cells[0], f64::INFINITY);
-        for cell in cells {
-            let height = self.height(cell, observer)? + others.height(cell, observer)?;
-            if height < best.1 {
-                best = (cell, height);
-            }
-        }
-        Ok(best.0)
     }
 
     /// Of all kernels of a family that are [`AS_LIKELY`] as the best one, that with the shortest length
@@ -122,27 +103,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// What a cell says; `None` if it does not explain the values in float64.
-    ///
-    /// # Errors
-    /// [`NumericsError::WeightsOverflow`] of values whose square leaves float64;
-    /// [`NumericsError::Cancelled`].
-    pub(super) fn learned(
-        &mut self,
-        cell: Cell,
-        observer: &dyn Observer,
-    ) -> Result<Option<Learned>, NumericsError> {
-        let Some(score) = self.score(cell, observer)? else { return Ok(None) };
-        self.grid.learned(cell, score, self.evidence.values.unit).map(Some)
-    }
-
     fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool, NumericsError> {
         let Some(score) = self.score(cell, observer)? else { return Ok(false) };
         Ok(self.against_noise(cell, score) > 0.0)
     }
 
     /// The first of the best.
-    fn least_of(
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn least_of(
         &mut self,
         cells: impl Iterator<Item = Cell>,
         observer: &dyn Observer,
@@ -199,7 +169,11 @@ impl<'a> Search<'a> {
         Ok(begin)
     }
 
-    fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
+    /// `−ln` of how likely a cell is, by the values and beforehand; infinite where it does not explain them in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
         let Some(score) = self.score(cell, observer)? else { return Ok(f64::INFINITY) };
         Ok(score.negative_log + self.against_noise(cell, score))
     }
@@ -208,7 +182,15 @@ impl<'a> Search<'a> {
         self.grid.against_noise(cell, score.variance, self.evidence.values.mean_square)
     }
 
-    fn score(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Score>, NumericsError> {
+    /// What the values say of a cell; `None` if it does not explain them in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn score(
+        &mut self,
+        cell: Cell,
+        observer: &dyn Observer,
+    ) -> Result<Option<Score>, NumericsError> {
         if let Some(known) = self.scores[cell.slot()] {
             return Ok(known);
         }

@@ -71,6 +71,25 @@ fn rough_fields_get_rough_kernels() {
 }
 
 #[test]
+fn a_hot_spot_shortens_the_length_scale_and_outliers_do_not() {
+    let (cloud, plain) = field(2000, 0.01);
+    let length = |values: &[f64]| learned(&cloud, values, Noise::Unknown).length_scale;
+    let expected = length(&plain);
+    // A two-hundredth of the sphere.
+    let spot = |x: &[f64]| (-(1.0 - x[0]) / 0.01).exp();
+    let with_spot: Vec<f64> = plain.iter().zip(cloud.points()).map(|(value, x)| value + spot(x)).collect();
+    let found = length(&with_spot);
+    assert!(found < 0.4 * expected, "{found} of {expected}");
+    // One value in 500, by 10 and by 100 deviations of the noise. The family may be another, with half the length.
+    for off in [0.1, 1.0] {
+        let error = |i: usize| if i % 500 == 250 { off } else { 0.0 };
+        let with_outliers: Vec<f64> = plain.iter().enumerate().map(|(i, value)| value + error(i)).collect();
+        let found = length(&with_outliers);
+        assert!(found > 0.4 * expected, "{off}: {found} of {expected}");
+    }
+}
+
+#[test]
 fn few_values_and_equal_ones_decide_nothing() {
     let family = Family::Matern { order: 2 };
     for n in [1, 2, 7] {
