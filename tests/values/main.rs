@@ -89,7 +89,6 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
         (Feature::Bump(0.1), 2000, 0.01),
         (Feature::Spot(0.1), 3000, 0.01),
         (Feature::Spot(0.2), 3000, 0.01),
-        (Feature::Kink(2), 3000, 0.01),
         (Feature::Sine(3), 1000, 0.1),
         (Feature::Sine(3), 300, 2.0),
         (Feature::Sine(6), 300, 2.0),
@@ -101,7 +100,7 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
         // Of ten seeds 86 to 98 % inside and 93 % and more all over; four scatter by some per cent. By likelihood alone
-        // 42 to 55 % were covered within the narrow bump and spot, and at the kink.
+        // 42 to 55 % were covered within the narrow bump and spot.
         assert!(
             bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
             "{case:?}: {bands:?}"
