@@ -86,7 +86,7 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let cases = [
         (Feature::Bump(0.03), 2000, 0.01),
         (Feature::Bump(0.05), 1000, 0.01),
-        (Feature::Bump(0.1), 2000, 0.01),
+        (Feature::Bump(0.1), 1000, 0.01),
         (Feature::Spot(0.1), 3000, 0.01),
         (Feature::Spot(0.2), 3000, 0.01),
         (Feature::Sine(3), 1000, 0.1),
@@ -99,7 +99,7 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
-        // Of ten seeds 86 to 98 % inside and 93 % and more all over; four scatter by some per cent. By likelihood alone
+        // Of ten seeds 86 to 98 % inside and 89 % and more all over; four scatter by some per cent. By likelihood alone
         // 42 to 55 % were covered within the narrow bump and spot.
         assert!(
             bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
