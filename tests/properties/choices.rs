@@ -1,5 +1,5 @@
-//! What is chosen for a cloud, sites, means of points, groups of values, is chosen by distances: neither the order of the
-//! points nor the axes matter.
+//! What is chosen for a cloud, sites, means of points, groups of values, is chosen by distances: neither the
+//! order of the points nor the axes matter.
 
 use std::sync::Arc;
 
@@ -25,7 +25,8 @@ fn noisy(n: usize, d: usize) -> Cloud {
     Cloud::new((0..n).flat_map(|_| point()).collect(), d).unwrap()
 }
 
-/// Where point i of n comes in another order: 1,009 is a prime, and none of the sizes here is a multiple of it.
+/// Where point i of n comes in another order: 1,009 is a prime, and none of the sizes here is a multiple of
+/// it.
 fn place(i: usize, n: usize) -> usize {
     i * 1009 % n
 }

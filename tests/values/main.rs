@@ -99,8 +99,8 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
-        // Of ten seeds 86 to 98 % inside and 89 % and more all over; four scatter by some per cent. By likelihood alone
-        // 42 to 55 % were covered within the narrow bump and spot.
+        // Of ten seeds 86 to 98 % inside and 89 % and more all over; four scatter by some per cent. By
+        // likelihood alone 42 to 55 % were covered within the narrow bump and spot.
         assert!(
             bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
             "{case:?}: {bands:?}"

@@ -98,7 +98,8 @@ impl Patches {
         best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
     }
 
-    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise at sites.
+    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise at
+    /// sites.
     fn over(
         sites: &Cloud,
         support: Support,

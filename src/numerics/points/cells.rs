@@ -3,7 +3,8 @@
 use super::cloud::{Cloud, squared_distance};
 use crate::numerics::machine::small::{Small, zeros};
 
-/// Points in cells: halves of halves, each across where its points reach farthest, until none has more than a number of points.
+/// Points in cells: halves of halves, each across where its points reach farthest, until none has more than a
+/// number of points.
 ///
 /// All cells have nearly as many points. Neighbours in the list of cells are mostly neighbours in space.
 pub(crate) struct Cells {
@@ -48,11 +49,12 @@ fn split(cloud: &Cloud, points: &mut [u32], most: usize, ends: &mut Vec<u32>) {
     split(cloud, right, most, ends);
 }
 
-/// The first `middle` of some points and the others, in the order in which they come along the line between two that
-/// are far apart. Where several lie at `middle`, by index.
+/// The first `middle` of some points and the others, in the order in which they come along the line between
+/// two that are far apart. Where several lie at `middle`, by index.
 ///
-/// The first end of the line is the point farthest from their mean, the second the one farthest from that. Unlike sides
-/// parallel to the axes, these turn with the cloud, so that nothing that is computed from halves depends on the axes.
+/// The first end of the line is the point farthest from their mean, the second the one farthest from that.
+/// Unlike sides parallel to the axes, these turn with the cloud, so that nothing that is computed from halves
+/// depends on the axes.
 pub(crate) fn halve<'a>(
     cloud: &Cloud,
     points: &'a mut [u32],

@@ -65,7 +65,8 @@ impl Sampling {
     }
 
     /// So many points, or fewer than twice as many, of every spacing: at equal steps in the order of
-    /// [`Sampling::spacing`], which neither the order of the points nor the axes change. Where spacings tie, by index.
+    /// [`Sampling::spacing`], which neither the order of the points nor the axes change. Where spacings tie,
+    /// by index.
     pub fn of_every_spacing(&self, count: usize) -> Vec<usize> {
         let n = self.spacings.len();
         let mut order: Vec<usize> = (0..n).collect();

@@ -3,8 +3,8 @@
 use super::cells::halve;
 use super::cloud::Cloud;
 
-/// Points of the coarse cloud at most: their factorization takes a second and a half on two cores. With 4,000 thin
-/// parts of a scan have a third more normals on the wrong side.
+/// Points of the coarse cloud at most: their factorization takes a second and a half on two cores. With 4,000
+/// thin parts of a scan have a third more normals on the wrong side.
 const MAX_COARSE: usize = 6000;
 
 /// Points of the cloud per point of the coarse one, where that leaves more than [`LEAST_COARSE`].
@@ -16,8 +16,8 @@ pub(crate) fn n_coarse(n_points: usize) -> usize {
     (n_points / POINTS_PER_COARSE).clamp(LEAST_COARSE, MAX_COARSE).min(n_points)
 }
 
-/// At most `count` points of a cloud, one for each of as many parts with equally many points: halves of halves of the
-/// cloud, of each the point in the middle of its last halving.
+/// At most `count` points of a cloud, one for each of as many parts with equally many points: halves of
+/// halves of the cloud, of each the point in the middle of its last halving.
 pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
     if count >= cloud.n_points() {
         return cloud.clone();

@@ -125,7 +125,8 @@ pub(crate) fn ball_volume(k: usize) -> f64 {
 }
 
 /// The axis along which some points of a cloud spread most; the first of several. Sides that are in doubt may
-/// come out otherwise for a cloud that is turned: halves that turn with the cloud cost more wrong ones on folded strips.
+/// come out otherwise for a cloud that is turned: halves that turn with the cloud cost more wrong ones on
+/// folded strips.
 fn widest_axis(cloud: &Cloud, points: &[u32]) -> usize {
     let extent = |axis: usize| {
         let along = || points.iter().map(|&point| cloud.point(point as usize)[axis]);

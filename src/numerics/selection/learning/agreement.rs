@@ -30,11 +30,13 @@ struct Verdict {
 impl Agreement<'_> {
     /// What the best cells of families come to.
     ///
-    /// The best one is taken, with the shortest length scale that values leave open; a shorter one where groups that are
-    /// given more contradict its variance, or the values of some place do, which have a feature that it does not expect.
+    /// The best one is taken, with the shortest length scale that values leave open; a shorter one where
+    /// groups that are given more contradict its variance, or the values of some place do, which have a
+    /// feature that it does not expect.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`], [`NumericsError::WeightsOverflow`] of values whose square leaves float64.
+    /// [`NumericsError::Cancelled`], [`NumericsError::WeightsOverflow`] of values whose square leaves
+    /// float64.
     pub(super) fn decided(
         &mut self,
         best: [Cell; N_FAMILIES],

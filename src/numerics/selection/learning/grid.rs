@@ -28,7 +28,8 @@ const FIRST_LENGTH: usize = 9;
 /// The length scale of a field that neighbours hardly explain: 1.25 spacings.
 const ROUGH_LENGTH: usize = 2;
 
-/// The shortest length scale that is taken for what is local: 3.5 spacings. A shorter one explains single outliers.
+/// The shortest length scale that is taken for what is local: 3.5 spacings. A shorter one explains single
+/// outliers.
 const LEAST_LOCAL: usize = 5;
 
 /// Ratios of noise to variance: the least, and quarters of a decade up to 10.

@@ -28,9 +28,9 @@ pub(super) struct Score {
     pub(super) of_places: f64,
 }
 
-/// Values one after the other, which are mostly near ones, whose mean square is looked at. The greatest are left out,
-/// since outliers are no feature. Of the rest of standard normal numbers one in 500,000 has a mean square beyond `most`:
-/// hundreds of places are looked at.
+/// Values one after the other, which are mostly near ones, whose mean square is looked at. The greatest are
+/// left out, since outliers are no feature. Of the rest of standard normal numbers one in 500,000 has a mean
+/// square beyond `most`: hundreds of places are looked at.
 struct Run {
     length: usize,
     n_left_out: usize,
@@ -41,7 +41,8 @@ const RUNS: [Run; 2] =
     [Run { length: PLACE, n_left_out: 1, most: 2.9 }, Run { length: 2 * PLACE, n_left_out: 2, most: 2.1 }];
 
 impl Run {
-    /// The mean square of what is not left out over its bound; 0 for fewer values than three quarters of a run.
+    /// The mean square of what is not left out over its bound; 0 for fewer values than three quarters of a
+    /// run.
     fn excess(&self, values: &[f64]) -> f64 {
         if 4 * values.len() < 3 * self.length {
             return 0.0;

@@ -8,8 +8,8 @@
 //!
 //! The grid is searched on a sample first, then from there on all values: together while they are few, else
 //! in groups that explain each other (order.rs). A sample alone misses what is local: from 256 of 2,000
-//! values a plane with a bump looks like a plane with noise. Even the likelihood of all values outvotes a small
-//! place, so what was found has to agree with every place (agreement.rs).
+//! values a plane with a bump looks like a plane with noise. Even the likelihood of all values outvotes a
+//! small place, so what was found has to agree with every place (agreement.rs).
 
 mod agreement;
 mod grid;

@@ -3,9 +3,10 @@
 //! A likelihood of n values takes n³ flops. It is the product of that of each value given those before it,
 //! and of those before it the near ones say nearly all (Vecchia 1988): here values are taken in groups of
 //! near ones, each given the values nearest to it of those that come before (Stein, Chi, Welty 2004). The
-//! first group is a sample of near and far points. Of the others one half is given points of the sample, and the other
-//! half is given points of all. With levels that grow from the sample by twos likelihoods came nearer to that of all values,
-//! and bands covered less: smooth kernels won more often where a field has a kink.
+//! first group is a sample of near and far points. Of the others one half is given points of the sample, and
+//! the other half is given points of all. With levels that grow from the sample by twos likelihoods came
+//! nearer to that of all values, and bands covered less: smooth kernels won more often where a field has a
+//! kink.
 
 use super::Observed;
 use crate::numerics::error::NumericsError;
@@ -113,7 +114,8 @@ fn sample(observed: &Observed<'_>) -> Vec<usize> {
     points
 }
 
-/// The points that are not of the sample, in two halves that are both spread over the cloud: one of each two near points.
+/// The points that are not of the sample, in two halves that are both spread over the cloud: one of each two
+/// near points.
 fn halves(observed: &Observed<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
     let n = observed.cloud.n_points();
     let mut is_left = vec![true; n];

@@ -169,7 +169,8 @@ impl<'a> Search<'a> {
         Ok(begin)
     }
 
-    /// `−ln` of how likely a cell is, by the values and beforehand; infinite where it does not explain them in float64.
+    /// `−ln` of how likely a cell is, by the values and beforehand; infinite where it does not explain them
+    /// in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].

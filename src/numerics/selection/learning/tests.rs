@@ -80,7 +80,8 @@ fn a_hot_spot_shortens_the_length_scale_and_outliers_do_not() {
     let with_spot: Vec<f64> = plain.iter().zip(cloud.points()).map(|(value, x)| value + spot(x)).collect();
     let found = length(&with_spot);
     assert!(found < 0.4 * expected, "{found} of {expected}");
-    // One value in 500, by 10 and by 100 deviations of the noise. The family may be another, with half the length.
+    // One value in 500, by 10 and by 100 deviations of the noise. The family may be another, with half the
+    // length.
     for off in [0.1, 1.0] {
         let error = |i: usize| if i % 500 == 250 { off } else { 0.0 };
         let with_outliers: Vec<f64> = plain.iter().enumerate().map(|(i, value)| value + error(i)).collect();
