@@ -18,7 +18,7 @@ use gramian::numerics::points::cloud::Cloud;
 use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::surface::local::LocalSurface;
+use gramian::numerics::surface::local::{Given, LocalSurface};
 use gramian::numerics::surface::operators::{RowKind, Stencils, laplace_beltrami_stencils};
 
 type Sample = fn(usize, &mut Random) -> Cloud;
@@ -52,7 +52,7 @@ fn main() {
 fn stencils(cloud: &Cloud) -> Stencils {
     let cloud = Arc::new(cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), None, &Unobserved).unwrap();
+    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), &Unobserved).unwrap();
     let geometry =
         Geometry::of(&Surface::from(surface), &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     laplace_beltrami_stencils(&geometry, &cloud, sampling.neighbours(), &cloud, &Unobserved).unwrap()

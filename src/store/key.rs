@@ -64,9 +64,15 @@ impl FitKey {
         blake3::Hash::from(self.fit).to_string()
     }
 
-    /// Names local regressions of a cloud, which choose all else by themselves.
-    pub fn of_local(owner: Owner, cloud_id: CloudId) -> Self {
-        Self { owner, cloud_id, fit: blake3::hash(b"local").into() }
+    /// Names local regressions of a cloud, which choose all else by themselves, as it is at sites where these
+    /// are given.
+    pub fn of_local(owner: Owner, cloud_id: CloudId, sites: Option<&Cloud>) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"local");
+        if let Some(sites) = sites {
+            update_with_floats(&mut hasher, sites.coordinates());
+        }
+        Self { owner, cloud_id, fit: hasher.finalize().into() }
     }
 
     /// Names a fit of values to a cloud (with duplicates merged or not).
@@ -224,7 +230,8 @@ mod tests {
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
             FitKey::of(SolverKind::Local, Owner(0), id, &gauss, &alpha(0.0), false),
-            FitKey::of_local(Owner(0), id),
+            FitKey::of_local(Owner(0), id, None),
+            FitKey::of_local(Owner(0), id, Some(&cloud)),
         ];
         let distinct: std::collections::HashSet<_> = keys.iter().collect();
         assert_eq!(distinct.len(), keys.len());

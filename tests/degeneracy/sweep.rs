@@ -11,7 +11,7 @@ use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::degeneracy::DegeneracyReason;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::surface::local::LocalSurface;
+use gramian::numerics::surface::local::{Given, LocalSurface};
 use gramian::numerics::surface::served::ServedBy;
 
 use super::common::clouds::cloud;
@@ -118,7 +118,7 @@ impl Case {
         let before = surface(&factorize(&noisy, kernel, alpha));
         let before = self.tally(&before, &noisy, &points, &GeometryRequest::CURVATURES);
         let sampling = Arc::new(Sampling::of(&noisy, &Unobserved).unwrap());
-        let local = LocalSurface::of(noisy.clone(), sampling, None, &Unobserved).unwrap();
+        let local = LocalSurface::of(noisy.clone(), sampling, Given::default(), &Unobserved).unwrap();
         let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
         [before, self.tally(&local.into(), &noisy, &points, &request)]
     }

@@ -173,8 +173,38 @@ async fn what_local_regressions_lack_is_refused_by_name() {
         let problem = server.post(path, &body).await.expect_problem(422, "unsupported-by-solver");
         assert_eq!(problem["errors"][0]["pointer"], pointer, "{path}");
     }
+    let sites = vec![[0.0; 3]; 193];
+    let cases = [
+        (json!({"cloud": cloud, "sites": sites[..2]}), "unsupported-by-solver"),
+        (json!({"cloud": cloud, "solver": "local", "sites": [[0.0, 1.0]]}), "dimension-mismatch"),
+        (json!({"cloud": cloud, "solver": "local", "sites": sites}), "invalid-request"),
+        (json!({"cloud": cloud, "solver": "local", "sites": []}), "invalid-request"),
+    ];
+    for (body, slug) in cases {
+        for path in ["/v1/normals", "/v1/curvatures", "/v1/laplace-beltrami/sparse-matrix"] {
+            let problem = server.post(path, &body).await.expect_problem(422, slug);
+            assert_eq!(problem["errors"][0]["pointer"], "/sites", "{path} {slug}");
+        }
+    }
     let body = json!({"cloud": cloud, "values": values, "solver": "local"});
     assert_eq!(numbers(&server.post("/v1/laplace-beltrami", &body).await.expect_ok()["values"]).len(), 60);
+}
+
+#[tokio::test]
+async fn surfaces_are_learned_where_it_is_said() {
+    let server = Server::start().await;
+    // A sphere, and a rough one beside it.
+    let mut random = Random(4);
+    let rough = fibonacci_sphere(1000).into_iter().map(|x| x.map(|c| c * (1.0 + 0.02 * random.normal())));
+    let rough: Vec<_> = rough.map(|[x, y, z]| [x + 4.0, y, z]).collect();
+    let points: Vec<_> = fibonacci_sphere(1000).into_iter().chain(rough).collect();
+    let mut noise = Vec::new();
+    for sites in [&points[..90], &points[1000..1090], &points[..90]] {
+        let body = json!({"cloud": {"points": points}, "solver": "local", "sites": sites});
+        let answer = server.post("/v1/normals", &body).await.expect_ok();
+        noise.push(answer["diagnostics"]["noise_deviation"].as_f64().unwrap());
+    }
+    assert!(noise[0] < 1e-3 && noise[1] > 1e-2 && noise[2] == noise[0], "{noise:?}");
 }
 
 #[tokio::test]

@@ -65,6 +65,28 @@ fn regressions_change_by_rounding_alone() {
     }
 }
 
+#[test]
+fn parts_with_the_same_sites_learn_the_same() {
+    let mut random = Random(7);
+    let on_sphere = (0..4000).flat_map(|_| random.on_sphere());
+    let whole = Cloud::new(on_sphere.collect(), 3).unwrap();
+    let above = |least: f64| {
+        let points = whole.points().filter(|x| x[2] > least);
+        Cloud::new(points.flatten().copied().collect(), 3).unwrap()
+    };
+    // Neighbourhoods reach 0.2 at most.
+    let (part, sites) = (above(-0.4), above(0.9));
+    let at_sites = |cloud: &Cloud| {
+        let cloud = Arc::new(cloud.clone());
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        Patches::learned_at(&sites, cloud, sampling, &Unobserved).unwrap()
+    };
+    let (of_whole, of_part) = (at_sites(&whole), at_sites(&part));
+    assert!(of_whole.kernel().length_scale > 0.1);
+    assert!((of_whole.kernel().length_scale / of_part.kernel().length_scale - 1.0).abs() < 1e-12);
+    assert_eq!(of_whole.noise(), of_part.noise());
+}
+
 fn learned(cloud: &Cloud, values: &[f64]) -> Learned {
     let sampling = Sampling::of(cloud, &Unobserved).unwrap();
     let (noise, mean) = (Noise::Unknown, Mean::Constant);

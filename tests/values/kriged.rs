@@ -15,7 +15,7 @@ use gramian::numerics::solver::trend::Mean;
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::surface::local::LocalSurface;
+use gramian::numerics::surface::local::{Given, LocalSurface};
 use gramian::numerics::surface::operators::{
     Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged,
 };
@@ -74,7 +74,8 @@ impl Case {
         let alpha = Regularization::uniform(learned.ratio).unwrap();
         let system = System::new(cloud.clone(), kernel, alpha).unwrap();
         let moving = Moving::new(system, sampling.clone(), &Unobserved).unwrap();
-        let surface = Surface::from(LocalSurface::of(cloud, sampling, None, &Unobserved).unwrap());
+        let surface =
+            Surface::from(LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap());
         let request = GeometryRequest {
             model: SurfaceModel::Local,
             has_deviations: true,

@@ -17,7 +17,7 @@ use gramian::numerics::sums::jets::JetOrder;
 use gramian::numerics::sums::regularization::Regularization;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
-use gramian::numerics::surface::local::LocalSurface;
+use gramian::numerics::surface::local::{Given, LocalSurface};
 use gramian::numerics::surface::operators::{
     laplace_beltrami, laplace_beltrami_deviations, surface_gradient, surface_gradient_deviations,
 };
@@ -113,7 +113,7 @@ impl Case {
         row.add(1, &jets.gradients(), &bars.gradients, truth.iter().flat_map(|t| t.gradient));
         row.add(2, &jets.hessians(), &bars.hessians, truth.iter().flat_map(|t| t.hessian.concat()));
 
-        let local = LocalSurface::of(cloud.clone(), sampling, None, &Unobserved).unwrap();
+        let local = LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap();
         let surface = Surface::from(local);
         let request = GeometryRequest {
             model: SurfaceModel::Local,

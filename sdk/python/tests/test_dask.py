@@ -88,11 +88,11 @@ def test_surfaces_are_those_of_one_request(
         tiles.normals(), tiles.curvatures(deviations=True), tiles.laplace_beltrami(), tiles.surface_gradient()
     )
     cloud = client.cloud(points)
-    assert_same(normals, cloud.normals(solver="local"))
-    assert_same(curvatures, cloud.curvatures(solver="local", deviations=True))
+    assert_same(normals, cloud.normals(solver="local", sites=tiles.sites))
+    assert_same(curvatures, cloud.curvatures(solver="local", deviations=True, sites=tiles.sites))
     assert curvatures.mean_curvature_deviations.shape == (6000,)
-    of_all = [cloud.laplace_beltrami_sparse_matrix(solver="local").matrix]
-    of_all += cloud.surface_gradient_sparse_matrix(solver="local").matrices
+    of_all = [cloud.laplace_beltrami_sparse_matrix(solver="local", sites=tiles.sites).matrix]
+    of_all += cloud.surface_gradient_sparse_matrix(solver="local", sites=tiles.sites).matrices
     for matrix, expected in zip([*laplace.matrices, *gradient.matrices], of_all, strict=True):
         assert isinstance(matrix, csr_matrix)
         assert np.array_equal(matrix.indices, expected.indices)
@@ -112,8 +112,9 @@ def test_operators_are_applied_in_blocks(service: gramian.dask.Service, points: 
 def test_points_may_coincide_and_be_few(client: gramian.Client, service: gramian.dask.Service, n_tiles: int) -> None:
     points = torus(900)
     points = np.concatenate([points, points[:40]])
-    (found,) = dask.compute(service.tiles(points, n_tiles).curvatures(deviations=True))
-    assert_same(found, client.cloud(points).curvatures(solver="local", deviations=True))
+    tiles = service.tiles(points, n_tiles)
+    (found,) = dask.compute(tiles.curvatures(deviations=True))
+    assert_same(found, client.cloud(points).curvatures(solver="local", deviations=True, sites=tiles.sites))
 
 
 def test_tiles_without_a_surface_have_no_normals(service: gramian.dask.Service) -> None:
@@ -171,7 +172,7 @@ def test_tiles_are_tasks_of_a_cluster(client: gramian.Client, points: Array) -> 
     ):
         tiles = gramian.dask.connect(urls).tiles(points, n_tiles=4)
         (normals,) = dask.compute(tiles.normals(), retries=2)
-    assert_same(normals, client.cloud(points).normals(solver="local"))
+    assert_same(normals, client.cloud(points).normals(solver="local", sites=tiles.sites))
 
 
 def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: gramian.Client, points: Array) -> None:
@@ -181,7 +182,7 @@ def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: g
     process.kill()
     process.wait()
     (found,) = dask.compute(normals)
-    assert_same(found, client.cloud(points).normals(solver="local"))
+    assert_same(found, client.cloud(points).normals(solver="local", sites=tiles.sites))
 
 
 def test_replicas_are_asked_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -235,13 +236,12 @@ def test_cells_have_equally_many_points(n: int, n_cells: int) -> None:
         assert (cut.depths(cell, points[cut.cells_of(points) == cell]) >= 0).all()
 
 
-def test_sites_are_at_the_places_that_the_service_looks_at() -> None:
+def test_tiles_know_what_is_theirs_what_is_near_and_what_all_carry() -> None:
     points = np.random.default_rng(0).normal(size=(5000, 3))
     whole = Part(np.arange(5000), points)
-    sites = np.arange(0, 5000, 5000 // 96)
-    core, carried = whole[np.arange(700, 1333)], whole[sites]
-    tile = assemble(0, core, [whole[np.arange(1333, 1400)]], carried, sites, whole)
-    assert tile.index[:: len(tile.index) // 96].tolist() == sites.tolist()
+    core, carried = whole[np.arange(700, 1333)], whole[np.arange(0, 5000, 52)]
+    tile = assemble(0, core, [whole[np.arange(1333, 1400)]], carried)
+    assert set(carried.index) <= set(tile.index)
     np.testing.assert_array_equal(tile.points, points[tile.index])
     assert tile.rows.tolist() == list(range(700, 1333))
     assert set(tile.index[tile.is_near]) == set(range(700, 1400))

@@ -238,6 +238,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+learn the same.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -1399,6 +1404,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where rows are wanted; the points of the surface if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+learn the same.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -1670,6 +1680,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+learn the same.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -2733,6 +2748,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where rows are wanted; the points of the surface if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+learn the same.*/
+        #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
+        pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///How the linear system is solved.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
@@ -3447,6 +3467,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            sites: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
@@ -3467,6 +3491,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: Ok(Default::default()),
                     orientation: Ok(Default::default()),
                     queries: Ok(Default::default()),
+                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     surface: Ok(Default::default()),
                 }
@@ -3575,6 +3600,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn sites<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.sites = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for sites: {e}")
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -3614,6 +3651,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: value.noise_variances?,
                     orientation: value.orientation?,
                     queries: value.queries?,
+                    sites: value.sites?,
                     solver: value.solver?,
                     surface: value.surface?,
                 })
@@ -3630,6 +3668,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: Ok(value.noise_variances),
                     orientation: Ok(value.orientation),
                     queries: Ok(value.queries),
+                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                     surface: Ok(value.surface),
                 }
@@ -7358,6 +7397,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            sites: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
@@ -7373,6 +7416,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
+                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                 }
             }
@@ -7466,6 +7510,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn sites<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.sites = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for sites: {e}")
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -7493,6 +7549,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
+                    sites: value.sites?,
                     solver: value.solver?,
                 })
             }
@@ -7508,6 +7565,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
+                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                 }
             }
@@ -8261,6 +8319,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            sites: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
@@ -8281,6 +8343,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: Ok(Default::default()),
                     orientation: Ok(Default::default()),
                     queries: Ok(Default::default()),
+                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                     surface: Ok(Default::default()),
                 }
@@ -8389,6 +8452,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn sites<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.sites = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for sites: {e}")
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -8428,6 +8503,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: value.noise_variances?,
                     orientation: value.orientation?,
                     queries: value.queries?,
+                    sites: value.sites?,
                     solver: value.solver?,
                     surface: value.surface?,
                 })
@@ -8444,6 +8520,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     noise_variances: Ok(value.noise_variances),
                     orientation: Ok(value.orientation),
                     queries: Ok(value.queries),
+                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                     surface: Ok(value.surface),
                 }
@@ -10841,6 +10918,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 ::std::vec::Vec<::std::vec::Vec<f64>>,
                 ::std::string::String,
             >,
+            sites: ::std::result::Result<
+                ::std::vec::Vec<::std::vec::Vec<f64>>,
+                ::std::string::String,
+            >,
             solver: ::std::result::Result<
                 ::std::option::Option<super::SolverChoice>,
                 ::std::string::String,
@@ -10856,6 +10937,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(Default::default()),
                     noise_variances: Ok(Default::default()),
                     queries: Ok(Default::default()),
+                    sites: Ok(Default::default()),
                     solver: Ok(Default::default()),
                 }
             }
@@ -10949,6 +11031,18 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     });
                 self
             }
+            pub fn sites<T>(mut self, value: T) -> Self
+            where
+                T: ::std::convert::TryInto<::std::vec::Vec<::std::vec::Vec<f64>>>,
+                T::Error: ::std::fmt::Display,
+            {
+                self.sites = value
+                    .try_into()
+                    .map_err(|e| {
+                        format!("error converting supplied value for sites: {e}")
+                    });
+                self
+            }
             pub fn solver<T>(mut self, value: T) -> Self
             where
                 T: ::std::convert::TryInto<::std::option::Option<super::SolverChoice>>,
@@ -10976,6 +11070,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: value.kernel?,
                     noise_variances: value.noise_variances?,
                     queries: value.queries?,
+                    sites: value.sites?,
                     solver: value.solver?,
                 })
             }
@@ -10991,6 +11086,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                     kernel: Ok(value.kernel),
                     noise_variances: Ok(value.noise_variances),
                     queries: Ok(value.queries),
+                    sites: Ok(value.sites),
                     solver: Ok(value.solver),
                 }
             }

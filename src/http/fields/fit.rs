@@ -9,6 +9,7 @@ use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
 use super::cloud_ref::CloudRef;
 use super::kernel::Kernel;
 use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word};
+use crate::http::wire::read::points::Points;
 
 /// The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as in
 /// the request.
@@ -60,6 +61,8 @@ pub struct Fit {
     /// Lists of them, where there may be many; 0 where there is one.
     pub n_lists: usize,
     pub mean: Option<MeanChoice>,
+    /// Where local regressions learn, where the client says so.
+    pub sites: Option<Points>,
 }
 
 /// Declares a request: the fields of a fit, which stand directly in it, and its own.
@@ -120,6 +123,7 @@ macro_rules! request {
                     values: None,
                     n_lists: 0,
                     mean: None,
+                    sites: None,
                 }
             }
         }

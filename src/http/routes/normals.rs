@@ -9,7 +9,7 @@ use axum::response::Response;
 use super::surfaces::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
-    Degenerate, Diagnostics, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
+    Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
@@ -43,6 +43,12 @@ request! {
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
+        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+        /// points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /// learn the same.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1, max_items = 192)]
+        pub sites: Option<Points>,
     }
 }
 
@@ -100,7 +106,7 @@ impl Operation for NormalsRequest {
     const HAS_SURFACE: bool = true;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<GeometryWork>, Problem> {
-        let fit = self.take_fit();
+        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
         let request = geometry_request(self.surface, self.orientation, false, self.include.as_deref());
         plan_geometry(planner, fit, self.queries, request, Purpose::Normals, |d| d + 3)
     }

@@ -258,6 +258,12 @@ request! {
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
+        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
+        /// points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /// learn the same.
+        #[serde(default, deserialize_with = "present")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1, max_items = 192)]
+        pub sites: Option<Points>,
     }
 }
 
@@ -315,7 +321,7 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
     }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
-        let fit = self.take_fit();
+        let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
         plan_stencils(planner, fit, self.geometry, self.queries, |d| d)
     }
 

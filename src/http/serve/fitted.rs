@@ -173,7 +173,7 @@ impl Fitted {
     fn kernel(&self) -> Option<&Kernel> {
         match &self.plan.model {
             FitModel::Dense { kernel, .. } | FitModel::Moving { kernel, .. } => Some(kernel),
-            FitModel::Local(_) => None,
+            FitModel::Local { .. } => None,
         }
     }
 
@@ -337,7 +337,7 @@ impl Fitted {
     /// What the answer says of local regressions.
     fn local_diagnostics(&self, surface: &LocalSurface, n_queries: usize) -> Diagnostics {
         let reason = match self.plan.model {
-            FitModel::Local(reason) => reason.words(),
+            FitModel::Local { reason, .. } => reason.words(),
             FitModel::Dense { .. } | FitModel::Moving { .. } => None,
         };
         let noise = surface.patches().noise();

@@ -19,7 +19,7 @@ use crate::numerics::solver::choose::Choice;
 use crate::numerics::solver::{Solver, System, Workspace};
 use crate::numerics::sums::regularization::Regularization;
 use crate::numerics::surface::Surface;
-use crate::numerics::surface::local::LocalSurface;
+use crate::numerics::surface::local::{Given, LocalSurface};
 use crate::numerics::surface::signature::{Signature, SignatureSurface};
 use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
@@ -288,7 +288,7 @@ async fn prepare(
         FitModel::Moving { kernel, regularization, .. } => {
             return prepare_moving(app, admission, plan, (kernel, regularization), memory).await;
         }
-        FitModel::Local(_) => return Ok(PreparedFit::local(memory)),
+        FitModel::Local { .. } => return Ok(PreparedFit::local(memory)),
     };
     let flops = plan.choice(app.prepared.memory()).at_most.flops;
     let system = System::new(plan.fitted.clone(), kernel.clone(), regularization.clone());
@@ -372,12 +372,13 @@ fn make_surface(
                 Some(sampling) => sampling,
                 None => Arc::new(Sampling::of(&plan.fitted, observer)?),
             };
-            let given = plan.fitted_normals();
+            let normals = plan.fitted_normals();
+            let given = Given { normals: normals.as_deref(), sites: plan.sites() };
             let surface = match stored.solver() {
-                None => LocalSurface::of(plan.fitted.clone(), sampling, given.as_deref(), observer)?.into(),
+                None => LocalSurface::of(plan.fitted.clone(), sampling, given, observer)?.into(),
                 Some(solver) => {
                     let signature = signature(&shared, &plan, solver, observer)?;
-                    SignatureSurface::over(sampling, signature, given.as_deref(), observer)?.into()
+                    SignatureSurface::over(sampling, signature, given.normals, observer)?.into()
                 }
             };
             // As with a factor, the memory goes with the job.

@@ -79,14 +79,14 @@ impl Learning {
 }
 
 /// How a fit is served.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Way {
     /// By a factorization of the whole matrix.
     Dense,
     /// Values from the points nearest to each query.
     Moving(LocalReason),
-    /// A surface by local regressions.
-    Regressions(LocalReason),
+    /// A surface by local regressions, which learn at sites, if these are given.
+    Regressions { reason: LocalReason, sites: Option<Arc<Cloud>> },
 }
 
 /// Why a fit is served locally.
@@ -117,7 +117,7 @@ impl PlannedFit {
 
     /// Whether the surface is regressed locally.
     pub fn is_local(&self) -> bool {
-        matches!(self.way, Way::Regressions(_))
+        matches!(self.way, Way::Regressions { .. })
     }
 
     /// Whether values come from the points nearest to each query.
@@ -192,9 +192,9 @@ impl PlannedFit {
     pub fn resolve(self) -> Result<FitPlan, Problem> {
         let (owner, pointers, is_moving) = (self.owner, self.pointers, self.is_moving());
         let Self { stored, way, .. } = self;
-        if let Way::Regressions(reason) = way {
-            let (key, fitted) = (FitKey::of_local(owner, stored.id), stored.cloud.clone());
-            let model = FitModel::Local(reason);
+        if let Way::Regressions { reason, sites } = way {
+            let key = FitKey::of_local(owner, stored.id, sites.as_deref());
+            let (fitted, model) = (stored.cloud.clone(), FitModel::Local { reason, sites });
             let (scale, is_learned, mean) = (1.0, false, Mean::Zero);
             return Ok(FitPlan {
                 stored,
@@ -238,7 +238,7 @@ impl PlannedFit {
         };
         let model = match way {
             Way::Moving(reason) => FitModel::Moving { kernel, regularization, reason },
-            Way::Dense | Way::Regressions(_) => FitModel::Dense { kernel, regularization },
+            Way::Dense | Way::Regressions { .. } => FitModel::Dense { kernel, regularization },
         };
         let is_learned = self.kernel.is_none() && learned.is_some();
         Ok(FitPlan { stored, fitted, merge, model, key, pointers, scale, is_learned, mean, learned })
@@ -315,8 +315,11 @@ pub enum FitModel {
         regularization: Regularization,
         reason: LocalReason,
     },
-    /// Local regressions, which choose all that they need.
-    Local(LocalReason),
+    /// Local regressions, which choose all that they need, as it is at sites, if these are given.
+    Local {
+        reason: LocalReason,
+        sites: Option<Arc<Cloud>>,
+    },
 }
 
 impl FitPlan {
@@ -351,6 +354,14 @@ impl FitPlan {
         Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
     }
 
+    /// Where local regressions learn, if that is given.
+    pub fn sites(&self) -> Option<&Cloud> {
+        match &self.model {
+            FitModel::Local { sites, .. } => sites.as_deref(),
+            FitModel::Dense { .. } | FitModel::Moving { .. } => None,
+        }
+    }
+
     /// The solver of this fit with what it and the surface take, within so many bytes of memory.
     pub fn choice(&self, memory: usize) -> Choice {
         let (n, d) = (self.fitted.n_points(), self.fitted.dimension());
@@ -359,7 +370,7 @@ impl FitPlan {
             FitModel::Moving { ref kernel, .. } => {
                 choose_moving(n, d, self.merge.is_some(), kernel.is_stretched())
             }
-            FitModel::Local(_) => choose_local(n, d),
+            FitModel::Local { .. } => choose_local(n, d),
         }
     }
 

@@ -29,8 +29,11 @@ use room::{Found, Purpose};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
-/// Neighbourhoods whose likelihood is pooled.
-const N_SAMPLES: usize = 96;
+/// Neighbourhoods whose likelihood is pooled, or fewer than twice as many.
+const N_SITES: usize = 96;
+
+/// Those at most, where others choose them.
+pub const MAX_SITES: usize = 2 * N_SITES;
 
 /// Points per mean that are tried, one after the other.
 const GROUPS: [usize; 7] = [1, 3, 8, 24, 72, 216, 648];
@@ -63,7 +66,7 @@ pub struct PatchKernel {
 }
 
 impl Patches {
-    /// Chooses neighbourhoods and hyperparameters.
+    /// Chooses neighbourhoods and hyperparameters, as points of every spacing have them.
     ///
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
@@ -72,10 +75,24 @@ impl Patches {
         sampling: Arc<Sampling>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
+        let sites = cloud.select(&sampling.of_every_spacing(N_SITES));
+        Self::learned_at(&sites, cloud, sampling, observer)
+    }
+
+    /// Chooses them as the neighbourhoods of sites `[s, d]` have it. Parts of a cloud that hold the same
+    /// neighbourhoods of the same sites learn the same.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn learned_at(
+        sites: &Cloud,
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
         if cloud.dimension() < 2 {
             return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
         }
-        let sites = cloud.select(&sampling.of_every_spacing(N_SAMPLES));
         let mut best: Option<(f64, Self)> = None;
         for group in GROUPS {
             if group > 1 && cloud.n_points() / group < LEAST_MEANS {
@@ -85,7 +102,7 @@ impl Patches {
                 1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
                 _ => Support::means(&cloud, group, observer)?,
             };
-            let (deviation, patches) = Self::over(&sites, support, group, observer)?;
+            let (deviation, patches) = Self::over(sites, support, group, observer)?;
             let is_exact = patches.noise == 0.0;
             let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
             if is_better {

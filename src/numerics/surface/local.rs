@@ -31,6 +31,15 @@ const UNCERTAIN_NORMAL: f64 = 0.3;
 /// Curvature times the radius of the cloud up to which a surface counts as flat.
 const FLAT: f64 = 0.1;
 
+/// What is known of a surface beside its points.
+#[derive(Clone, Copy, Default)]
+pub struct Given<'a> {
+    /// Normals of the points, `[n, d]`, of any length but 0: they say which side is outward.
+    pub normals: Option<&'a Cloud>,
+    /// Where noise and shape are learned, `[s, d]`; see [`Patches::learned_at`].
+    pub sites: Option<&'a Cloud>,
+}
+
 /// Local regressions of a cloud with consistently oriented normals, d ≥ 2.
 pub struct LocalSurface {
     cloud: Arc<Cloud>,
@@ -47,20 +56,23 @@ pub struct LocalSurface {
 }
 
 impl LocalSurface {
-    /// Regresses the surface at every point and chooses its side; `given` are normals of the points, `[n, d]`, of any length but 0.
+    /// Regresses the surface at every point and chooses its side.
     ///
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
     pub fn of(
         cloud: Arc<Cloud>,
         sampling: Arc<Sampling>,
-        given: Option<&Cloud>,
+        given: Given<'_>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         observer.enter(Stage::Evaluate);
-        let patches = Patches::of(cloud.clone(), sampling.clone(), observer)?;
+        let patches = match given.sites {
+            None => Patches::of(cloud.clone(), sampling.clone(), observer)?,
+            Some(sites) => Patches::learned_at(sites, cloud.clone(), sampling.clone(), observer)?,
+        };
         let mut at_points = patches.at(&cloud, true, true, observer)?;
-        let oriented = orient(&cloud, &sampling, &patches, &at_points, given, observer)?;
+        let oriented = orient(&cloud, &sampling, &patches, &at_points, given.normals, observer)?;
         let d = cloud.dimension();
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
@@ -305,7 +317,8 @@ mod tests {
     fn geometry(cloud: Cloud) -> Geometry {
         let cloud = Arc::new(cloud);
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-        let surface = Surface::from(LocalSurface::of(cloud.clone(), sampling, None, &Unobserved).unwrap());
+        let surface =
+            Surface::from(LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap());
         let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
         Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap()
     }

@@ -8,7 +8,7 @@ use gramian::numerics::points::sampling::Sampling;
 use gramian::numerics::surface::Surface;
 use gramian::numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
 use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian::numerics::surface::local::LocalSurface;
+use gramian::numerics::surface::local::{Given, LocalSurface};
 
 use super::clouds::Sided;
 use crate::common::fits::{default_kernel_and_alpha, factorize, surface};
@@ -42,7 +42,7 @@ impl SideTally {
     pub fn local(sided: &Sided) -> Self {
         let cloud = Arc::new(sided.cloud.clone());
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-        Self::of(&LocalSurface::of(cloud, sampling, None, &Unobserved).unwrap().into(), sided)
+        Self::of(&LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap().into(), sided)
     }
 
     fn of(surface: &Surface, sided: &Sided) -> Self {

@@ -28,7 +28,7 @@ NUMBERS = {
 ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
 """What takes one number where these take many."""
 
-ROWS = {"points": "points", "queries": "points", "normals": "normals", "values": "lists of values"}
+ROWS = {"points": "points", "queries": "points", "sites": "points", "normals": "normals", "values": "lists of values"}
 """What the rows of an array with two axes are."""
 
 KINDS = {"c": "complex numbers", "b": "truth values", "S": "bytes", "U": "text", "M": "dates", "m": "durations"}

@@ -259,6 +259,7 @@ REQUEST: Mapping[str, Rule] = {
     "normals": array("n", "d"),
     "values": array("n"),
     "queries": array("m", "d"),
+    "sites": array("s", "d"),
     "derivatives": whole,
     "mean": word(*MeanChoice),
     "include": words(*PosteriorQuantity),

@@ -175,6 +175,7 @@ class OperatorsOnCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
+        sites: npt.ArrayLike | None = None,
     ) -> SurfaceGradientSparseMatrix:
         """Assembles sparse matrices, one per coordinate, that turn values at the points into surface gradients.
 
@@ -199,6 +200,9 @@ class OperatorsOnCloud(RegisteredCloud):
             to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+        sites : array_like, `[s, d]`, optional
+            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
+            that it chooses if absent.
 
         Returns
         -------
@@ -232,6 +236,7 @@ class OperatorsOnCloud(RegisteredCloud):
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            sites=sites,
         )
 
     def laplace_beltrami(
@@ -384,6 +389,7 @@ class OperatorsOnCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
+        sites: npt.ArrayLike | None = None,
     ) -> LaplaceBeltramiSparseMatrix:
         """Assembles the sparse matrix that turns values at the points into Δu at the queries.
 
@@ -408,6 +414,9 @@ class OperatorsOnCloud(RegisteredCloud):
             to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+        sites : array_like, `[s, d]`, optional
+            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
+            that it chooses if absent.
 
         Returns
         -------
@@ -439,4 +448,5 @@ class OperatorsOnCloud(RegisteredCloud):
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            sites=sites,
         )

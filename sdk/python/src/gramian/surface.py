@@ -30,6 +30,7 @@ class SurfaceOfCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
+        sites: npt.ArrayLike | None = None,
     ) -> Normals:
         """Computes unit normals ν = −∇u/|∇u| of the surface that the points sample; no mesh is needed.
 
@@ -59,6 +60,9 @@ class SurfaceOfCloud(RegisteredCloud):
             any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+        sites : array_like, `[s, d]`, optional
+            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
+            that it chooses if absent.
 
         Returns
         -------
@@ -89,6 +93,7 @@ class SurfaceOfCloud(RegisteredCloud):
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            sites=sites,
         )
 
     def curvatures(
@@ -104,6 +109,7 @@ class SurfaceOfCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
+        sites: npt.ArrayLike | None = None,
     ) -> Curvatures:
         """Computes principal, mean and Gaussian curvatures of the surface that the points sample; no mesh is needed.
 
@@ -135,6 +141,9 @@ class SurfaceOfCloud(RegisteredCloud):
             any number of points, or `"auto"` to let the service choose, as it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+        sites : array_like, `[s, d]`, optional
+            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
+            that it chooses if absent.
 
         Returns
         -------
@@ -171,4 +180,5 @@ class SurfaceOfCloud(RegisteredCloud):
             noise_variances=noise_variances,
             solver=solver,
             duplicates=duplicates,
+            sites=sites,
         )

@@ -6,6 +6,7 @@ use super::inputs::length_mismatch;
 use crate::http::fields::{Fit, Geometry, Kernel};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
+use crate::http::wire::read::points::Points;
 use crate::numerics::solver::trend::Mean;
 use crate::numerics::sums::regularization::Regularization;
 use crate::store::clouds::RegisteredCloud;
@@ -40,6 +41,12 @@ pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
     let detail = "operators take values of one function, which the local solver does not have: take \"solver\": \"dense\", and \
                   {\"geometry\": {\"surface\": \"local\"}} for the surface under an operator";
     Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
+}
+
+/// 422 for sites of a surface that is not regressed locally.
+pub(super) fn only_local_has_sites() -> Problem {
+    let detail = "only local regressions learn at sites: leave them out, or take \"solver\": \"local\"";
+    Problem::of_field(Slug::UnsupportedBySolver, "/sites", detail)
 }
 
 /// Where the fit of a request stands.
@@ -78,6 +85,7 @@ pub(super) struct Chosen {
     pub(super) values: Option<Arc<Vec<f64>>>,
     pub(super) n_lists: usize,
     pub(super) mean: Option<Mean>,
+    pub(super) sites: Option<Points>,
 }
 
 impl Chosen {
@@ -89,6 +97,7 @@ impl Chosen {
             values: fit.values,
             n_lists: fit.n_lists,
             mean: fit.mean.map(Mean::from),
+            sites: fit.sites,
         }
     }
 

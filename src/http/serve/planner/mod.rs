@@ -23,7 +23,9 @@ use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::DenseOnly;
-use choice::{Chosen, TRY_LOCAL, local_lacks_operators, pointers_of, pointers_of_surface};
+use choice::{
+    Chosen, TRY_LOCAL, local_lacks_operators, only_local_has_sites, pointers_of, pointers_of_surface,
+};
 use inputs::length_mismatch;
 pub use inputs::{check_seed, unknown_cloud, value_lists};
 
@@ -101,9 +103,13 @@ impl<'a> Planner<'a> {
         pointers: Pointers,
     ) -> Result<PlannedFit, Problem> {
         let Some(reason) = self.local_reason(&stored.cloud, &chosen, solver, request, pointers)? else {
+            if chosen.sites.is_some() {
+                return Err(only_local_has_sites());
+            }
             return self.plan(stored, chosen, Way::Dense, duplicates, purpose, pointers);
         };
-        let way = Way::Regressions(reason);
+        let sites = chosen.sites.map(|sites| self.sites(sites, &stored.cloud)).transpose()?;
+        let way = Way::Regressions { reason, sites };
         let (kernel, regularization) = (None, None);
         Ok(PlannedFit {
             owner: self.owner,
@@ -242,7 +248,8 @@ impl<'a> Planner<'a> {
             return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
         }
         let (solver, duplicates) = (geometry.solver.unwrap_or(fit.solver), fit.duplicates);
-        let chosen = Chosen::of(fit);
+        let mut chosen = Chosen::of(fit);
+        let sites = chosen.sites.take();
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
         if inherits_noise && chosen.noise_variances.is_some() && surface_cloud.id != values_cloud.id {
             let detail =
@@ -265,6 +272,7 @@ impl<'a> Planner<'a> {
                     true => chosen.noise_variances.clone(),
                     false => geometry.noise_variances,
                 },
+                sites,
                 ..Chosen::default()
             }
         };

@@ -18,7 +18,7 @@ MAX_SAMPLE = 2_000_000
 """Points that cells and coarse cloud are chosen from, at most: as many as a server takes in one request."""
 
 N_SITES = 96
-"""Neighbourhoods, or one more, that local regressions learn from: src/numerics/patches/mod.rs."""
+"""Neighbourhoods that tiles learn from, or less than twice as many, which is what the service takes at most."""
 
 PROBE_POINTS = 60_000
 """Points of the cloud that is asked what all learn, at most; one of no more is asked itself."""
@@ -31,7 +31,7 @@ AROUND_SITES = PROBE_POINTS // N_SITES
 
 N_CENTRES = 16
 TOGETHER = 16
-"""Groups of points, and points of each, that a kernel is learned from: src/numerics/selection/sample.rs."""
+"""Groups of points, and points of each, that a kernel is learned from."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Plan:
     coarse
         At most 6,000 points, no two of which coincide, that say which side is outward.
     sites
-        The points whose neighbourhoods the service learns from: 96 or 97 of large clouds, up to 191 of small ones.
+        The points at which tiles learn.
     around
         The points nearest to these, one for each position; all points of a small cloud.
     extremes
@@ -100,11 +100,6 @@ class Plan:
         """Returns the sites with the points of the `count` positions that are nearest to each."""
         positions = self.positions()
         return join([self.sites, positions[nearest(positions, self.sites.points, Reach(count))]])
-
-    @property
-    def spare(self) -> Part:
-        """Points that tiles may have beside what they need; all points of a small cloud."""
-        return self.coarse if self.n_points > PROBE_POINTS else self.around
 
     def positions(self) -> Part:
         """Returns the points around the sites, one for each position."""

@@ -39,7 +39,7 @@ def surface(replicas: Replicas, settled: Settled, sides: Sides, what: str, devia
     def call(client: Client) -> Normals | Curvatures:
         cloud = settled.cloud(client)
         ask = cloud.normals if what == "normals" else cloud.curvatures
-        return ask(solver="local", deviations=deviations)
+        return ask(solver="local", deviations=deviations, sites=settled.sites)
 
     answer = replicas.ask(tile.number, call)
     reasons = _reasons(answer.degenerate, settled)
@@ -57,9 +57,9 @@ def operator(replicas: Replicas, settled: Settled, what: str, n_points: int) -> 
     def call(client: Client) -> tuple[list[csr_matrix], tuple[Degenerate, ...]]:
         cloud = settled.cloud(client)
         if what == "laplace_beltrami":
-            of_values = cloud.laplace_beltrami_sparse_matrix(solver="local")
+            of_values = cloud.laplace_beltrami_sparse_matrix(solver="local", sites=settled.sites)
             return [of_values.matrix], of_values.degenerate
-        of_gradients = cloud.surface_gradient_sparse_matrix(solver="local")
+        of_gradients = cloud.surface_gradient_sparse_matrix(solver="local", sites=settled.sites)
         return list(of_gradients.matrices), of_gradients.degenerate
 
     matrices, degenerate = replicas.ask(tile.number, call)

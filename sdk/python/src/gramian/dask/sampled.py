@@ -15,7 +15,7 @@ from . import graph
 from .parts import Part, Reach, join
 from .plan import PROBE_POINTS, REGRESSED, Plan
 from .replicas import Replicas
-from .settling import Learned, Settled, learn, orient, settle
+from .settling import Learned, Learning, Settled, learn, orient, settle
 from .signs import joined
 from .tile import assemble
 
@@ -67,14 +67,13 @@ class SurfaceTiles:
         counts = [first, *[count for count in MORE if count > first]]
         plan = plan.reaching(points, min(first, MAX_AROUND))
         carried, *more = [join([plan.around_sites(count), plan.extremes]) for count in counts]
-        sites = plan.sites.index
-        coarse = dask.delayed(orient(plan.coarse, learned.noise), pure=True)
+        learning = Learning(orient(plan.coarse, learned.noise), learned, plan.sites, more)
         cores = graph.cores(points, plan)
         rims = graph.rims(cores, plan, Reach(AROUND[plan.dimension] * factor))
-        shared, others, spare = (dask.delayed(part, pure=True) for part in (carried, more, plan.spare))
+        shared, how = dask.delayed(carried, pure=True), dask.delayed(learning, pure=True)
         build, settled = dask.delayed(assemble, pure=True), dask.delayed(settle, pure=True)
-        tiles = [build(cell, core, rims[cell], shared, sites, spare) for cell, core in enumerate(cores)]
-        ready = [settled(replicas, tile, coarse, learned, others, sites, spare) for tile in tiles]
+        tiles = [build(cell, core, rims[cell], shared) for cell, core in enumerate(cores)]
+        ready = [settled(replicas, tile, how) for tile in tiles]
         return cls(ready, sides(ready))
 
 
@@ -93,8 +92,10 @@ def decide(replicas: Replicas, plan: Plan) -> tuple[Learned, int]:
     spare = join([plan.around, plan.coarse])
 
     def ask(sample: Part, least: int = 0) -> Learned:
-        tile = assemble(0, sample, [], sample, plan.sites.index, spare, least)
-        learned: Learned = dask.delayed(learn)(replicas, tile).compute()
+        others = spare[np.flatnonzero(~np.isin(spare.index, sample.index))]
+        missing = max(min(least - len(sample), len(others)), 0)
+        whole = join([sample, others[np.arange(missing)]])
+        learned: Learned = dask.delayed(learn)(replicas, whole, plan.sites).compute()
         return learned
 
     if plan.n_points <= PROBE_POINTS:

@@ -19,7 +19,6 @@ from ..fit import Fit, Kernel
 from ..tensors import Array
 from .cut import Ints
 from .parts import Part
-from .plan import N_SITES
 from .regions import Regions
 from .replicas import Replicas
 from .thinning import scales
@@ -83,16 +82,39 @@ class Coarse:
         return directions / np.where(lengths == 0, 1, lengths)[:, None]
 
 
-def learn(replicas: Replicas, tile: Tile) -> Learned:
+@dataclass(frozen=True)
+class Learning:
+    """What tiles are to learn, and from what.
+
+    Attributes
+    ----------
+    coarse
+        The signature function that says which side is outward.
+    learned
+        What the sample said.
+    sites
+        Where tiles learn.
+    more
+        What they carry instead, one after the other, while they learn something else.
+    """
+
+    coarse: Coarse
+    learned: Learned
+    sites: Part
+    more: Sequence[Part]
+
+
+def learn(replicas: Replicas, sample: Part, sites: Part) -> Learned:
     """Asks what the neighbourhoods of the sites say of noise and size, and how surely curvatures are known there."""
 
     def call(client: Client) -> Learned:
-        cloud = client.cloud(tile.points)
-        answer = cloud.curvatures(solver="local", deviations=True)  # at points, whose noise counts
-        at_sites = np.asarray(answer.principal_curvature_deviations)[:: max(cloud.n_points // N_SITES, 1)]
+        cloud = client.cloud(sample.points)
+        # At points, whose noise counts.
+        answer = cloud.curvatures(solver="local", deviations=True, sites=sites.points)
+        at_sites = np.asarray(answer.principal_curvature_deviations)[np.searchsorted(sample.index, sites.index)]
         known = at_sites.max(axis=1)[~np.isnan(at_sites).any(axis=1)]
         deviation = float(np.median(known)) if len(known) else np.nan
-        return replace(_learned(cloud), deviation=deviation)
+        return replace(_learned(cloud, sites.points), deviation=deviation)
 
     return replicas.ask(0, call)
 
@@ -115,6 +137,8 @@ class Settled:
         Its points.
     directions
         `[n, d]`. Unit vectors outward at these, by the coarse function.
+    sites
+        `[s, d]`. Where it learns, L.
     labels
         `[n]`. The region of each point, 0 for those that are neither in its cell nor in the halo.
     regions
@@ -125,14 +149,16 @@ class Settled:
 
     tile: Tile
     directions: Array
+    sites: Array
     labels: Ints
     regions: Regions
     is_alike: bool
 
     @classmethod
-    def of(cls, client: Client, tile: Tile, directions: Array, coarse: Coarse, is_alike: bool) -> Settled:
+    def of(cls, client: Client, tile: Tile, directions: Array, learning: Learning, is_alike: bool) -> Settled:
         """Asks for normals, and finds the regions."""
-        normals = client.cloud(tile.points, directions).normals(solver="local").normals
+        sites, coarse = learning.sites.points, learning.coarse
+        normals = client.cloud(tile.points, directions).normals(solver="local", sites=sites).normals
         labels = np.zeros(len(tile.points), dtype=np.int64)
         near = np.flatnonzero(tile.is_near)
         place = np.empty(len(tile.points), dtype=np.int64)
@@ -145,7 +171,7 @@ class Settled:
             own=place[tile.own],
             coarse=coarse.part.index,
         )
-        return cls(tile, directions, labels, regions, is_alike)
+        return cls(tile, directions, sites, labels, regions, is_alike)
 
     def cloud(self, client: Client) -> Cloud:
         """Returns it as a cloud of a replica, with these sides."""
@@ -157,24 +183,24 @@ class Settled:
         return self.tile.index[shared], self.labels[shared]
 
 
-def settle(
-    replicas: Replicas, tile: Tile, coarse: Coarse, learned: Learned, more: Sequence[Part], sites: Ints, spare: Part
-) -> Settled:
+def settle(replicas: Replicas, tile: Tile, learning: Learning) -> Settled:
     """Prepares a tile on its replica, with more of the sample where it would learn something else without."""
 
     def call(client: Client) -> Settled:
-        candidate, directions = tile, coarse.directions(client, tile.points)
-        for carried in [*more, None]:
-            is_alike = learned.is_like(_learned(client.cloud(candidate.points, directions)))
+        candidate, directions = tile, learning.coarse.directions(client, tile.points)
+        for carried in [*learning.more, None]:
+            learned = _learned(client.cloud(candidate.points, directions), learning.sites.points)
+            is_alike = learning.learned.is_like(learned)
             if is_alike or carried is None:
-                return Settled.of(client, candidate, directions, coarse, is_alike)
-            candidate = widened(tile, carried, sites, spare)
-            directions = coarse.directions(client, candidate.points)
+                return Settled.of(client, candidate, directions, learning, is_alike)
+            candidate = widened(tile, carried)
+            directions = learning.coarse.directions(client, candidate.points)
         raise AssertionError("the last one is taken as it is")
 
     return replicas.ask(tile.number, call)
 
 
-def _learned(cloud: Cloud) -> Learned:
-    used = cloud.normals(cloud.points[:1] if cloud.points is not None else None, solver="local").diagnostics
+def _learned(cloud: Cloud, sites: Array) -> Learned:
+    first = cloud.points[:1] if cloud.points is not None else None
+    used = cloud.normals(first, solver="local", sites=sites).diagnostics
     return Learned(float(used.alpha or 0) ** 0.5, float(used.kernel.length_scale or 0))

@@ -1,4 +1,4 @@
-"""Fewer points, spread as the cloud is: those that the service would choose of it."""
+"""Fewer points, spread as the cloud is."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Tiles: the points of a cell, those around it that its answers depend on, and what the service decides by.
 
-Local regressions learn how noise relates to shape from the neighbourhoods of about 96 points, every (n/96)-th of the
-cloud. So that a tile learns the same, it has all of these neighbourhoods, with the same points at every (n/96)-th place
-of its own. The bounding box, beside which surfaces count as flat, is that of the cloud by the points that span it.
+Local regressions learn how noise relates to shape at sites, some points of the cloud. So that a tile learns the same,
+it has the neighbourhoods of all of them, and tells the service where they are. The bounding box, beside which surfaces
+count as flat, is that of the cloud by the points that span it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy.typing as npt
 from ..tensors import Array
 from .cut import Ints
 from .parts import Part, join
-from .plan import N_SITES
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Tile:
     number
         That of the cell.
     index
-        `[n]`. Rows of the points in the cloud.
+        `[n]`, ascending. Rows of the points in the cloud.
     points
         `[n, d]`, L.
     own
@@ -49,9 +48,7 @@ class Tile:
         return self.index[self.own]
 
 
-def assemble(
-    number: int, core: Part, rims: Sequence[Part], carried: Part, sites: Ints, spare: Part, least: int = 0
-) -> Tile:
+def assemble(number: int, core: Part, rims: Sequence[Part], carried: Part) -> Tile:
     """Puts a tile together.
 
     Parameters
@@ -63,54 +60,18 @@ def assemble(
     rims : sequence of Part
         Those of other cells that its answers depend on.
     carried : Part
-        What all tiles have, the sites among them.
-    sites : `[s]`
-        Rows in the cloud of the points that are to be every (n/96)-th of the tile.
-    spare : Part
-        Points that may be added, for the tile to have a number of points with as many such places.
-    least : int
-        Points that it is to have, if there are so many.
+        What all tiles have.
     """
     near = join([core, *rims])
-    return _arranged(number, join([near, carried]), (core.index, near.index), sites, spare, least)
+    return _of(number, join([near, carried]), core.index, near.index)
 
 
-def widened(tile: Tile, carried: Part, sites: Ints, spare: Part) -> Tile:
+def widened(tile: Tile, carried: Part) -> Tile:
     """Returns a tile that carries more."""
-    order = np.argsort(tile.index)
-    whole = join([Part(tile.index[order], tile.points[order]), carried])
-    return _arranged(tile.number, whole, (tile.rows, tile.index[tile.is_near]), sites, spare, 0)
+    whole = join([Part(tile.index, tile.points), carried])
+    return _of(tile.number, whole, tile.rows, tile.index[tile.is_near])
 
 
-def _arranged(number: int, whole: Part, members: tuple[Ints, Ints], sites: Ints, spare: Part, least: int) -> Tile:
-    """Adds spare points, and puts the sites to their places; members are the rows of the cell, and those near it."""
-    missing = _wanted(max(len(whole), least), len(sites)) - len(whole)
-    if missing:
-        others = spare[np.flatnonzero(~np.isin(spare.index, whole.index))]
-        whole = join([whole, others[np.arange(min(missing, len(others)))]])
-    order = _with_sites(whole, sites)
-    index = whole.index[order]
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    own, near = members
-    return Tile(number, index, whole.points[order], place[np.searchsorted(whole.index, own)], np.isin(index, near))
-
-
-def _wanted(n_points: int, n_sites: int) -> int:
-    """Returns the least number of points from this one on of which every (n/96)-th are so many."""
-    candidates = range(n_points, n_points + 2 * N_SITES)
-    return next((n for n in candidates if -(-n // max(n // N_SITES, 1)) == n_sites), n_points)
-
-
-def _with_sites(whole: Part, sites: Ints) -> Ints:
-    """Returns the rows in the order of the cloud, but for those of the sites, which are at every (n/96)-th place."""
-    n = len(whole)
-    places = np.arange(0, n, max(n // N_SITES, 1))
-    rows = np.searchsorted(whole.index, sites)
-    if len(places) != len(rows):  # no spare points were left; what is learned is then a little different
-        return np.arange(n)
-    order = np.empty(n, dtype=np.int64)
-    is_site, is_place = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    is_site[rows], is_place[places] = True, True
-    order[places], order[~is_place] = rows, np.flatnonzero(~is_site)
-    return order
+def _of(number: int, whole: Part, own: Ints, near: Ints) -> Tile:
+    """Returns the tile of these points, with the rows of its cell and of those near it."""
+    return Tile(number, whole.index, whole.points, np.searchsorted(whole.index, own), np.isin(whole.index, near))

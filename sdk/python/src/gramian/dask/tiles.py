@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..fit import KernelLike, Mean, Number, ValuesFit
 from ..keywords import suggest_names
+from ..tensors import Array
 from . import answers, graph, kriging, parts, requests
 from .gathering import gathered
 from .plan import Plan
@@ -27,9 +28,10 @@ class Tiles:
     (`dask.compute(answer, retries=3)`) and its dashboard. Ask for several things in one `dask.compute`, and each tile
     is cut once.
 
-    Answers are those of one request for all points with `solver="local"`, up to ties of distance and the sides of
-    single points. Where the cloud has so much noise that the service regresses on means of points, these are means of
-    other points, and answers differ as those of two samples do, by less than their deviations at most points.
+    Answers are those of one request for all points with `solver="local"` and the `sites` of the tiles, up to ties of
+    distance and the sides of single points. Where the cloud has so much noise that the service regresses on means of
+    points, these are means of other points, and answers differ as those of two samples do, by less than their
+    deviations at most points.
 
     Attributes
     ----------
@@ -52,6 +54,11 @@ class Tiles:
     def n_tiles(self) -> int:
         """The number of tiles."""
         return self.plan.cut.n_cells
+
+    @property
+    def sites(self) -> Array:
+        """Where all tiles learn noise and shape of the surface, `[s, d]`, L."""
+        return self.plan.sites.points
 
     def cells(self) -> da.Array:
         """Says in which tile each point is, `[n]`, from 0."""
@@ -89,7 +96,7 @@ class Tiles:
         """Kriges values at queries, each from the 128 points nearest to it.
 
         Kernel, noise and mean are one for all tiles. What is not given (a length scale, `alpha`, the coefficients of a
-        mean) is learned here and now, from up to 256 values: those that the service would look at if it had all.
+        mean) is learned here and now, from up to 256 values, where the service would look at all.
 
         Parameters
         ----------

@@ -7,7 +7,7 @@ use crate::numerics::observer::Unobserved;
 use crate::numerics::points::sampling::Sampling;
 use crate::numerics::surface::Surface;
 use crate::numerics::surface::geometry::GeometryRequest;
-use crate::numerics::surface::local::LocalSurface;
+use crate::numerics::surface::local::{Given, LocalSurface};
 use crate::numerics::testing::{Random, circle, fibonacci_sphere};
 
 /// The operators over the points of a cloud.
@@ -19,7 +19,7 @@ pub(super) struct Operators {
 pub(super) fn operators(cloud: &Cloud) -> Operators {
     let cloud = Arc::new(cloud.clone());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), None, &Unobserved).unwrap();
+    let surface = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), &Unobserved).unwrap();
     let surface = Surface::from(surface);
     let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     let tree = sampling.neighbours();

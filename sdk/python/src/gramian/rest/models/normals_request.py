@@ -42,6 +42,10 @@ class NormalsRequest:
         surface (SurfaceChoice | Unset): Which function's level surface is meant.
         orientation (OrientationChoice | Unset): Which way normals point.
         include (list[GeometryInclude] | Unset): What is wanted beside what every answer has.
+        sites (list[list[float]] | Unset): Where `"solver": "local"` learns noise and shape of the surface, at most 192
+            positions; 96 to 191
+            points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+            learn the same.
     """
 
     cloud: CloudRef
@@ -54,6 +58,7 @@ class NormalsRequest:
     surface: SurfaceChoice | Unset = UNSET
     orientation: OrientationChoice | Unset = UNSET
     include: list[GeometryInclude] | Unset = UNSET
+    sites: list[list[float]] | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -101,6 +106,14 @@ class NormalsRequest:
                 include_item = include_item_data.value
                 include.append(include_item)
 
+        sites: list[list[float]] | Unset = UNSET
+        if not isinstance(self.sites, Unset):
+            sites = []
+            for sites_item_data in self.sites:
+                sites_item = sites_item_data
+
+                sites.append(sites_item)
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -126,6 +139,8 @@ class NormalsRequest:
             field_dict["orientation"] = orientation
         if include is not UNSET:
             field_dict["include"] = include
+        if sites is not UNSET:
+            field_dict["sites"] = sites
 
         return field_dict
 
@@ -194,6 +209,15 @@ class NormalsRequest:
 
                 include.append(include_item)
 
+        _sites = d.pop("sites", UNSET)
+        sites: list[list[float]] | Unset = UNSET
+        if _sites is not UNSET:
+            sites = []
+            for sites_item_data in _sites:
+                sites_item = cast(list[float], sites_item_data)
+
+                sites.append(sites_item)
+
         normals_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -205,6 +229,7 @@ class NormalsRequest:
             surface=surface,
             orientation=orientation,
             include=include,
+            sites=sites,
         )
 
         return normals_request

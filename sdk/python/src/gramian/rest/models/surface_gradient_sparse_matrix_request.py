@@ -40,6 +40,10 @@ class SurfaceGradientSparseMatrixRequest:
         geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
             the values. What is absent is as in
             the request.
+        sites (list[list[float]] | Unset): Where `"solver": "local"` learns noise and shape of the surface, at most 192
+            positions; 96 to 191
+            points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+            learn the same.
     """
 
     cloud: CloudRef
@@ -50,6 +54,7 @@ class SurfaceGradientSparseMatrixRequest:
     duplicates: DuplicatePolicy | Unset = UNSET
     queries: list[list[float]] | Unset = UNSET
     geometry: Geometry | Unset = UNSET
+    sites: list[list[float]] | Unset = UNSET
 
     __repr__ = without_unset
 
@@ -86,6 +91,14 @@ class SurfaceGradientSparseMatrixRequest:
         if not isinstance(self.geometry, Unset):
             geometry = self.geometry.to_dict()
 
+        sites: list[list[float]] | Unset = UNSET
+        if not isinstance(self.sites, Unset):
+            sites = []
+            for sites_item_data in self.sites:
+                sites_item = sites_item_data
+
+                sites.append(sites_item)
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -107,6 +120,8 @@ class SurfaceGradientSparseMatrixRequest:
             field_dict["queries"] = queries
         if geometry is not UNSET:
             field_dict["geometry"] = geometry
+        if sites is not UNSET:
+            field_dict["sites"] = sites
 
         return field_dict
 
@@ -160,6 +175,15 @@ class SurfaceGradientSparseMatrixRequest:
         else:
             geometry = Geometry.from_dict(_geometry)
 
+        _sites = d.pop("sites", UNSET)
+        sites: list[list[float]] | Unset = UNSET
+        if _sites is not UNSET:
+            sites = []
+            for sites_item_data in _sites:
+                sites_item = cast(list[float], sites_item_data)
+
+                sites.append(sites_item)
+
         surface_gradient_sparse_matrix_request = cls(
             cloud=cloud,
             kernel=kernel,
@@ -169,6 +193,7 @@ class SurfaceGradientSparseMatrixRequest:
             duplicates=duplicates,
             queries=queries,
             geometry=geometry,
+            sites=sites,
         )
 
         return surface_gradient_sparse_matrix_request
