@@ -22,8 +22,8 @@ def n_coarse(n_points: int) -> int:
 def thinned(points: Array, count: int) -> Ints:
     """Chooses `count` of the points `[n, d]`, one for each of as many parts with equally many points; ascending.
 
-    Parts come about by halving across the widest side; of each it is the point in the middle. Points with the same
-    coordinate are in the order of their indices.
+    Parts come about by halving along the line between two points that are far apart; of each it is the point in the
+    middle. Where several are there, they are in the order of their indices.
     """
     if count >= len(points):
         return np.arange(len(points))
@@ -31,8 +31,7 @@ def thinned(points: Array, count: int) -> Ints:
     waiting = [(np.arange(len(points)), max(count, 1))]
     while waiting:
         rows, wanted = waiting.pop()
-        axis = int(np.argmax(np.ptp(points[rows], axis=0)))
-        along = points[rows, axis]
+        along = _along(points[rows])
         middle = (len(rows) - 1) // 2
         at = np.partition(along, middle)[middle]
         is_left, equal = along < at, np.flatnonzero(along == at)
@@ -44,6 +43,19 @@ def thinned(points: Array, count: int) -> Ints:
         parts = ((rows[is_left], (wanted + 1) // 2), (rows[~is_left], wanted // 2))
         waiting += [(part, share) for part, share in parts if len(part) and share]
     return np.sort(np.array(chosen, dtype=np.int64))
+
+
+def _along(points: Array) -> Array:
+    """Returns where points `[n, d]` come along a line between two that are far apart."""
+    start = points[_squares(points - points.mean(axis=0)).argmax()]
+    end = points[_squares(points - start).argmax()]
+    places: Array = (points - start) @ (end - start)
+    return places
+
+
+def _squares(arms: Array) -> Array:
+    squares: Array = np.einsum("ij,ij->i", arms, arms)
+    return squares
 
 
 def distinct(points: Array) -> Ints:
