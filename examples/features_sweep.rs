@@ -76,5 +76,7 @@ fn main() {
 
 fn cell(bands: &Bands) -> String {
     let inside = bands.inside.map_or(String::new(), |inside| format!("{inside:.0} %, "));
-    format!("{:.1} %, {inside}{:.3}", bands.coverage, bands.error)
+    let misfits =
+        if bands.misfits > 0.0 { format!(", {:.0} %", 100.0 * bands.misfits) } else { String::new() };
+    format!("{:.1} %, {inside}{:.3}{misfits}", bands.coverage, bands.error)
 }

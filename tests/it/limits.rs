@@ -115,7 +115,7 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
 
 /// A row is counted, not kept: a batch of a million rows would otherwise take four times its body.
 #[tokio::test]
-async fn lists_of_values_and_quantiles_beyond_the_limits_are_refused() {
+async fn lists_of_values_quantiles_and_sites_beyond_the_limits_are_refused() {
     let server = Server::with_flags(&["--max-points", "20"]).await;
     let batch = json!({
         "cloud": {"points": fibonacci_sphere(20)}, "kernel": {"family": "laplace", "epsilon": 1},
@@ -134,6 +134,10 @@ async fn lists_of_values_and_quantiles_beyond_the_limits_are_refused() {
         refuses(path, "values", json!(vec![vec![1.0; 20]; 21]), "/values", 20, 21).await;
     }
     refuses("/v1/posterior/batch", "quantiles", json!(vec![0.5; 1001]), "/quantiles", 1000, 1001).await;
+    let sites = vec![[0.0; 3]; 193];
+    let body = json!({"cloud": batch["cloud"], "solver": "local", "sites": sites});
+    let problem = server.post("/v1/normals", &body).await.expect_problem(413, "problem-too-large");
+    assert_eq!((&problem["limit"], &problem["errors"][0]["pointer"]), (&json!(192), &json!("/sites")));
 }
 
 #[tokio::test]

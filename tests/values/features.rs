@@ -7,7 +7,7 @@ use std::sync::Arc;
 use gramian::numerics::points::cloud::Cloud;
 
 use crate::common::random::Random;
-use crate::posterior::{By, posterior};
+use crate::posterior::{By, Posterior, posterior};
 
 /// Queries all over, and as many inside of what is special about the field.
 const N_QUERIES: usize = 200;
@@ -49,6 +49,8 @@ pub struct Bands {
     pub coverage: f64,
     pub inside: Option<f64>,
     pub error: f64,
+    /// Share of the clouds whose values were said to contradict them.
+    pub misfits: f64,
 }
 
 impl Bands {
@@ -65,10 +67,11 @@ impl Measured {
         let mut sum = Bands::default();
         let (mut n_inside, mut squares) = (0.0, 0.0);
         for seed in 0..n_seeds {
-            let (coverage, inside, square) = self.draw(by, seed);
-            sum.coverage += coverage / n_seeds as f64;
-            squares += square / n_seeds as f64;
-            if let Some(inside) = inside {
+            let of_seed = self.draw(by, seed);
+            sum.coverage += of_seed.coverage / n_seeds as f64;
+            sum.misfits += of_seed.misfits / n_seeds as f64;
+            squares += of_seed.error.powi(2) / n_seeds as f64;
+            if let Some(inside) = of_seed.inside {
                 n_inside += 1.0;
                 sum.inside = Some(sum.inside.unwrap_or(0.0) + inside);
             }
@@ -76,7 +79,7 @@ impl Measured {
         Bands { inside: sum.inside.map(|all| all / n_inside), error: f64::sqrt(squares), ..sum }
     }
 
-    fn draw(&self, by: By, seed: usize) -> (f64, Option<f64>, f64) {
+    fn draw(&self, by: By, seed: usize) -> Bands {
         let mut random = Random((7919 * seed + self.n_points) as u64 + 1);
         let waves = Waves::of(self.feature, &mut random);
         let places = |n: usize, random: &mut Random| -> Vec<Vec<f64>> {
@@ -100,8 +103,8 @@ impl Measured {
         }
         let dimension = points[0].len();
         let cloud = Arc::new(Cloud::new(points.concat(), dimension).unwrap());
-        let (means, variances) =
-            posterior(by, cloud, &values, &Cloud::new(queries.concat(), dimension).unwrap());
+        let at_queries = Cloud::new(queries.concat(), dimension).unwrap();
+        let Posterior { means, variances, has_misfit } = posterior(by, cloud, &values, &at_queries);
         let errors: Vec<f64> = queries.iter().zip(&means).map(|(x, mean)| mean - at(x)).collect();
         let is_within = |k: usize| errors[k].abs() <= 1.96 * variances[k].sqrt();
         let covered = |range: std::ops::Range<usize>| {
@@ -109,7 +112,12 @@ impl Measured {
         };
         let square = errors[..N_QUERIES].iter().map(|e| (e / spread).powi(2)).sum::<f64>() / N_QUERIES as f64;
         let inside = (queries.len() > N_QUERIES).then(|| covered(N_QUERIES..queries.len()));
-        (covered(0..N_QUERIES), inside, square)
+        Bands {
+            coverage: covered(0..N_QUERIES),
+            inside,
+            error: square.sqrt(),
+            misfits: f64::from(u8::from(has_misfit)),
+        }
     }
 }
 

@@ -92,17 +92,25 @@ impl Sensors {
         let truth: Vec<f64> = truth.collect();
         let (cloud, at) = (Arc::new(Cloud::new(points, d).unwrap()), Cloud::new(queries, d).unwrap());
 
-        let (found, latent) = posterior(by, cloud, &values, &at);
+        let Posterior { means: found, variances, .. } = posterior(by, cloud, &values, &at);
         let within = |((f, t), v): ((&f64, &f64), &f64)| (f - t).abs() <= 1.96 * v.sqrt();
-        let n_within = found.iter().zip(&truth).zip(&latent).filter(|&entry| within(entry)).count();
+        let n_within = found.iter().zip(&truth).zip(&variances).filter(|&entry| within(entry)).count();
         let unit = self.factor * spread;
         (n_within, found.iter().zip(&truth).map(|(f, t)| ((f - t) / unit).powi(2)).sum())
     }
 }
 
-/// Means and latent variances at queries.
-pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> (Vec<f64>, Vec<f64>) {
-    let (kernel, ratio, variance) = chosen(by, &cloud, values);
+/// What is said at queries.
+pub struct Posterior {
+    pub means: Vec<f64>,
+    /// Of the function.
+    pub variances: Vec<f64>,
+    /// Whether the values contradict it.
+    pub has_misfit: bool,
+}
+
+pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Posterior {
+    let Chosen { kernel, ratio, variance, has_place } = chosen(by, &cloud, values);
     let alpha = Regularization::uniform(ratio).unwrap();
     let solver = System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved));
     let u = Interpolant::fit_with_mean(Arc::new(solver.unwrap()), values, Mean::Constant, &Unobserved);
@@ -110,17 +118,28 @@ pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> (Vec<
     let means = u.at(at, JetOrder::Value, &Unobserved).unwrap().values();
     let trend = u.solution.trend.as_ref();
     let variances = variances_with_mean(&u.solver, trend, at, &Unobserved).unwrap();
-    (means, variances.scaled(variance).latent)
+    let has_misfit = has_place || u.solution.disagreement(values.len(), variance).is_some();
+    Posterior { means, variances: variances.scaled(variance).latent, has_misfit }
 }
 
-/// A kernel of variance 1, the noise in its units, and the variance.
-fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> (Kernel, f64, f64) {
+struct Chosen {
+    /// Of variance 1.
+    kernel: Kernel,
+    /// Of noise to variance.
+    ratio: f64,
+    variance: f64,
+    /// Whether the values of some place contradict it.
+    has_place: bool,
+}
+
+fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let sampling = Spacings::of(cloud, &Unobserved).unwrap();
     let (noise, mean) = (Noise::Unknown, Mean::Constant);
     let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
     let By::Criterion(criterion) = by else {
         let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
-        return (kernel, learned.ratio, learned.variance);
+        let has_place = learned.disagreement.is_some_and(|found| found.place.is_some());
+        return Chosen { kernel, ratio: learned.ratio, variance: learned.variance, has_place };
     };
     let kernel = Kernel::new(learned.family, learned.length_scale, learned.variance).unwrap();
     let start = Hyperparameters::of(&kernel, Regularization::Uniform(learned.ratio * learned.variance));
@@ -147,5 +166,6 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> (Kernel, f64, f64) {
     let Regularization::Uniform(noise) = found.noise else { unreachable!("it was uniform") };
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
     // What a factorization of many points bears.
-    (kernel, (noise / found.variance).max(1e-10), found.variance)
+    let ratio = (noise / found.variance).max(1e-10);
+    Chosen { kernel, ratio, variance: found.variance, has_place: false }
 }

@@ -7,7 +7,7 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
-use crate::numerics::solver::{Disagreement, Outlier};
+use crate::numerics::solver::{Disagreement, Outlier, Place};
 use crate::numerics::surface::operators::{RowKind, Stencils};
 
 /// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
@@ -193,12 +193,16 @@ impl Diagnostics {
     /// Says how values contradict kernel and noise, with what helps.
     pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
-        let detail = match found.outlier {
-            Some(Outlier { point, deviations }) => format!(
+        let detail = match (found.outlier, found.place) {
+            (Some(Outlier { point, deviations }), _) => format!(
                 "the value of point {point} is {deviations:.1} deviations from what others say of it, and all are {spread:.1} in root mean \
                  square; {remedy}"
             ),
-            None => format!(
+            (None, Some(Place { point, n_points, deviations })) => format!(
+                "the {n_points} values around point {point} are {deviations:.1} deviations from what others say \
+                 of them in root mean square, and all are {spread:.1}; {remedy}"
+            ),
+            (None, None) => format!(
                 "values are {spread:.1} deviations from what others say of them in root mean square; {remedy}"
             ),
         };

@@ -279,15 +279,17 @@ impl Fitted {
         has_deviations: bool,
     ) {
         let plan = &self.plan;
-        let of_solution = |solution: &Solution| solution.disagreement(plan.fitted.n_points(), plan.scale);
-        let found = solution.map_or_else(|| plan.disagreement(), of_solution);
-        let Some(found) = found.filter(|_| plan.is_learned || has_deviations) else { return };
         // Learning sees the points as they were sent, a solver sees them merged.
-        let merge = plan.merge.as_ref().filter(|_| solution.is_some());
-        let as_sent = |point: usize| merge.map_or(point, |merge| merge.first_point(point));
-        let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });
+        let as_sent = |point: usize| plan.merge.as_ref().map_or(point, |merge| merge.first_point(point));
+        let of_solution = solution.and_then(|solution| {
+            let found = solution.disagreement(plan.fitted.n_points(), plan.scale)?;
+            let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });
+            Some(Disagreement { outlier, ..found })
+        });
+        let found = of_solution.or_else(|| plan.disagreement());
+        let Some(found) = found.filter(|_| plan.is_learned || has_deviations) else { return };
         let remedy = if plan.is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
-        diagnostics.warn_of_misfit(Disagreement { outlier, ..found }, remedy);
+        diagnostics.warn_of_misfit(found, remedy);
     }
 
     /// Warnings that are known before anything is solved.

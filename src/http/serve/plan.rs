@@ -333,9 +333,11 @@ impl FitPlan {
         self.learned_of_moving()?.trend.as_ref()
     }
 
-    /// How such values contradict kernel and noise.
+    /// How values contradict kernel and noise, as far as that was seen when they were learned from: of values
+    /// that a solver sees all at once, it says the rest.
     pub fn disagreement(&self) -> Option<Disagreement> {
-        self.learned_of_moving()?.disagreement
+        let found = self.learned.as_ref()?.disagreement?;
+        (self.learned_of_moving().is_some() || found.place.is_some()).then_some(found)
     }
 
     /// Whether the values are so small that their variance is taken to be greater than it is.

@@ -72,11 +72,33 @@ fn suspects(solver: &Solver, weights: &[f64]) -> Vec<usize> {
     points
 }
 
+/// Near values that are together farther off than chance has it, though none of them alone is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The one that is farthest off.
+    pub point: usize,
+    pub n_points: usize,
+    /// How far they are from what others say of them, in standard deviations, in root mean square but for the
+    /// one or two that are farthest off.
+    pub deviations: f64,
+}
+
+/// What may contradict kernel and noise.
+#[derive(Clone, Copy)]
+pub(in crate::numerics) struct Suspects {
+    /// The value that is farthest off.
+    pub(in crate::numerics) outlier: Option<Outlier>,
+    /// A place that is farther off than chance has it.
+    pub(in crate::numerics) place: Option<Place>,
+}
+
 /// How values contradict kernel and noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disagreement {
     /// The value that is farthest off, if one is by more than six deviations.
     pub outlier: Option<Outlier>,
+    /// The place that is farthest off, where places were looked at, if one is.
+    pub place: Option<Place>,
     /// Mean square of the values, each without what those before it say of it, in units of the deviations that
     /// these leave: 1 where kernel and noise are right.
     pub mean_square: f64,
@@ -84,14 +106,11 @@ pub struct Disagreement {
 
 impl Disagreement {
     /// What is found of values with so many degrees of freedom; `None` if that is no contradiction.
-    pub(in crate::numerics) fn of(
-        outlier: Option<Outlier>,
-        mean_square: f64,
-        n_degrees: usize,
-    ) -> Option<Self> {
-        let outlier = outlier.filter(|outlier| outlier.deviations > OUTLYING);
+    pub(in crate::numerics) fn of(suspects: Suspects, mean_square: f64, n_degrees: usize) -> Option<Self> {
+        let outlier = suspects.outlier.filter(|outlier| outlier.deviations > OUTLYING);
         let most = MEAN_SQUARE + 5.0 * (2.0 / n_degrees as f64).sqrt();
-        (outlier.is_some() || mean_square > most).then_some(Self { outlier, mean_square })
+        let found = Self { outlier, place: suspects.place, mean_square };
+        (outlier.is_some() || found.place.is_some() || mean_square > most).then_some(found)
     }
 }
 
@@ -101,7 +120,8 @@ impl Solution {
         let n_functions = self.trend.as_ref().map_or(0, |trend| trend.basis().n_functions());
         let n_degrees = n_points.checked_sub(n_functions).filter(|&n_degrees| n_degrees > 0)?;
         let scaled = |outlier: Outlier| Outlier { deviations: outlier.deviations / scale.sqrt(), ..outlier };
-        Disagreement::of(self.outlier.map(scaled), self.energy / scale / n_degrees as f64, n_degrees)
+        let suspects = Suspects { outlier: self.outlier.map(scaled), place: None };
+        Disagreement::of(suspects, self.energy / scale / n_degrees as f64, n_degrees)
     }
 }
 

@@ -11,7 +11,6 @@ use crate::http::serve::plan::PlannedFit;
 use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::numerics::error::NumericsError;
-use crate::numerics::patches::MAX_SITES;
 use crate::numerics::points::cloud::Cloud;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
@@ -51,15 +50,11 @@ impl Planner<'_> {
     /// Positions of the dimension of a cloud at which its surface is learned.
     ///
     /// # Errors
-    /// 422 for what is no list of points of this dimension, or too long.
+    /// 422 for what is no list of points of this dimension.
     pub(super) fn sites(&self, sites: Points, cloud: &Cloud) -> Result<Arc<Cloud>, Problem> {
         let sites = rectangular(sites, "/sites", Slug::InvalidRequest)?;
         if cloud.dimension() != sites.dimension() {
             return Err(dimension_mismatch("/sites", cloud.dimension(), &sites));
-        }
-        if sites.n_points() > MAX_SITES {
-            let detail = format!("at most {MAX_SITES} sites are learned at, found {}", sites.n_points());
-            return Err(Problem::invalid_request("/sites", detail));
         }
         Ok(Arc::new(sites))
     }

@@ -5,6 +5,7 @@ use crate::config::Config;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::numerics::observer::{Observer, Unobserved};
+use crate::numerics::patches::MAX_SITES;
 
 /// What to do about a body that is too large.
 pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
@@ -48,6 +49,7 @@ impl<'a> ParseContext<'a> {
         match list {
             List::Points | List::Numbers | List::ValueLists => self.max_points,
             List::Queries => self.max_queries,
+            List::Sites => MAX_SITES,
             List::Quantiles => MAX_QUANTILES,
             List::Coordinates | List::LengthScales => self.max_dimension,
             List::Other => usize::MAX,
@@ -64,6 +66,7 @@ impl<'a> ParseContext<'a> {
             (List::Numbers, _) => too_many_numbers(limit, length),
             (List::ValueLists, _) => too_many_value_lists(limit, length),
             (List::LengthScales, _) => too_many_length_scales(limit, length),
+            (List::Sites, _) => too_many_sites(limit, length),
             (List::Quantiles, _) => too_many_quantiles(limit, length),
             (List::Points | List::Coordinates | List::Other, _) => too_many_points(limit, length),
         };
@@ -78,6 +81,8 @@ pub(super) enum List {
     Points,
     /// Rows where answers are wanted.
     Queries,
+    /// Rows where a surface is learned.
+    Sites,
     /// One number for each point.
     Numbers,
     /// Rows of one number for each point.
@@ -97,6 +102,7 @@ impl List {
         match name {
             "points" | "normals" => Self::Points,
             "queries" => Self::Queries,
+            "sites" => Self::Sites,
             "values" | "noise_variances" => Self::Numbers,
             "quantiles" => Self::Quantiles,
             "length_scales" => Self::LengthScales,
@@ -112,7 +118,7 @@ impl List {
     /// What the entries of this list are.
     pub(super) fn of_entries(self) -> Self {
         match self {
-            Self::Points | Self::Queries => Self::Coordinates,
+            Self::Points | Self::Queries | Self::Sites => Self::Coordinates,
             Self::ValueLists => Self::Numbers,
             Self::Numbers | Self::Quantiles | Self::LengthScales | Self::Coordinates | Self::Other => {
                 Self::Other
@@ -184,6 +190,11 @@ fn too_many_length_scales(limit: usize, required: usize) -> Problem {
     )
 }
 
+fn too_many_sites(limit: usize, required: usize) -> Problem {
+    Problem::too_large(Slug::ProblemTooLarge, "sites", limit, Some(required))
+        .with_remedy("send some of them, spread over the surface: more would say the same")
+}
+
 fn too_many_quantiles(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "quantiles", limit, Some(required)).with_remedy(
         "ask for fewer: they are those of normal distributions, whose means and variances say everything",
@@ -246,6 +257,7 @@ mod tests {
                 "points",
                 "quantiles",
                 "queries",
+                "sites",
                 "values",
                 "values"
             ]

@@ -12,7 +12,7 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
 use crate::numerics::solver::trend::{Mean, Trend, solve_gram};
-use crate::numerics::solver::{Disagreement, Outlier};
+use crate::numerics::solver::{Disagreement, Outlier, Place, Suspects};
 
 /// Noise over variance that a mean is found with at least.
 const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
@@ -41,16 +41,23 @@ const RUNS: [Run; 2] =
     [Run { length: PLACE, n_left_out: 1, most: 2.9 }, Run { length: 2 * PLACE, n_left_out: 2, most: 2.1 }];
 
 impl Run {
-    /// The mean square of what is not left out over its bound; 0 for fewer values than three quarters of a
-    /// run.
-    fn excess(&self, values: &[f64]) -> f64 {
-        if 4 * values.len() < 3 * self.length {
-            return 0.0;
-        }
+    /// Whether there are enough values: three quarters of a run.
+    fn is_of(&self, values: &[f64]) -> bool {
+        4 * values.len() >= 3 * self.length
+    }
+
+    /// The squares of what is not left out, ascending.
+    fn squares(&self, values: &[f64]) -> Vec<f64> {
         let mut squares: Vec<f64> = values.iter().map(|z| z * z).collect();
         squares.sort_unstable_by(f64::total_cmp);
-        let rest = &squares[..squares.len() - self.n_left_out];
-        rest.iter().sum::<f64>() / rest.len() as f64 / self.most
+        squares.truncate(values.len() - self.n_left_out);
+        squares
+    }
+
+    /// Their mean over its bound.
+    fn excess(&self, values: &[f64]) -> f64 {
+        let squares = self.squares(values);
+        squares.iter().sum::<f64>() / squares.len() as f64 / self.most
     }
 }
 
@@ -134,18 +141,40 @@ impl<'a> Evidence<'a> {
 
     /// The greatest of all runs: mean square over the bound.
     fn variance_of_places(&self, rest: &[f64]) -> f64 {
-        let n_rows = self.points.len();
-        let mut most = 0.0f64;
-        for list in rest.chunks_exact(n_rows) {
-            let mut following = list;
-            for group in &self.groups {
-                let (own, others) = following.split_at(group.n_responses());
-                following = others;
-                let runs = RUNS.iter().flat_map(|run| own.chunks(run.length).map(|part| run.excess(part)));
-                most = runs.fold(most, f64::max);
-            }
-        }
-        most
+        self.runs(rest).map(|(run, _, values)| run.excess(values)).fold(0.0, f64::max)
+    }
+
+    /// The runs of all groups and lists, each with the row where it begins and its values.
+    fn runs<'r>(&'r self, rest: &'r [f64]) -> impl Iterator<Item = (&'static Run, usize, &'r [f64])> {
+        let of_group = |begin: usize, own: &'r [f64]| {
+            let of_length = move |run: &'static Run| {
+                let begins = (begin..).step_by(run.length);
+                begins.zip(own.chunks(run.length)).map(move |(begin, values)| (run, begin, values))
+            };
+            RUNS.iter().flat_map(of_length).filter(|(run, _, values)| run.is_of(values))
+        };
+        let of_list = move |list: &'r [f64]| {
+            let begins = self.groups.iter().scan(0, |end, group| {
+                let begin = *end;
+                *end += group.n_responses();
+                Some(begin..*end)
+            });
+            begins.flat_map(move |rows| of_group(rows.start, &list[rows]))
+        };
+        rest.chunks_exact(self.points.len()).flat_map(of_list)
+    }
+
+    /// The run that is farthest off, if it is beyond its bound.
+    fn place(&self, rest: &[f64], in_deviations: f64) -> Option<Place> {
+        let runs = self.runs(rest).map(|run| (run.0.excess(run.2), run));
+        let (excess, (run, begin, values)) = runs.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let largest = (0..values.len()).max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()))?;
+        let mean_square = excess * run.most * in_deviations.powi(2);
+        (mean_square > run.most).then(|| Place {
+            point: self.points[begin + largest],
+            n_points: values.len(),
+            deviations: mean_square.sqrt(),
+        })
     }
 
     fn trend(&self, left: &Unexplained) -> Result<Trend, NumericsError> {
@@ -176,7 +205,8 @@ impl<'a> Evidence<'a> {
         let (at, largest) =
             rest.iter().map(|z| z.abs()).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let outlier = Outlier { point: self.points[at % n], deviations: largest * in_deviations };
-        Disagreement::of(Some(outlier), mean_square, n_degrees)
+        let place = self.place(rest, in_deviations);
+        Disagreement::of(Suspects { outlier: Some(outlier), place }, mean_square, n_degrees)
     }
 
     fn n_functions(&self) -> usize {

@@ -91,6 +91,20 @@ fn a_hot_spot_shortens_the_length_scale_and_outliers_do_not() {
 }
 
 #[test]
+fn a_place_that_no_length_scale_explains_is_named() {
+    let (cloud, plain) = field(1000, 0.01);
+    let place = |values: &[f64]| learned(&cloud, values, Noise::Unknown).disagreement?.place;
+    assert_eq!(place(&plain), None);
+    let is_above = |x: &[f64]| x[0] + 0.3 * x[1] > 0.0;
+    let step = plain.iter().zip(cloud.points()).map(|(value, x)| value + f64::from(u8::from(is_above(x))));
+    let found = place(&step.collect::<Vec<f64>>()).unwrap();
+    // Points are 0.11 apart.
+    let x = cloud.point(found.point);
+    assert!((x[0] + 0.3 * x[1]).abs() < 0.2, "{x:?}");
+    assert!((12..=32).contains(&found.n_points) && found.deviations > 1.4, "{found:?}");
+}
+
+#[test]
 fn few_values_and_equal_ones_decide_nothing() {
     let family = Family::Matern { order: 2 };
     for n in [1, 2, 7] {
