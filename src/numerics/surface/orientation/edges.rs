@@ -27,13 +27,8 @@ impl Edge {
     /// On one sheet `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b` for consistent normals; two sheets at a distance t have
     /// `D·ν_a ≈ D·ν_b ≈ t`.
     pub(super) fn between(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> Self {
-        let d = cloud.dimension();
-        let (normal_a, normal_b) = (&normals[a * d..][..d], &normals[b * d..][..d]);
-        let cosine = dot(normal_a, normal_b);
-        let (x, y) = (cloud.point(a), cloud.point(b));
-        let step = |normal: &[f64]| -> f64 { (0..d).map(|c| (y[c] - x[c]) * normal[c]).sum() };
-        let across = (step(normal_a) + cosine.signum() * step(normal_b)).abs();
-        let weight = cosine * cosine * (1.0 - 2.0 * across / squared_distance(x, y).sqrt());
+        let cosine = cosine(cloud, normals, a, b);
+        let weight = cosine * cosine * (1.0 - 2.0 * across(cloud, normals, a, b));
         Self { a, b, cosine, weight }
     }
 
@@ -41,6 +36,21 @@ impl Edge {
     pub(super) fn agreement(&self, signs: &[f64]) -> f64 {
         self.weight * (signs[self.a] * signs[self.b] * self.cosine).signum()
     }
+}
+
+/// `|D·ν_a ± D·ν_b| / |D|` of two points, with the sign that their normals have in common: 0 on a sphere.
+pub(super) fn across(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
+    let d = cloud.dimension();
+    let (x, y) = (cloud.point(a), cloud.point(b));
+    let step = |at: usize| -> f64 {
+        normals[at * d..][..d].iter().zip(x).zip(y).map(|((n, x), y)| n * (y - x)).sum()
+    };
+    (step(a) + cosine(cloud, normals, a, b).signum() * step(b)).abs() / squared_distance(x, y).sqrt()
+}
+
+fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
+    let d = cloud.dimension();
+    dot(&normals[a * d..][..d], &normals[b * d..][..d])
 }
 
 /// Neighbouring points between which the surface bends like a sphere, up to the sign of the normals; by their

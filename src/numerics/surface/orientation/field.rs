@@ -30,7 +30,12 @@ impl<'a> Field<'a> {
         }
         let scaled = sampled.cloud.coordinates().iter().map(|x| x / radius).collect();
         let cloud = Cloud::new(scaled, d).ok()?;
-        Some(Self { cloud, areas: areas(sampled, edges, radius), normals, observer: sampled.observer })
+        Some(Self {
+            cloud,
+            areas: areas(sampled, normals, edges, radius),
+            normals,
+            observer: sampled.observer,
+        })
     }
 
     pub(super) fn normal(&self, point: usize) -> &[f64] {

@@ -14,6 +14,7 @@
 //! 4. Points whose winding numbers or neighbours still contradict have an ambiguous side.
 
 mod areas;
+mod cell;
 mod consistent;
 mod edges;
 mod field;
