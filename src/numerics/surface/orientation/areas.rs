@@ -1,7 +1,9 @@
 //! The area of the surface that each point stands for.
 
+use rayon::prelude::*;
+
 use super::cell::Cell;
-use super::edges::{Edge, across};
+use super::edges::{Edge, across, edges_of};
 use super::{Sampled, n_neighbours};
 use crate::numerics::machine::vector::{dot, tangent_basis};
 use crate::numerics::points::cloud::squared_distance;
@@ -29,20 +31,15 @@ const REACH_OF_CELL: f64 = 0.75;
 /// Areas in units of radius^{d−1}, `[n]`, from the neighbours of each point on its sheet; `normals` are
 /// `[n, d]`.
 pub(super) fn areas(sampled: &Sampled<'_>, normals: &[f64], edges: &[Edge], radius: f64) -> Vec<f64> {
-    let n = sampled.cloud.n_points();
-    let mut areas = Vec::with_capacity(n);
-    let mut rest = edges;
-    for point in 0..n {
-        let (own, others) = rest.split_at(rest.iter().take_while(|edge| edge.a == point).count());
-        rest = others;
-        let place = Place { sampled, normals, point, own };
-        areas.push(match sampled.cloud.dimension() {
+    let area = |point: usize| {
+        let place = Place { sampled, normals, point, own: edges_of(edges, point) };
+        match sampled.cloud.dimension() {
             2 => place.length() / radius,
             3 => place.cell(radius),
             _ => place.area(radius),
-        });
-    }
-    areas
+        }
+    };
+    (0..sampled.cloud.n_points()).into_par_iter().map(area).collect()
 }
 
 /// A point with its edges.
