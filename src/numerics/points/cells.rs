@@ -3,6 +3,9 @@
 use super::cloud::{Cloud, squared_distance};
 use crate::numerics::machine::small::{Small, zeros};
 
+/// Points whose halves are split side by side.
+const SHARED: usize = 4096;
+
 /// Points in cells: halves of halves, each across where its points reach farthest, until none has more than a
 /// number of points.
 ///
@@ -17,8 +20,12 @@ pub(crate) struct Cells {
 impl Cells {
     /// Cells of at most `most` points each, of some points of a cloud.
     pub(crate) fn of(cloud: &Cloud, mut points: Vec<u32>, most: usize) -> Self {
-        let mut ends = Vec::with_capacity(2 * points.len() / most.max(1) + 1);
-        split(cloud, &mut points, most.max(1), &mut ends);
+        let mut ends = split(cloud, &mut points, most.max(1));
+        let mut end = 0;
+        for size in &mut ends {
+            end += *size;
+            *size = end;
+        }
         Self { points, ends }
     }
 
@@ -38,15 +45,19 @@ impl Cells {
     }
 }
 
-fn split(cloud: &Cloud, points: &mut [u32], most: usize, ends: &mut Vec<u32>) {
-    if points.len() <= most {
-        let before = ends.last().copied().unwrap_or(0);
-        ends.push(before + points.len() as u32);
-        return;
+/// Orders points cell by cell, and says how many each has.
+fn split(cloud: &Cloud, points: &mut [u32], most: usize) -> Vec<u32> {
+    let n = points.len();
+    if n <= most {
+        return vec![n as u32];
     }
-    let (left, right) = halve(cloud, points, points.len() / 2);
-    split(cloud, left, most, ends);
-    split(cloud, right, most, ends);
+    let (left, right) = halve(cloud, points, n / 2);
+    let (mut sizes, others) = match n > SHARED {
+        true => rayon::join(|| split(cloud, left, most), || split(cloud, right, most)),
+        false => (split(cloud, left, most), split(cloud, right, most)),
+    };
+    sizes.extend(others);
+    sizes
 }
 
 /// The first `middle` of some points and the others, in the order in which they come along the line between
