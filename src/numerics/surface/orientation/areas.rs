@@ -112,3 +112,42 @@ impl Place<'_> {
         0.5 * (first + behind.map_or(first, |step| dot(&step, &step).sqrt()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::super::edges::sheet_edges;
+    use super::*;
+    use crate::numerics::observer::Unobserved;
+    use crate::numerics::points::cloud::Cloud;
+    use crate::numerics::points::neighbourhoods::Neighbourhoods;
+    use crate::numerics::points::sampling::Sampling;
+    use crate::numerics::testing::{Random, fibonacci_sphere};
+
+    /// Areas on the unit sphere, and on one around it that is so far away.
+    fn areas_of_shells(distance: f64, roughness: f64) -> Vec<f64> {
+        let (inner, mut random) = (fibonacci_sphere(1000), Random(3));
+        let outer = inner.coordinates().iter().map(|c| c * (1.0 + distance));
+        let cloud = Cloud::new(inner.coordinates().iter().copied().chain(outer).collect(), 3).unwrap();
+        let rough = inner.points().chain(inner.points()).flat_map(|x| {
+            let moved: Vec<f64> = x.iter().map(|c| c + roughness * random.normal()).collect();
+            let length = dot(&moved, &moved).sqrt();
+            moved.into_iter().map(move |c| c / length)
+        });
+        let normals: Vec<f64> = rough.collect();
+        let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let around = Neighbourhoods::of(sampling.neighbours(), &cloud, 18, &Unobserved).unwrap();
+        let sampled = Sampled { cloud: &cloud, sampling: &sampling, around: &around, observer: &Unobserved };
+        areas(&sampled, &normals, &sheet_edges(&sampled, &normals), 1.0)
+    }
+
+    #[test]
+    fn areas_are_those_of_the_sphere_with_another_one_near_and_rough_normals() {
+        // Points are 0.11 apart; roughness of 0.2 is 11° in each direction.
+        for (distance, roughness, tolerance) in [(1.0, 0.0, 0.02), (0.15, 0.0, 0.02), (0.15, 0.2, 0.1)] {
+            let sum: f64 = areas_of_shells(distance, roughness)[..1000].iter().sum();
+            assert!((sum / (4.0 * PI) - 1.0).abs() < tolerance, "{distance} {roughness}: {sum}");
+        }
+    }
+}
