@@ -184,6 +184,10 @@ async fn what_local_regressions_lack_is_refused_by_name() {
             assert_eq!(problem["errors"][0]["pointer"], "/sites", "{path} {slug}");
         }
     }
+    let sites = [points[3], points[3], [1e3, 0.0, 0.0]];
+    let body = json!({"cloud": cloud, "solver": "local", "sites": sites});
+    let problem = server.post("/v1/normals", &body).await.expect_problem(422, "invalid-request");
+    assert_eq!(problem["errors"][0]["pointer"], "/sites/2");
     let body = json!({"cloud": cloud, "values": values, "solver": "local"});
     assert_eq!(numbers(&server.post("/v1/laplace-beltrami", &body).await.expect_ok()["values"]).len(), 60);
 }

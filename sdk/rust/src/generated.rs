@@ -238,8 +238,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
-points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
+191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
 learn the same.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
@@ -1404,8 +1404,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where rows are wanted; the points of the surface if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
-points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
+191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
 learn the same.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
@@ -1680,8 +1680,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where answers are wanted; the points of the cloud if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
-points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
+191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
 learn the same.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
@@ -2748,8 +2748,8 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///Where rows are wanted; the points of the surface if absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
-points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
+191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
 learn the same.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,

@@ -43,8 +43,8 @@ request! {
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
-        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 positions; 96 to 191
-        /// points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
+        /// 191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
         /// learn the same.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1, max_items = 192)]

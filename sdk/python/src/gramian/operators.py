@@ -201,8 +201,8 @@ class OperatorsOnCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
-            that it chooses if absent.
+            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
+            it chooses if absent.
 
         Returns
         -------
@@ -415,8 +415,8 @@ class OperatorsOnCloud(RegisteredCloud):
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 positions; points of the cloud
-            that it chooses if absent.
+            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
+            it chooses if absent.
 
         Returns
         -------

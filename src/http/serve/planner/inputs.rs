@@ -1,5 +1,6 @@
 //! Clouds, queries, values and normals of a request: what they are to be, and what is said where they are not.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::Planner;
@@ -47,14 +48,18 @@ impl Planner<'_> {
         Ok(Arc::new(queries))
     }
 
-    /// Positions of the dimension of a cloud at which its surface is learned.
+    /// Points of a cloud at which its surface is learned: nothing is learned where it is not.
     ///
     /// # Errors
-    /// 422 for what is no list of points of this dimension.
+    /// 422 for what is no list of points of the cloud.
     pub(super) fn sites(&self, sites: Points, cloud: &Cloud) -> Result<Arc<Cloud>, Problem> {
         let sites = rectangular(sites, "/sites", Slug::InvalidRequest)?;
         if cloud.dimension() != sites.dimension() {
             return Err(dimension_mismatch("/sites", cloud.dimension(), &sites));
+        }
+        if let Some(site) = first_elsewhere(&sites, cloud) {
+            let detail = format!("site {site} is none of the points of the cloud");
+            return Err(Problem::invalid_request(format!("/sites/{site}"), detail));
         }
         Ok(Arc::new(sites))
     }
@@ -136,6 +141,21 @@ impl Planner<'_> {
         }
         Ok((stored, is_new))
     }
+}
+
+/// The first of some sites that is at none of the points of a cloud.
+fn first_elsewhere(sites: &Cloud, cloud: &Cloud) -> Option<usize> {
+    let mut order: Vec<usize> = (0..sites.n_points()).collect();
+    // All coordinates are finite.
+    let along = |site: usize, x: &[f64]| sites.point(site).partial_cmp(x).unwrap_or(Ordering::Equal);
+    order.sort_by(|&a, &b| along(a, sites.point(b)));
+    let mut is_there = vec![false; sites.n_points()];
+    for x in cloud.points() {
+        let start = order.partition_point(|&site| along(site, x).is_lt());
+        let here = order[start..].iter().take_while(|&&site| along(site, x).is_eq());
+        here.for_each(|&site| is_there[site] = true);
+    }
+    is_there.iter().position(|is_there| !is_there)
 }
 
 /// 404 for an id that names no cloud of this owner.

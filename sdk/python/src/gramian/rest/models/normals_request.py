@@ -43,8 +43,8 @@ class NormalsRequest:
         orientation (OrientationChoice | Unset): Which way normals point.
         include (list[GeometryInclude] | Unset): What is wanted beside what every answer has.
         sites (list[list[float]] | Unset): Where `"solver": "local"` learns noise and shape of the surface, at most 192
-            positions; 96 to 191
-            points of the cloud if absent. Parts of one cloud with the same sites, and the points around them,
+            points of the cloud; 96 to
+            191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
             learn the same.
     """
 
