@@ -36,14 +36,14 @@ def main() -> None:
     print("| mesh | points | flagged | for its side | off | flipped | flipped, flagged ones too |\n" + "|---" * 7 + "|")
     dragon = Dragon(FOLDER)
     for level in (1, 2, 3, 4):
-        print(row(f"dragon {level}", dragon.mesh(level)), flush=True)
+        print(row(f"dragon {level}", *dragon.mesh(level)), flush=True)
     for surface in SURFACES:
-        print(row(surface.replace("_", " "), cortex(surface)), flush=True)
+        print(row(surface.replace("_", " "), *cortex(surface)), flush=True)
 
 
-def row(name: str, mesh: tuple[Floats, NDArray[np.int64]]) -> str:
+def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
     """Of the points whose faces agree; off and flipped are shares of the normals without a flag."""
-    points, sums, areas = of_mesh(*mesh)
+    points, sums, areas = of_mesh(vertices, faces)
     lengths = np.linalg.norm(sums, axis=1)
     is_known = (lengths >= AGREE * areas) & (areas > 0)
     expected = sums / np.where(lengths > 0, lengths, 1)[:, None]

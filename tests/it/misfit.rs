@@ -54,6 +54,26 @@ async fn one_wrong_value_is_named_whichever_solver_answers() {
 }
 
 #[tokio::test]
+async fn a_place_that_no_kernel_explains_is_named_whichever_solver_answers() {
+    let server = Server::start().await;
+    let points = fibonacci_sphere(1000);
+    // Noise of 1 %, cosines of large angles, and a step along a great circle, none of whose values is far out.
+    let noise = |i: usize| 0.01 * 2f64.sqrt() * (12.9898 * (i as f64 + 2.0).powi(2)).cos();
+    let across = |x: &[f64; 3]| x[0] + 0.3 * x[1];
+    for height in [0.0, 1.0] {
+        let step = |x: &[f64; 3]| if across(x) > 0.0 { height } else { 0.0 };
+        let values: Vec<f64> = points.iter().enumerate().map(|(i, x)| x[2] + noise(i) + step(x)).collect();
+        let body = json!({"cloud": {"points": points}, "values": values, "queries": [[1.0, 0.0, 0.0]]});
+        for solver in ["dense", "local"] {
+            let answer = server.post("/v1/posterior", &with(&body, json!({"solver": solver}))).await;
+            let found = misfits(&answer.expect_ok());
+            assert_eq!(found.len(), height as usize, "{solver}: {found:?}");
+            assert!(found.iter().all(|detail| detail.contains("values around point")), "{found:?}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     let server = Server::start().await;
     let given = json!({"kernel": {"family": "gauss", "length_scale": 1.0}, "alpha": 1e-8});

@@ -20,13 +20,12 @@ pub(crate) struct Cells {
 impl Cells {
     /// Cells of at most `most` points each, of some points of a cloud.
     pub(crate) fn of(cloud: &Cloud, mut points: Vec<u32>, most: usize) -> Self {
-        let mut ends = split(cloud, &mut points, most.max(1));
-        let mut end = 0;
-        for size in &mut ends {
-            end += *size;
-            *size = end;
-        }
-        Self { points, ends }
+        let sizes = split(cloud, &mut points, most.max(1));
+        let add = |end: &mut u32, size: u32| {
+            *end += size;
+            Some(*end)
+        };
+        Self { points, ends: sizes.into_iter().scan(0, add).collect() }
     }
 
     /// Cells of all points of a cloud.

@@ -28,7 +28,6 @@ pub(in crate::numerics) use dense::factorize_in_place;
 pub(crate) use dense::parallelism;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
 use kind::{Quantity, SolverKind};
-pub(in crate::numerics) use residuals::Suspects;
 pub use residuals::{Disagreement, Outlier, Place};
 pub(in crate::numerics) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;

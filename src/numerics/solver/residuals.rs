@@ -83,15 +83,6 @@ pub struct Place {
     pub deviations: f64,
 }
 
-/// What may contradict kernel and noise.
-#[derive(Clone, Copy)]
-pub(in crate::numerics) struct Suspects {
-    /// The value that is farthest off.
-    pub(in crate::numerics) outlier: Option<Outlier>,
-    /// A place that is farther off than chance has it.
-    pub(in crate::numerics) place: Option<Place>,
-}
-
 /// How values contradict kernel and noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disagreement {
@@ -105,12 +96,13 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
-    /// What is found of values with so many degrees of freedom; `None` if that is no contradiction.
-    pub(in crate::numerics) fn of(suspects: Suspects, mean_square: f64, n_degrees: usize) -> Option<Self> {
-        let outlier = suspects.outlier.filter(|outlier| outlier.deviations > OUTLYING);
+    /// What was found of values with so many degrees of freedom, with the outlier only if it is one; `None` if
+    /// that is no contradiction.
+    pub(in crate::numerics) fn if_any(self, n_degrees: usize) -> Option<Self> {
+        let outlier = self.outlier.filter(|outlier| outlier.deviations > OUTLYING);
         let most = MEAN_SQUARE + 5.0 * (2.0 / n_degrees as f64).sqrt();
-        let found = Self { outlier, place: suspects.place, mean_square };
-        (outlier.is_some() || found.place.is_some() || mean_square > most).then_some(found)
+        let is_any = outlier.is_some() || self.place.is_some() || self.mean_square > most;
+        is_any.then_some(Self { outlier, ..self })
     }
 }
 
@@ -120,8 +112,8 @@ impl Solution {
         let n_functions = self.trend.as_ref().map_or(0, |trend| trend.basis().n_functions());
         let n_degrees = n_points.checked_sub(n_functions).filter(|&n_degrees| n_degrees > 0)?;
         let scaled = |outlier: Outlier| Outlier { deviations: outlier.deviations / scale.sqrt(), ..outlier };
-        let suspects = Suspects { outlier: self.outlier.map(scaled), place: None };
-        Disagreement::of(suspects, self.energy / scale / n_degrees as f64, n_degrees)
+        let mean_square = self.energy / scale / n_degrees as f64;
+        Disagreement { outlier: self.outlier.map(scaled), place: None, mean_square }.if_any(n_degrees)
     }
 }
 

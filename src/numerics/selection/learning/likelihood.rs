@@ -12,7 +12,7 @@ use crate::numerics::kernel::Kernel;
 use crate::numerics::machine::vector::dot;
 use crate::numerics::observer::Observer;
 use crate::numerics::solver::trend::{Mean, Trend, solve_gram};
-use crate::numerics::solver::{Disagreement, Outlier, Place, Suspects};
+use crate::numerics::solver::{Disagreement, Outlier, Place};
 
 /// Noise over variance that a mean is found with at least.
 const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
@@ -206,7 +206,7 @@ impl<'a> Evidence<'a> {
             rest.iter().map(|z| z.abs()).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let outlier = Outlier { point: self.points[at % n], deviations: largest * in_deviations };
         let place = self.place(rest, in_deviations);
-        Disagreement::of(Suspects { outlier: Some(outlier), place }, mean_square, n_degrees)
+        Disagreement { outlier: Some(outlier), place, mean_square }.if_any(n_degrees)
     }
 
     fn n_functions(&self) -> usize {

@@ -71,8 +71,12 @@ impl Place<'_> {
             let along =
                 |row: &[f64]| -> f64 { row.iter().zip(x).zip(y).map(|((t, x), y)| t * (y - x)).sum() };
             let [u, v] = [along(&basis[..d]), along(&basis[d..])];
-            let stretch = found.squared_distance.sqrt() / u.hypot(v).max(f64::MIN_POSITIVE) / reach;
-            cell.cut([u * stretch, v * stretch]);
+            let length = u.hypot(v);
+            // One straight above, of a point without a normal, has no direction in the plane.
+            if length > 0.0 {
+                let stretch = found.squared_distance.sqrt() / length / reach;
+                cell.cut([u * stretch, v * stretch]);
+            }
         }
         cell.area() * (reach / radius).powi(2)
     }

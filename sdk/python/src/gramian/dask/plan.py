@@ -18,7 +18,7 @@ MAX_SAMPLE = 2_000_000
 """Points that cells and coarse cloud are chosen from, at most: as many as a server takes in one request."""
 
 N_SITES = 96
-"""Neighbourhoods that tiles learn from, or less than twice as many, which is what the service takes at most."""
+"""Sites of a large cloud, or one more; a small one has up to 191, and the service takes 192 at most."""
 
 PROBE_POINTS = 60_000
 """Points of the cloud that is asked what all learn, at most; one of no more is asked itself."""
