@@ -5,6 +5,7 @@
 
 #![allow(clippy::disallowed_methods)]
 
+#[path = "../numerics/benches/support/mod.rs"]
 mod support;
 
 use std::hint::black_box;

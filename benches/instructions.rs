@@ -3,6 +3,7 @@
 //! `cargo bench --bench instructions -- PART` runs one part once; without a name all of them, and lists their names. Only
 //! what happens inside [`measured`] is counted. Everything runs on one thread, the calling one, so that callgrind sees it.
 
+#[path = "../numerics/benches/support/mod.rs"]
 mod support;
 
 use std::hint::black_box;
@@ -13,17 +14,17 @@ use gramian::http::wire::read::limits::ParseContext;
 use gramian::http::wire::read::parse::parse_json;
 use gramian::http::wire::read::points::Points;
 use gramian::http::wire::write::array::Array;
-use gramian::numerics::function::posterior;
-use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::machine::instruction_set::InstructionSet;
-use gramian::numerics::observer::{Observer, Stage, Unobserved};
-use gramian::numerics::points::sampling::Sampling;
-use gramian::numerics::solver::{Solution, Solver, System};
-use gramian::numerics::sums::jets::{JetOrder, Jets};
-use gramian::numerics::sums::nodes::Nodes;
-use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::Surface;
 use gramian::store::key::CloudId;
+use gramian_numerics::function::posterior;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::machine::instruction_set::InstructionSet;
+use gramian_numerics::observer::{Observer, Stage, Unobserved};
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::solver::{Solution, Solver, System};
+use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::sums::nodes::Nodes;
+use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::Surface;
 use support::common::clouds::fibonacci_sphere;
 use support::common::fits;
 use support::scattered;

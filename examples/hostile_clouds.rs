@@ -11,7 +11,7 @@ use gramian::server::serve;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../numerics/tests/common/mod.rs"]
 mod common;
 
 use common::hostile::{HOSTILE, Hostile};

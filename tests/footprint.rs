@@ -2,25 +2,26 @@
 //!
 //! One test alone in its process: the resident set is everybody's.
 
+#[path = "../numerics/tests/common/mod.rs"]
 mod common;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use gramian::numerics::error::NumericsError;
-use gramian::numerics::kernel::{Family, Kernel};
-use gramian::numerics::observer::Unobserved;
-use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::points::sampling::Sampling;
-use gramian::numerics::solver::choose::choose;
-use gramian::numerics::solver::kind::SolverKind;
-use gramian::numerics::solver::{Solution, Solver, System};
-use gramian::numerics::sums::regularization::Regularization;
-use gramian::numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::key::{CloudId, FitKey, ValuesKey};
 use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::solver::choose::choose;
+use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::solver::{Solution, Solver, System};
+use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 
 use crate::common::clouds::fibonacci_sphere;
 use crate::common::fits;

@@ -19,7 +19,7 @@ use gramian::http::wire::read::members::{
     object, present, present_object, present_unless_empty, present_word, present_words,
 };
 use gramian::http::wire::read::points::Points;
-use gramian::numerics::observer::Unobserved;
+use gramian_numerics::observer::Unobserved;
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;
 use safetensors::Dtype;

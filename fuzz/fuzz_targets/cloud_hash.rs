@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use gramian::numerics::points::cloud::Cloud;
+use gramian_numerics::points::cloud::Cloud;
 use gramian::store::Owner;
 use gramian::store::clouds::CloudStore;
 use gramian::store::key::CloudId;

@@ -5,7 +5,7 @@ use super::routes::estimate;
 use super::wire::negotiation::{Coding, Format};
 use super::wire::read::body::RequestBody;
 use super::wire::read::limits::ParseContext;
-use crate::numerics::observer::Unobserved;
+use gramian_numerics::observer::Unobserved;
 
 /// Operations that compute, by name; every other name is the registration of a cloud.
 pub const OPERATIONS: &[&str] = estimate::NAMES;

@@ -3,11 +3,11 @@
 use std::fmt;
 
 use super::Owner;
-use crate::numerics::kernel::{Family, Kernel};
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::kind::SolverKind;
-use crate::numerics::solver::trend::Mean;
-use crate::numerics::sums::regularization::Regularization;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::sums::regularization::Regularization;
 
 /// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
 /// likewise if given; written as 64 hexadecimal digits.

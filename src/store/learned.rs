@@ -6,8 +6,8 @@ use super::Owner;
 use super::fair_cache::FairCache;
 use super::key::{CloudId, ValuesKey};
 use super::single_flight::SingleFlight;
-use crate::numerics::machine::heap::{arc_payload, block_bytes};
-use crate::numerics::selection::Learned;
+use gramian_numerics::machine::heap::{arc_payload, block_bytes};
+use gramian_numerics::selection::Learned;
 
 /// Bytes of everything that is kept here: thousands of entries, a part of what the process takes by itself.
 const MAX_BYTES: usize = 1 << 20;

@@ -9,11 +9,11 @@ use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
 use super::fair_cache::{Counts, FairCache};
 use super::key::{CloudId, FitKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
-use crate::numerics::function::moving::Moving;
-use crate::numerics::machine::heap::{arc_payload, block_bytes};
-use crate::numerics::machine::pages::SpareBuffer;
-use crate::numerics::solver::{Solution, Solver};
-use crate::numerics::surface::Surface;
+use gramian_numerics::function::moving::Moving;
+use gramian_numerics::machine::heap::{arc_payload, block_bytes};
+use gramian_numerics::machine::pages::SpareBuffer;
+use gramian_numerics::solver::{Solution, Solver};
+use gramian_numerics::surface::Surface;
 
 /// The share of the cache that weights may take: they are n numbers beside the n² of a dense solver.
 const WEIGHTS_SHARE: usize = 16;

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use gramian::numerics::observer::Unobserved;
-use gramian::numerics::points::cloud::Cloud;
-use gramian::numerics::points::sampling::Sampling;
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
 use serde_json::{Value, json};
 
 use crate::common::hostile::HOSTILE;

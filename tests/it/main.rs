@@ -3,7 +3,7 @@
 // These threads are no pool's.
 #![allow(clippy::disallowed_methods)]
 
-#[path = "../common/mod.rs"]
+#[path = "../../numerics/tests/common/mod.rs"]
 mod common;
 
 mod access;

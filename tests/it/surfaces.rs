@@ -321,7 +321,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
 }
 
 fn read(name: &str) -> Vec<[f64; 3]> {
-    let path = format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/numerics/tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let number = |word: &str| word.parse::<f64>().unwrap();
     let row = |line: &str| line.split_whitespace().map(number).collect::<Vec<_>>().try_into().unwrap();

@@ -139,7 +139,7 @@ mod tests {
         let lane = Lane::new("lane", 1, Turns::new(1), 0).unwrap();
         let (done, is_done) = std::sync::mpsc::channel::<()>();
         let work = move |observer: &JobObserver| {
-            use crate::numerics::observer::Observer;
+            use gramian_numerics::observer::Observer;
             while is_done.try_recv().is_err() {
                 assert!(observer.checkpoint().is_ok());
             }

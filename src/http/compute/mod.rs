@@ -210,7 +210,7 @@ fn panicked() -> Problem {
 mod tests {
     use super::*;
     use crate::http::problem::slug::Slug;
-    use crate::numerics::observer::Observer;
+    use gramian_numerics::observer::Observer;
     use tokio::sync::oneshot;
 
     const OWNER: Owner = Owner(0);

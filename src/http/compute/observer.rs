@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::progress::Progress;
 use super::pulse::Pulse;
-use crate::numerics::observer::{Observer, Stage};
+use gramian_numerics::observer::{Observer, Stage};
 
 /// Time spent in each stage of a job.
 #[derive(Debug, Clone, Copy, Default)]

@@ -7,7 +7,7 @@ use std::future::Future;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use crate::numerics::observer::Stage;
+use gramian_numerics::observer::Stage;
 
 tokio::task_local! {
     static WATCHED: Arc<Progress>;

@@ -7,8 +7,8 @@ use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
 use crate::http::wire::write::answer::{Member, Parts};
-use crate::numerics::solver::{Disagreement, Outlier, Place};
-use crate::numerics::surface::operators::{RowKind, Stencils};
+use gramian_numerics::solver::{Disagreement, Outlier, Place};
+use gramian_numerics::surface::operators::{RowKind, Stencils};
 
 /// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
 /// answer has them yet.

@@ -7,10 +7,10 @@ use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::{present, present_unless_empty, word};
 use crate::http::wire::write::answer::{Member, Parts};
-use crate::numerics::defaults::Purpose;
-use crate::numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
-use crate::numerics::patches::PatchKernel;
-use crate::numerics::points::sampling::Scales;
+use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
+use gramian_numerics::patches::PatchKernel;
+use gramian_numerics::points::sampling::Scales;
 
 /// The families of kernels; `GET /v1/kernels` has their formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -14,10 +14,10 @@ use crate::http::compute::Snapshot;
 use crate::http::problem::Problem;
 use crate::http::serve::app::App;
 use crate::http::serve::durable::unavailable;
-use crate::numerics::observer::Stage;
 use crate::store::Owner;
 use crate::store::objects::OwnerName;
 use crate::store::objects::jobs::{FoundResult, JobId, JobObjects, JobResult, Lease, Outcome};
+use gramian_numerics::observer::Stage;
 
 /// Bytes that the document of a problem may have.
 const MAX_PROBLEM_BYTES: u64 = 1 << 20;

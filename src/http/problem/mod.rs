@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::numerics::error::{NotDefinite, NumericsError};
+use gramian_numerics::error::{NotDefinite, NumericsError};
 use slug::Slug;
 
 /// Points listed in `point_indices` at most: enough to find the pattern, and bounded.

@@ -25,13 +25,13 @@ use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::present_unless_empty;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::json::Json;
-use crate::numerics::points::sampling::{NearestRange, Scales};
-use crate::numerics::solver::choose::{sampling_bytes, sampling_flops};
 use crate::store::Owner;
 use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
 use crate::store::objects::{ListWindow, Listed};
+use gramian_numerics::points::sampling::{NearestRange, Scales};
+use gramian_numerics::solver::choose::{sampling_bytes, sampling_flops};
 
 /// Clouds in a page when the client names no number.
 const DEFAULT_PAGE: usize = 50;

@@ -21,8 +21,8 @@ use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::defaults::Purpose;
 use crate::store::Owner;
+use gramian_numerics::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and where its curvatures are wanted.

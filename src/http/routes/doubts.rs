@@ -4,8 +4,8 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::Degenerate;
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::{Fits, SurfaceGeometry};
-use crate::numerics::error::NumericsError;
-use crate::numerics::surface::operators::Judged;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::surface::operators::Judged;
 
 /// The queries that the surface flags, and those at which the values do not bear out what was found: by deviations, where they are known, and by
 /// `judge` unless those say all of it.

@@ -33,8 +33,8 @@ use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::json::Json;
-use crate::numerics::solver::kind::SolverKind;
 use crate::store::Owner;
+use gramian_numerics::solver::kind::SolverKind;
 
 /// A request of another operation, with the name of that operation.
 pub struct EstimateRequest;

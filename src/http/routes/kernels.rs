@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::http::fields::KernelFamily;
 use crate::http::openapi::responses::ReadProblems;
 use crate::http::wire::write::json::Json;
-use crate::numerics::kernel::{Family, WendlandSmoothness};
+use gramian_numerics::kernel::{Family, WendlandSmoothness};
 
 /// A parameter that a family takes beside `length_scale` and `variance`.
 #[derive(Serialize, ToSchema)]

@@ -28,11 +28,11 @@ use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
-use crate::numerics::surface::operators::{
+use crate::store::Owner;
+use gramian_numerics::surface::operators::{
     Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix,
     laplace_beltrami_of_kriged, laplace_beltrami_stencils,
 };
-use crate::store::Owner;
 
 request! {
     /// Values on a surface, and where their Laplace–Beltrami operator is wanted.

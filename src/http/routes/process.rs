@@ -111,7 +111,7 @@ pub async fn get_version(State(app): State<Arc<App>>) -> Json<Version> {
         name: env!("CARGO_PKG_NAME"),
         version: env!("CARGO_PKG_VERSION"),
         api: "v1",
-        instruction_set: crate::numerics::machine::instruction_set::InstructionSet::best().name(),
+        instruction_set: gramian_numerics::machine::instruction_set::InstructionSet::best().name(),
         threads: app.config.n_threads(),
     })
 }

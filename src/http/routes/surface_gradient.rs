@@ -26,11 +26,11 @@ use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
-use crate::numerics::surface::operators::{
+use crate::store::Owner;
+use gramian_numerics::surface::operators::{
     Judged, surface_gradient, surface_gradient_deviations, surface_gradient_matrices,
     surface_gradient_of_kriged, surface_gradient_stencils,
 };
-use crate::store::Owner;
 
 request! {
     /// Values on a surface, and where their surface gradient is wanted.

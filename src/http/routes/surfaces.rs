@@ -15,23 +15,23 @@ use crate::http::serve::plan::Cost;
 use crate::http::serve::plan::PlannedFit;
 use crate::http::serve::planner::Planner;
 use crate::http::wire::read::points::Points;
-use crate::numerics::defaults::Purpose;
-use crate::numerics::error::NumericsError;
-use crate::numerics::observer::Observer;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::neighbours::Neighbours;
-use crate::numerics::points::sampling::Sampling;
-use crate::numerics::selection::learning_price;
-use crate::numerics::solver::choose::{
+use crate::store::clouds::RegisteredCloud;
+use gramian_numerics::defaults::Purpose;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::observer::Observer;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::neighbours::Neighbours;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::learning_price;
+use gramian_numerics::solver::choose::{
     Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, kriged_operator_price,
     n_entries_per_row, sampling_bytes, work_price,
 };
-use crate::numerics::surface::Surface;
-use crate::numerics::surface::geometry::{
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use crate::numerics::surface::operators::{JUDGED_FUNCTIONALS, Kriged, OfKriged, SparseMatrix, Stencils};
-use crate::store::clouds::RegisteredCloud;
+use gramian_numerics::surface::operators::{JUDGED_FUNCTIONALS, Kriged, OfKriged, SparseMatrix, Stencils};
 
 /// A checked request for normals or curvatures.
 pub struct GeometryWork {

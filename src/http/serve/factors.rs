@@ -8,11 +8,11 @@ use bytes::Bytes;
 use super::app::App;
 use super::plan::FitPlan;
 use crate::http::compute::Admission;
-use crate::numerics::solver::{FactorBuilder, Solver, System};
 use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
 use crate::store::objects::pieces::HASH_BYTES;
 use crate::store::objects::{Damaged, Unavailable};
 use crate::store::prepared::PreparedFit;
+use gramian_numerics::solver::{FactorBuilder, Solver, System};
 
 /// Points from which on a factor is kept: 4 n² bytes are read in less time than n³/3 flops take.
 const WORTH_IT: usize = 4000;

@@ -14,9 +14,9 @@ use crate::http::serve::app::App;
 use crate::http::wire::negotiation::{Format, announced};
 use crate::http::wire::read::body::{RequestBody, UnpackedBody};
 use crate::http::wire::read::limits::{ParseContext, SMALLER_BODY};
-use crate::numerics::observer::Observer;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
+use gramian_numerics::observer::Observer;
 
 /// Bytes that are asked for at first; then the buffer doubles as bytes come, whatever was announced.
 const FIRST_BYTES: usize = 64 << 10;

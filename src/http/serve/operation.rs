@@ -26,11 +26,11 @@ use crate::http::wire::negotiation::{Format, Wanted};
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::answer::Answer;
 use crate::http::wire::write::encode::Encoded;
-use crate::numerics::solver::kind::SolverKind;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
+use gramian_numerics::solver::kind::SolverKind;
 
 /// A request that needs a factorization.
 pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {

@@ -7,23 +7,23 @@ use std::sync::Arc;
 use crate::http::fields::DuplicatePolicy;
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::{Pointers, Problem};
-use crate::numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
-use crate::numerics::error::{NotDefinite, NumericsError};
-use crate::numerics::kernel::Kernel as NumericalKernel;
-use crate::numerics::observer::Observer;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::duplicates::Merge;
-use crate::numerics::points::sampling::Sampling;
-use crate::numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
-use crate::numerics::solver::Disagreement;
-use crate::numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
-use crate::numerics::solver::kind::SolverKind;
-use crate::numerics::solver::trend::{Mean, Trend};
-use crate::numerics::sums::regularization::Regularization;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
 use crate::store::learned::LearnedKey;
+use gramian_numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
+use gramian_numerics::error::{NotDefinite, NumericsError};
+use gramian_numerics::kernel::Kernel as NumericalKernel;
+use gramian_numerics::observer::Observer;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::duplicates::Merge;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
+use gramian_numerics::solver::Disagreement;
+use gramian_numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
+use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::solver::trend::{Mean, Trend};
+use gramian_numerics::sums::regularization::Regularization;
 
 /// A fit that is checked as far as the request goes; what is left out follows from the cloud.
 pub struct PlannedFit {

@@ -6,12 +6,12 @@ use super::app::App;
 use super::plan::PlannedFit;
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::{Pointers, Problem};
-use crate::numerics::error::NumericsError;
-use crate::numerics::points::noise::estimate_noise;
-use crate::numerics::points::sampling::Sampling;
-use crate::numerics::selection::learning_price;
-use crate::numerics::solver::choose::{noise_flops, sampling_flops};
 use crate::store::clouds::RegisteredCloud;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::points::noise::estimate_noise;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::learning_price;
+use gramian_numerics::solver::choose::{noise_flops, sampling_flops};
 
 /// Finds what a fit lacks of its cloud.
 ///

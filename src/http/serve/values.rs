@@ -8,15 +8,15 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::Diagnostics;
 use crate::http::problem::Problem;
 use crate::http::wire::write::array::Array;
-use crate::numerics::function::batch::{Batch, BatchJets};
-use crate::numerics::function::deviations::JetDeviations;
-use crate::numerics::function::interpolant::Interpolant;
-use crate::numerics::function::moving::{Moving, MovingRequest};
-use crate::numerics::function::posterior::{Variances, variances_with_mean};
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::Solution;
-use crate::numerics::solver::trend::Trend;
-use crate::numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::function::batch::{Batch, BatchJets};
+use gramian_numerics::function::deviations::JetDeviations;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::function::moving::{Moving, MovingRequest};
+use gramian_numerics::function::posterior::{Variances, variances_with_mean};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::Solution;
+use gramian_numerics::solver::trend::Trend;
+use gramian_numerics::sums::jets::{JetOrder, Jets};
 
 /// A function at queries, and how sure it is.
 pub struct ValuesAt {

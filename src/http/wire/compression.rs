@@ -9,7 +9,7 @@ use super::negotiation::Coding;
 use super::read::limits::SMALLER_BODY;
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
-use crate::numerics::observer::Observer;
+use gramian_numerics::observer::Observer;
 
 /// Levels for random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, 2 leaves 46 % at 127 MB/s, 6 as much at half the
 /// speed; zstd 1 leaves 42 % at 470 MB/s, 3 more at a third of the speed.
@@ -162,7 +162,7 @@ impl BufRead for Packed<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::observer::{Stage, Unobserved};
+    use gramian_numerics::observer::{Stage, Unobserved};
 
     fn compressed(coding: Coding, chunks: &[&[u8]]) -> Vec<u8> {
         let mut compressor = Compressor::new(coding).unwrap();

@@ -14,9 +14,9 @@ use super::Owner;
 use super::fair_cache::{Counts, FairCache};
 use super::key::CloudId;
 use super::single_flight::{Boarding, SingleFlight};
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::sampling::Sampling;
 pub use durable::{Holder, Kept, Recalled};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
 pub use page::{CloudPage, ListedCloud};
 pub use registered::RegisteredCloud;
 use turns::Turns;
@@ -177,9 +177,9 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::error::NumericsError;
-    use crate::numerics::observer::Unobserved;
-    use crate::numerics::points::sampling::Scales;
+    use gramian_numerics::error::NumericsError;
+    use gramian_numerics::observer::Unobserved;
+    use gramian_numerics::points::sampling::Scales;
 
     fn line(n: usize, offset: f64) -> Cloud {
         Cloud::new((0..n).map(|i| i as f64 + offset).collect(), 1).unwrap()

@@ -3,12 +3,12 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::points::duplicates::count_duplicates;
-use crate::numerics::points::sampling::{Sampling, Scales};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
+use gramian_numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::duplicates::count_duplicates;
+use gramian_numerics::points::sampling::{Sampling, Scales};
 
 /// A cloud with what its positions say, once that was asked for.
 ///

@@ -20,9 +20,9 @@ use std::time::{Duration, SystemTime};
 use bytes::Bytes;
 
 use super::Damaged;
-use crate::numerics::points::cloud::Cloud;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
+use gramian_numerics::points::cloud::Cloud;
 
 const MAGIC: &[u8; 16] = b"gramian cloud 1\n";
 const N_COUNTS: usize = 5;

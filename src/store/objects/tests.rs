@@ -7,9 +7,9 @@ use object_store::memory::InMemory;
 use super::cloud_object::CUT;
 use super::factors::{FactorHead, FactorName};
 use super::*;
-use crate::numerics::points::cloud::Cloud;
 use crate::store::Owner;
 use crate::store::clouds::{CloudStore, RegisteredCloud};
+use gramian_numerics::points::cloud::Cloud;
 
 fn objects() -> Objects {
     Objects::over(Arc::new(InMemory::new()), Path::from("some/prefix"))

@@ -2,13 +2,13 @@ use futures_util::future::BoxFuture;
 use tokio::sync::oneshot;
 
 use super::*;
-use crate::numerics::kernel::{Family, Kernel};
-use crate::numerics::observer::Unobserved;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::System;
-use crate::numerics::solver::choose::choose;
-use crate::numerics::solver::kind::SolverKind;
-use crate::numerics::sums::regularization::Regularization;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::System;
+use gramian_numerics::solver::choose::choose;
+use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;
 

@@ -21,8 +21,8 @@ use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::solver::choose::{Asked, many_price, work_price};
 use crate::store::Owner;
+use gramian_numerics::solver::choose::{Asked, many_price, work_price};
 
 request! {
     /// Many lists of values at the points of a cloud, and where the functions through them are wanted.

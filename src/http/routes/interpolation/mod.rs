@@ -22,12 +22,12 @@ use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
-use crate::numerics::function::deviations::JetDeviations;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{Asked, Price, deviations_price, work_price};
-use crate::numerics::sums::jets::JetOrder;
 use crate::store::Owner;
 pub use batch::*;
+use gramian_numerics::function::deviations::JetDeviations;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::choose::{Asked, Price, deviations_price, work_price};
+use gramian_numerics::sums::jets::JetOrder;
 
 request! {
     /// Values at the points of a cloud, and where the function through them is wanted.

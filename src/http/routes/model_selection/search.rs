@@ -14,16 +14,16 @@ use crate::http::serve::plan::FitModel;
 use crate::http::serve::planner::check_seed;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
-use crate::numerics::error::NumericsError;
-use crate::numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
-use crate::numerics::selection::{
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
+use gramian_numerics::selection::{
     Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Parameter, Selected, Selection, Variation,
     alpha_path, alpha_path_price, default_alphas, expected_evaluations, leave_one_out_price,
     leave_one_out_with, select, selection_price,
 };
-use crate::numerics::solver::choose::Price;
-use crate::numerics::solver::trend::Trend;
-use crate::numerics::sums::regularization::Regularization;
+use gramian_numerics::solver::choose::Price;
+use gramian_numerics::solver::trend::Trend;
+use gramian_numerics::sums::regularization::Regularization;
 
 const BEYOND_KERNELS: &str =
     "the variance of the values is beyond what kernels take, 1e-140 to 1e140; scale the values";

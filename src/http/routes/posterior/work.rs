@@ -13,20 +13,20 @@ use crate::http::serve::planner::{DenseOnly, Planner, check_seed};
 use crate::http::serve::values::{EachAt, ValuesAt, ValuesRequest};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
-use crate::numerics::error::NumericsError;
-use crate::numerics::function::batch::BatchJets;
-use crate::numerics::function::deviations::JetDeviations;
-use crate::numerics::function::interpolant::Interpolant;
-use crate::numerics::function::posterior::{
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::function::batch::BatchJets;
+use gramian_numerics::function::deviations::JetDeviations;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::function::posterior::{
     Covariance, Variances, covariance_with_mean, log_marginal_likelihood,
 };
-use crate::numerics::function::samples::Root;
-use crate::numerics::machine::normal::{cumulative, quantile};
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{
+use gramian_numerics::function::samples::Root;
+use gramian_numerics::machine::normal::{cumulative, quantile};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::choose::{
     Asked as AskedOfSolver, Price, deviations_price, many_price, samples_price, work_price,
 };
-use crate::numerics::sums::jets::JetOrder;
+use gramian_numerics::sums::jets::JetOrder;
 
 /// What is wanted beside the means.
 pub struct Asked {

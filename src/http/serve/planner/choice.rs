@@ -7,9 +7,9 @@ use crate::http::fields::{Fit, Geometry, Kernel};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::points::Points;
-use crate::numerics::solver::trend::Mean;
-use crate::numerics::sums::regularization::Regularization;
 use crate::store::clouds::RegisteredCloud;
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::sums::regularization::Regularization;
 
 /// What is asked that only a dense factorization has: its word, and where it stands.
 #[derive(Debug, Clone, Copy)]

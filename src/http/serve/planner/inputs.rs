@@ -11,10 +11,10 @@ use crate::http::serve::durable::TRUST;
 use crate::http::serve::plan::PlannedFit;
 use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
 use crate::http::wire::read::points::{Points, ValueLists};
-use crate::numerics::error::NumericsError;
-use crate::numerics::points::cloud::Cloud;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::points::cloud::Cloud;
 
 /// Bytes that a number takes in JSON at most, with its comma.
 const BYTES_PER_NUMBER: usize = 25;

@@ -13,12 +13,6 @@ use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::app::App;
 use crate::http::wire::read::limits::too_many_dense_points;
-use crate::numerics::defaults::Purpose;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
-use crate::numerics::solver::trend::Mean;
-use crate::numerics::sums::regularization::Regularization;
-use crate::numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
@@ -26,6 +20,12 @@ pub use choice::DenseOnly;
 use choice::{
     Chosen, TRY_LOCAL, local_lacks_operators, only_local_has_sites, pointers_of, pointers_of_surface,
 };
+use gramian_numerics::defaults::Purpose;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use inputs::length_mismatch;
 pub use inputs::{check_seed, unknown_cloud, value_lists};
 

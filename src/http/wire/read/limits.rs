@@ -4,8 +4,8 @@
 use crate::config::Config;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::numerics::observer::{Observer, Unobserved};
-use crate::numerics::patches::MAX_SITES;
+use gramian_numerics::observer::{Observer, Unobserved};
+use gramian_numerics::patches::MAX_SITES;
 
 /// What to do about a body that is too large.
 pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \

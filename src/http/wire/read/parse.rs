@@ -9,7 +9,7 @@ use super::members::object;
 use super::plain_json;
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
-use crate::numerics::error::NumericsError;
+use gramian_numerics::error::NumericsError;
 
 /// Lists and objects within each other, as `serde_json` has it.
 const MAX_NESTING: usize = 128;
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::http::wire::read::members::present;
     use crate::http::wire::read::points::Points;
-    use crate::numerics::observer::{Observer, Stage};
+    use gramian_numerics::observer::{Observer, Stage};
 
     #[derive(Debug, serde::Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -1,6 +1,6 @@
 //! How a run goes on where there are several ways: at random, or each way in turn.
 
-use crate::numerics::testing::Random;
+use super::random::Random;
 
 /// Where a run goes on, of several ways.
 pub trait Choose {

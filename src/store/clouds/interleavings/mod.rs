@@ -9,18 +9,20 @@
 //! store, and nothing else is left there.
 
 mod choose;
+#[path = "../../../../numerics/tests/common/random.rs"]
+mod random;
 mod requests;
 mod stepped;
 
 use std::sync::Arc;
 
 use super::CloudStore;
-use crate::numerics::points::cloud::Cloud;
-use crate::numerics::testing::Random;
 use crate::store::key::CloudId;
 use crate::store::objects::Objects;
 use choose::{Choose, Odometer};
+use gramian_numerics::points::cloud::Cloud;
 use object_store::path::Path;
+use random::Random;
 use requests::{Answer, Process, Request};
 use stepped::{Gate, Stepped};
 use tokio::task::JoinHandle;

@@ -23,10 +23,10 @@ AROUND = {2: 24, 3: 48, 4: 96}
 """Positions that answers depend on, by dimension: regressions see 16, 30 or 50 of them, stencils 13, 38 or 88."""
 
 GROUPS = (1, 3, 8, 24, 72, 216, 648)
-"""Points of which regressions take means, where there is noise: src/numerics/patches/mod.rs."""
+"""Points of which regressions take means, where there is noise: numerics/src/patches/mod.rs."""
 
 LENGTH_SCALE = 1.4
-"""That of the heights, in units of the radius of a neighbourhood: src/numerics/patches/pooled.rs."""
+"""That of the heights, in units of the radius of a neighbourhood: numerics/src/patches/pooled.rs."""
 
 MARGIN = 1.2
 """By how much more a neighbourhood of points may seem to have before it is one of means."""

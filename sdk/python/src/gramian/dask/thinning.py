@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from ..tensors import Array
 from .cut import Ints
 
-# As the service has them: src/numerics/points/thinning.rs.
+# As the service has them: numerics/src/points/thinning.rs.
 MAX_COARSE = 6000
 LEAST_COARSE = 600
 POINTS_PER_COARSE = 6

@@ -1,0 +1,111 @@
+//! Standard deviations of a function and its derivatives.
+
+use std::ops::Range;
+
+use super::functionals::{FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance};
+use super::interpolant::Interpolant;
+use crate::error::NumericsError;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+
+/// Standard deviations of a jet at m queries given the values.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JetDeviations {
+    /// `[m]`, unit V.
+    pub values: Vec<f64>,
+    /// `[m, d]`, unit V/L; empty unless asked for.
+    pub gradients: Vec<f64>,
+    /// `[m, d, d]`, unit V/L²; empty unless asked for.
+    pub hessians: Vec<f64>,
+    /// Queries, ascending, where rounding made a variance negative: the deviation is 0.
+    pub clamped: Vec<usize>,
+}
+
+impl JetDeviations {
+    /// Up to the derivatives of an order, 0 to 2; kernel and noise are `factor` times those of the solver.
+    ///
+    /// # Errors
+    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, so that their variance is infinite;
+    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor; [`NumericsError::DimensionMismatch`],
+    /// [`NumericsError::KernelNotSmooth`], [`NumericsError::Cancelled`].
+    pub fn of(
+        interpolant: &Interpolant,
+        factor: f64,
+        queries: &Cloud,
+        order: usize,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
+        if !has_variance(solver.kernel(), order) {
+            return Err(NumericsError::DerivativesVary { order });
+        }
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let width = width(d, order);
+        let per_block = (FUNCTIONALS_PER_BLOCK / width).max(1);
+        let (mut all, mut clamped) = (Vec::with_capacity(m * width), Vec::new());
+        for first in (0..m).step_by(per_block) {
+            let functionals = functionals(first..(first + per_block).min(m), d, order);
+            let found = deviations((solver, solution, factor), queries, &functionals, observer)?;
+            clamped.extend(found.clamped.iter().map(|at| functionals[*at].query));
+            all.extend(found.found);
+        }
+        clamped.dedup();
+        Ok(Self { clamped, ..Self::of_packed(&all, d, order) })
+    }
+
+    /// From value, derivatives and upper triangle of the Hessian, query by query, as far as the order goes.
+    pub(super) fn of_packed(found: &[f64], d: usize, order: usize) -> Self {
+        let mut of = Self::default();
+        for jet in found.chunks_exact(width(d, order)) {
+            let (value, rest) = jet.split_at(1);
+            of.values.extend(value);
+            let (gradient, hessian) = rest.split_at(if order >= 1 { d } else { 0 });
+            of.gradients.extend(gradient);
+            if order >= 2 {
+                of.hessians.extend((0..d * d).map(|at| hessian[upper(at / d, at % d, d)]));
+            }
+        }
+        of
+    }
+
+    /// For a kernel and noise that are `factor` times as great.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        let root = factor.sqrt();
+        for list in [&mut self.values, &mut self.gradients, &mut self.hessians] {
+            list.iter_mut().for_each(|deviation| *deviation *= root);
+        }
+        self
+    }
+}
+
+/// Functionals of a query: its value, derivatives, and the upper triangle of the Hessian, as far as the order goes.
+fn width(d: usize, order: usize) -> usize {
+    [1, 1 + d, 1 + d + d * (d + 1) / 2][order.min(2)]
+}
+
+/// These, query by query.
+fn functionals(queries: Range<usize>, d: usize, order: usize) -> Vec<JetFunctional> {
+    let mut functionals = Vec::with_capacity(queries.len() * width(d, order));
+    for query in queries {
+        functionals.push(JetFunctional::value(query, d));
+        if order >= 1 {
+            functionals.extend((0..d).map(|axis| {
+                let mut along = vec![0.0; d];
+                along[axis] = 1.0;
+                JetFunctional::derivative(query, &along)
+            }));
+        }
+        if order >= 2 {
+            let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
+            functionals.extend(pairs.map(|pair| JetFunctional::second_derivative(query, d, pair)));
+        }
+    }
+    functionals
+}
+
+/// Where an entry of a symmetric matrix stands in its upper triangle, row by row.
+fn upper(a: usize, b: usize, d: usize) -> usize {
+    let (row, column) = (a.min(b), a.max(b));
+    row * d - row * (row + 1) / 2 + column
+}

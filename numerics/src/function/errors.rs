@@ -1,0 +1,185 @@
+//! How far off linear functionals of a fitted function are, if the values come from another process than its kernel's.
+//!
+//! What is served is linear in the values, `F̂ = wᵀY` with `w = (K + N)⁻¹Fk(X)`. Had the function the covariance k̂ about the mean m̂ and the
+//! values the noise N̂, it would be off by `Fu − wᵀY`, whose mean square is
+//! `FF′k̂ − 2wᵀFk̂(X) + wᵀ(K̂ + N̂)w + (Fm̂ − wᵀm̂(X))²`.
+
+use faer::MatMut;
+use rayon::prelude::*;
+
+use super::functionals::{Covariant, JetFunctional};
+use super::interpolant::Interpolant;
+use crate::error::NumericsError;
+use crate::kernel::Kernel;
+use crate::machine::vector::dot;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::choose::JUDGED_AT_ONCE;
+use crate::solver::trend::Trend;
+use crate::sums::many::values_of_each;
+use crate::sums::regularization::Regularization;
+
+/// What values come from: covariance, variance of the noise, which where each point has its own is the least, and mean.
+///
+/// Covariance and noise are `factor` times those that are named, so that values of any size have numbers.
+pub(crate) struct Process<'a> {
+    pub(crate) kernel: &'a Kernel,
+    pub(crate) noise: f64,
+    pub(crate) factor: f64,
+    pub(crate) trend: Option<&'a Trend>,
+}
+
+/// Root mean square errors of functionals of a function, `[functionals]`, whose values come from a process that has their derivatives.
+///
+/// # Errors
+/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+pub(crate) fn errors_under(
+    process: &Process<'_>,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let mut found = Vec::with_capacity(functionals.len());
+    for block in functionals.chunks(JUDGED_AT_ONCE) {
+        // Of a size whose square has a number.
+        let sizes: Vec<f64> = block.iter().map(|functional| functional.size(process.kernel)).collect();
+        let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
+        let errors = errors_of_block(process, interpolant, queries, &block, observer)?;
+        found.extend(errors.iter().zip(sizes).map(|(error, size)| error * size));
+    }
+    Ok(found)
+}
+
+/// The same of as many as are held at once.
+fn errors_of_block(
+    process: &Process<'_>,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
+    let cloud = solver.cloud();
+    observer.checkpoint()?;
+    let weights = weights_on_values(interpolant, queries, functionals)?;
+    observer.enter(Stage::Evaluate);
+    let mut covariances = vec![0.0; n * functionals.len()];
+    Covariant::of(cloud, process.kernel).fill(functionals, queries, &mut covariances);
+    let images = values_of_each(cloud, process.kernel, &weights, cloud, observer)?;
+    let means: Option<Vec<f64>> = process.trend.map(|trend| cloud.points().map(|x| trend.at(x)).collect());
+    let noise: Vec<f64> = match solver.regularization() {
+        Regularization::Uniform(_) => vec![process.noise; n],
+        Regularization::PerPoint(given) => {
+            given.iter().map(|given| (given / process.factor).max(process.noise)).collect()
+        }
+    };
+    let error = |at: usize| {
+        let functional = &functionals[at];
+        let of = |all: &[f64]| -> f64 { dot(&all[at * n..][..n], &weights[at * n..][..n]) };
+        let spread = functional.prior_variance(process.kernel) - 2.0 * of(&covariances) + of(&images);
+        let own = &weights[at * n..][..n];
+        let of_noise: f64 = own.iter().zip(&noise).map(|(weight, noise)| noise * weight * weight).sum();
+        let bias = match (process.trend, &means) {
+            (Some(trend), Some(means)) => functional.of_mean(trend, queries) - dot(means, own),
+            _ => 0.0,
+        };
+        // Rounding may make it negative; what is no number stays none.
+        let spread = if spread < 0.0 { 0.0 } else { spread };
+        (process.factor * (spread + of_noise) + bias * bias).sqrt()
+    };
+    Ok((0..functionals.len()).into_par_iter().map(error).collect())
+}
+
+/// w of each functional, `[functionals, n]`: what it weighs the values with, those that the mean is found from included.
+fn weights_on_values(
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+) -> Result<Vec<f64>, NumericsError> {
+    let (solver, n) = (&interpolant.solver, interpolant.solver.n_points());
+    let mut weights = vec![0.0; n * functionals.len()];
+    Covariant::of(solver.cloud(), solver.kernel()).fill(functionals, queries, &mut weights);
+    solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, functionals.len()));
+    let Some(trend) = &interpolant.solution.trend else { return Ok(weights) };
+    let basis = trend.basis();
+    let exact = |at: usize| {
+        let functional: &JetFunctional = &functionals[at];
+        Some(functional.on_mean(basis, queries.point(functional.query)))
+    };
+    basis.make_exact(solver, &mut weights, exact).ok_or(NumericsError::MeanNotDetermined)?;
+    Ok(weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::function::functionals::{deviations, has_variance};
+    use crate::observer::Unobserved;
+    use crate::solver::trend::Mean;
+    use crate::solver::{Solver, System};
+    use crate::testing::{all_families, fibonacci_sphere};
+
+    const ALPHA: f64 = 1e-2;
+
+    fn fit(kernel: &Kernel, mean: Mean) -> Interpolant {
+        let cloud = Arc::new(fibonacci_sphere(60));
+        let values: Vec<f64> = cloud.points().map(|x| 3.0 + (2.0 * x[0]).sin() - x[2]).collect();
+        let system = System::new(cloud, kernel.clone(), Regularization::Uniform(ALPHA)).unwrap();
+        let solver = Arc::new(Solver::dense(system, &Unobserved).unwrap());
+        Interpolant::fit_with_mean(solver, &values, mean, &Unobserved).unwrap()
+    }
+
+    fn functionals() -> (Cloud, Vec<JetFunctional>) {
+        let queries = Cloud::new(vec![0.3, 0.8, 0.5, 0.0, 0.0, 1.1], 3).unwrap();
+        let of = |query| {
+            let bend = JetFunctional::second_derivative(query, 3, (0, 1));
+            [JetFunctional::value(query, 3), JetFunctional::derivative(query, &[0.6, 0.0, -0.8]), bend]
+        };
+        (queries, [of(0), of(1)].concat())
+    }
+
+    /// Kriging is unbiased whatever the mean is, so that errors are its deviations, and those do not depend on the coefficients.
+    #[test]
+    fn under_its_own_process_errors_are_the_deviations() {
+        let (queries, functionals) = functionals();
+        for family in all_families() {
+            let kernel = Kernel::new(family, 1.3, 2.0).unwrap();
+            if !has_variance(&kernel, 2) {
+                continue;
+            }
+            for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
+                let u = fit(&kernel, mean);
+                let process =
+                    Process { kernel: &kernel, noise: ALPHA, factor: 1.0, trend: u.solution.trend.as_ref() };
+                let found = errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap();
+                let of = (&*u.solver, &*u.solution, 1.0);
+                let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap().found;
+                for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
+                    // Terms of the size of what is not known beforehand cancel to rounding.
+                    let prior = functional.prior_variance(&kernel);
+                    assert!((a * a - b * b).abs() <= 1e-11 * prior, "{family:?}, {mean:?}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_that_nobody_told_and_means_that_are_left_out_show() {
+        let (queries, functionals) = functionals();
+        let kernel = Kernel::new(crate::kernel::Family::Gauss, 0.8, 1.0).unwrap();
+        let (u, with_mean) = (fit(&kernel, Mean::Zero), fit(&kernel, Mean::Constant));
+        let errors = |noise, trend| {
+            let process = Process { kernel: &kernel, noise, factor: 1.0, trend };
+            errors_under(&process, &u, &queries, &functionals, &Unobserved).unwrap()
+        };
+        let told = errors(ALPHA, None);
+        let untold = errors(100.0 * ALPHA, None);
+        let about = errors(ALPHA, with_mean.solution.trend.as_ref());
+        assert!(told.iter().zip(&untold).all(|(a, b)| b > a));
+        // The value far from all points goes to 0 instead of the mean, which is about 3.
+        assert!(about[0] > told[0], "{about:?} {told:?}");
+    }
+}

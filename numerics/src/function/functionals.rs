@@ -1,0 +1,334 @@
+//! How sure linear functionals of a function's jet are: its value, derivatives, and operators at a query.
+//!
+//! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, `F` of k(·, x_j) is its covariance with the value at x_j,
+//! and its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value (Rasmussen and Williams 2006, sec. 9.4).
+
+use faer::{ColRef, MatMut};
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::mean_variance::MeanVariance;
+use crate::error::NumericsError;
+use crate::kernel::{Kernel, Pairs};
+use crate::machine::registers::{BLOCK, Block, Pack};
+use crate::machine::small::{Small, zeros};
+use crate::machine::vector::dot;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::trend::{Basis, Trend};
+use crate::solver::{Solution, Solver};
+use crate::sums::jets::check_smooth_at;
+use crate::sums::nodes::Nodes;
+
+/// Functionals whose columns are held at once.
+pub(crate) const FUNCTIONALS_PER_BLOCK: usize = 512;
+
+/// `c u + g·∇u + A : D²u` at a query.
+#[derive(Debug, Clone)]
+pub(crate) struct JetFunctional {
+    pub(crate) query: usize,
+    pub(crate) of_value: f64,
+    /// g, `[d]`.
+    pub(crate) of_gradient: Small,
+    /// A, symmetric `[d, d]`; empty for none.
+    pub(crate) of_hessian: Small,
+}
+
+impl JetFunctional {
+    /// The value.
+    pub(crate) fn value(query: usize, dimension: usize) -> Self {
+        Self { query, of_value: 1.0, of_gradient: zeros(dimension), of_hessian: Small::new() }
+    }
+
+    /// The derivative along a vector.
+    pub(crate) fn derivative(query: usize, along: &[f64]) -> Self {
+        Self { query, of_value: 0.0, of_gradient: Small::from_slice(along), of_hessian: Small::new() }
+    }
+
+    /// An entry of the Hessian.
+    pub(crate) fn second_derivative(query: usize, dimension: usize, (a, b): (usize, usize)) -> Self {
+        let mut of_hessian = zeros(dimension * dimension);
+        of_hessian[a * dimension + b] += 0.5;
+        of_hessian[b * dimension + a] += 0.5;
+        Self { query, of_value: 0.0, of_gradient: zeros(dimension), of_hessian }
+    }
+
+    /// The same of a function of the coordinates in units of the length scale, as the kernel stretches them: gradients get the factors of their
+    /// axes, Hessians those of both.
+    fn in_length_scales(&self, kernel: &Kernel) -> Self {
+        let (mut found, d) = (self.clone(), self.of_gradient.len());
+        let factor = |axis: usize| kernel.stretch(axis) / kernel.length_scale();
+        found.of_gradient.iter_mut().enumerate().for_each(|(a, g)| *g *= factor(a));
+        let entries = found.of_hessian.iter_mut().enumerate();
+        entries.for_each(|(at, entry)| *entry *= factor(at / d) * factor(at % d));
+        found
+    }
+
+    /// How large it is in units of the length scale, where the squares of what it finds may have no number; 1 for nothing.
+    pub(super) fn size(&self, kernel: &Kernel) -> f64 {
+        let Self { of_value, of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
+        let largest = of_gradient.iter().chain(&of_hessian).fold(of_value.abs(), |a, b| a.max(b.abs()));
+        if largest > 0.0 { largest } else { 1.0 }
+    }
+
+    /// That part of it.
+    pub(super) fn over(&self, size: f64) -> Self {
+        let mut found = self.clone();
+        found.of_value /= size;
+        found.of_gradient.iter_mut().chain(&mut found.of_hessian).for_each(|entry| *entry /= size);
+        found
+    }
+
+    /// Of a mean.
+    pub(super) fn of_mean(&self, trend: &Trend, queries: &Cloud) -> f64 {
+        let value = if self.of_value == 0.0 { 0.0 } else { trend.at(queries.point(self.query)) };
+        self.of_value * value + dot(&self.of_gradient, &trend.gradient())
+    }
+
+    /// Of each function of a mean, at the query's place: they are linear.
+    pub(super) fn on_mean(&self, basis: &Basis, x: &[f64]) -> Vec<f64> {
+        let mut functions = vec![0.0; basis.n_functions()];
+        basis.at(x, &mut functions);
+        functions.iter_mut().for_each(|f| *f *= self.of_value);
+        basis.add_slopes(&self.of_gradient, &mut functions);
+        functions
+    }
+
+    /// Its coefficients on derivatives in units of the length scale: on those of first order, then on those of second, an upper triangle with entries
+    /// across counted for both of their places; on the value it has none.
+    pub(super) fn coefficients(&self, kernel: &Kernel) -> Small {
+        let Self { of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
+        let (mut coefficients, d) = (of_gradient, self.of_gradient.len());
+        if !of_hessian.is_empty() {
+            let pairs = (0..d).flat_map(|a| (a..d).map(move |b| (a, b)));
+            let entry = |(a, b)| {
+                if a == b { of_hessian[a * d + a] } else { of_hessian[a * d + b] + of_hessian[b * d + a] }
+            };
+            coefficients.extend(pairs.map(entry));
+        }
+        coefficients
+    }
+
+    fn has_derivatives(&self) -> bool {
+        self.has_hessian() || self.of_gradient.iter().any(|g| *g != 0.0)
+    }
+
+    fn has_hessian(&self) -> bool {
+        !self.of_hessian.is_empty()
+    }
+
+    /// `sᵀAs` as a sum of products: the entries of A that are not 0, those across counted for both of their
+    /// places.
+    fn form(&self) -> Vec<FormTerm> {
+        let d = self.of_gradient.len();
+        let entry = |a: usize, b: usize| self.of_hessian[a * d + b];
+        let pairs = (0..if self.has_hessian() { d } else { 0 }).flat_map(|a| (a..d).map(move |b| (a, b)));
+        let term =
+            |(a, b)| FormTerm { a, b, factor: if a == b { entry(a, a) } else { entry(a, b) + entry(b, a) } };
+        pairs.map(term).filter(|term| term.factor != 0.0).collect()
+    }
+
+    fn trace(&self) -> f64 {
+        self.of_hessian.iter().step_by(self.of_gradient.len() + 1).sum()
+    }
+
+    /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
+    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
+    pub(crate) fn prior_variance(&self, kernel: &Kernel) -> f64 {
+        let Self { of_value, of_gradient, of_hessian, .. } = &self.in_length_scales(kernel);
+        let [value, slope, bend] = kernel.profile_at_zero();
+        let first = 2.0 * slope;
+        let mut total = of_value * of_value * value - first * dot(of_gradient, of_gradient);
+        if self.has_hessian() {
+            let trace: f64 = of_hessian.iter().step_by(of_gradient.len() + 1).sum();
+            total += 2.0 * of_value * trace * first;
+            total += 4.0 * bend * (trace * trace + 2.0 * dot(of_hessian, of_hessian));
+        }
+        kernel.variance() * total
+    }
+}
+
+/// `factor · s_a s_b`.
+#[derive(Debug, Clone, Copy)]
+struct FormTerm {
+    a: usize,
+    b: usize,
+    factor: f64,
+}
+
+/// Whether the process has the derivatives of some functionals at a point: their variance is finite.
+pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
+    match order {
+        0 => true,
+        1 => !kernel.has_kink(),
+        _ => !kernel.has_kink() && kernel.has_second_derivatives(),
+    }
+}
+
+/// Standard deviations of functionals.
+pub(crate) struct Deviations {
+    /// `[functionals]`
+    pub(crate) found: Vec<f64>,
+    /// Functionals whose variance rounding made negative: their deviation is 0.
+    pub(crate) clamped: Vec<usize>,
+}
+
+/// Standard deviations of functionals given values at the points, for a kernel and noise that are `factor` times those of the solver.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] at points of the cloud; [`NumericsError::NotPositiveDefinite`]
+/// without a Cholesky factor; [`NumericsError::Overflow`] where one has no number; [`NumericsError::Cancelled`].
+pub(crate) fn deviations(
+    (solver, solution, factor): (&Solver, &Solution, f64),
+    queries: &Cloud,
+    functionals: &[JetFunctional],
+    observer: &dyn Observer,
+) -> Result<Deviations, NumericsError> {
+    let (n, kernel) = (solver.n_points(), solver.kernel());
+    solver.cloud().check_same_dimension(queries)?;
+    if functionals.iter().any(JetFunctional::has_derivatives) {
+        check_smooth_at(solver.cloud(), kernel, queries)?;
+    }
+    let covariances = Covariant::of(solver.cloud(), kernel);
+    let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
+    let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];
+    let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
+    for block in functionals.chunks(FUNCTIONALS_PER_BLOCK) {
+        observer.checkpoint()?;
+        // Of a size whose square has a number.
+        let sizes: Vec<f64> = block.iter().map(|functional| functional.size(kernel)).collect();
+        let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
+        observer.enter(Stage::Evaluate);
+        let columns = &mut buffer[..n * block.len()];
+        covariances.fill(&block, queries, columns);
+        observer.enter(Stage::Solve);
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, block.len()), observer)?;
+        let variance = |(column, functional): (&[f64], &JetFunctional)| {
+            let explained = ColRef::from_slice(column).squared_norm_l2();
+            let unexplained = of_mean.as_ref().map(|mean| {
+                let h = mean.unexplained_of(functional, queries.point(functional.query), column);
+                mean.product(&h, &h)
+            });
+            let variance = functional.prior_variance(kernel) - explained;
+            // What is no number stays none.
+            ((if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0), variance < 0.0)
+        };
+        let variances = columns.par_chunks_exact(n).zip(&block).map(variance).collect::<Vec<_>>();
+        let first = found.len();
+        for (at, ((variance, is_negative), size)) in variances.into_iter().zip(sizes).enumerate() {
+            found.push(factor.sqrt() * variance.sqrt() * size);
+            if is_negative {
+                clamped.push(first + at);
+            }
+        }
+    }
+    match found.iter().position(|deviation| !deviation.is_finite()) {
+        Some(at) => Err(NumericsError::Overflow { query: functionals[at].query }),
+        None => Ok(Deviations { found, clamped }),
+    }
+}
+
+/// Covariances of functionals with the values at the points of a cloud.
+pub(crate) struct Covariant<'a> {
+    nodes: Nodes,
+    kernel: &'a Kernel,
+}
+
+impl<'a> Covariant<'a> {
+    pub(crate) fn of(cloud: &Cloud, kernel: &'a Kernel) -> Self {
+        Self { nodes: Nodes::of(cloud), kernel }
+    }
+
+    /// `F k(·, x_j)` for all j, a column `[n]` for each functional; whether the kernel has the derivatives is for the caller to know.
+    pub(crate) fn fill(&self, functionals: &[JetFunctional], queries: &Cloud, columns: &mut [f64]) {
+        let Self { nodes, kernel } = self;
+        columns.par_chunks_exact_mut(nodes.n_points()).zip(functionals).for_each(|(column, functional)| {
+            let (x, functional) = (queries.point(functional.query), &functional.in_length_scales(kernel));
+            let form = &functional.form();
+            nodes.dispatch(Covariances { nodes, kernel, functional, form, x, column });
+        });
+    }
+}
+
+/// `F k(·, x_j)` for all j: with s = (x − x_j)/ℓ, `v[cφ + 2φ′(g·s + tr A) + 4φ″ sᵀAs]`, s, g and A in units of ℓ, as the kernel stretches them.
+struct Covariances<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    functional: &'a JetFunctional,
+    /// Few terms for one entry of a Hessian, whatever the dimension.
+    form: &'a [FormTerm],
+    x: &'a [f64],
+    column: &'a mut [f64],
+}
+
+impl WithSimd for Covariances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut out = Block::ZERO;
+        let trace = if self.functional.has_hessian() { self.functional.trace() } else { 0.0 };
+        let mut differences = vec![Block::ZERO; self.x.len()];
+        for block in 0..self.column.len().div_ceil(BLOCK) {
+            let pairs = CovariancePairs {
+                simd,
+                of: &self,
+                block,
+                trace,
+                differences: &mut differences,
+                out: &mut out,
+            };
+            self.kernel.profiles(pairs);
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(self.column.len());
+            self.column[start..end].copy_from_slice(&out.0[..end - start]);
+        }
+    }
+}
+
+/// A block of a column.
+struct CovariancePairs<'a, 'b, S> {
+    simd: S,
+    of: &'a Covariances<'b>,
+    block: usize,
+    trace: f64,
+    differences: &'a mut [Block],
+    out: &'a mut Block,
+}
+
+impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
+    /// g·s and sᵀAs.
+    type Others = (Pack<S>, Pack<S>);
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
+        let Covariances { nodes, kernel, functional, form: terms, x, .. } = *self.of;
+        let zero = Pack::splat(self.simd, 0.0);
+        let mut along = zero;
+        let inverse = 1.0 / kernel.length_scale();
+        let differences = &mut *self.differences;
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, difference| {
+            let difference = difference * inverse;
+            along = difference.mul_add(Pack::splat(self.simd, functional.of_gradient[c]), along);
+            difference.store(&mut differences[c], at);
+        });
+        let mut form = zero;
+        for FormTerm { a, b, factor } in terms {
+            let other = Pack::load(self.simd, &self.differences[*b], at) * *factor;
+            form = Pack::load(self.simd, &self.differences[*a], at).mul_add(other, form);
+        }
+        (q, (along, form))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (along, form): Self::Others, [value, slope, bend]: [Pack<S>; 3]) {
+        let Covariances { kernel, functional, .. } = *self.of;
+        let first = 2.0 * kernel.variance();
+        let of_slopes = first * slope * (along + self.trace);
+        let of_bends = (2.0 * first) * bend * form;
+        // φ″ may be as great as float64 has it where D is 0.
+        let jets = of_slopes + of_bends;
+        let of_value = kernel.variance() * functional.of_value;
+        value.mul_add(Pack::splat(self.simd, of_value), jets).store(self.out, at);
+    }
+}

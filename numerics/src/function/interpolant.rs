@@ -1,0 +1,77 @@
+//! A function on space: the expansion whose weights solve the fit of some values.
+
+use std::sync::Arc;
+
+use crate::error::NumericsError;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::trend::Mean;
+use crate::solver::{Solution, Solver};
+use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
+
+/// `u(x) = m(x) + Σ_j λ_j k(x, z_j)` over the centres of its solver, m its mean if it has one: interpolates the values at α = 0, regresses them at α > 0.
+#[derive(Clone)]
+pub struct Interpolant {
+    pub solver: Arc<Solver>,
+    pub solution: Arc<Solution>,
+}
+
+impl Interpolant {
+    /// Fits values `[n]`, unit V.
+    ///
+    /// # Errors
+    /// Those of [`Solution::of`].
+    pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let solution = Arc::new(Solution::of(&solver, values, observer)?);
+        Ok(Self { solver, solution })
+    }
+
+    /// Fits values `[n]`, unit V, by a function with a mean.
+    ///
+    /// # Errors
+    /// Those of [`Solution::with_mean`].
+    pub fn fit_with_mean(
+        solver: Arc<Solver>,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let solution = Arc::new(Solution::with_mean(&solver, values, mean, observer)?);
+        Ok(Self { solver, solution })
+    }
+
+    /// Fits the constant 1: the paper's signature function u_X, whose level 1 is the surface (with α > 0, the level that is
+    /// the mean of u over the cloud). On closed clouds u > 1 inside while ℓ is not small against the features
+    /// (errata.md, 2 and 13).
+    ///
+    /// # Errors
+    /// Those of [`Solution::of`].
+    pub fn signature(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let ones = vec![1.0; solver.n_points()];
+        Self::fit(solver, &ones, observer)
+    }
+
+    /// Evaluates at queries `[m, d]`.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] if derivatives are asked of a kernel with a
+    /// kink at a point of the cloud; [`NumericsError::Overflow`]; [`NumericsError::Cancelled`].
+    pub fn at(
+        &self,
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Jets, NumericsError> {
+        let (cloud, kernel) = (self.solver.cloud(), self.solver.kernel());
+        cloud.check_same_dimension(queries)?;
+        if order != JetOrder::Value {
+            check_smooth_at(cloud, kernel, queries)?;
+        }
+        observer.enter(Stage::Evaluate);
+        let jets = self.solver.expansion(&self.solution.weights).at(queries, order, observer)?;
+        Ok(match &self.solution.trend {
+            None => jets,
+            Some(trend) => jets.plus_linear(queries, &trend.gradient(), |x| trend.at(x)),
+        })
+    }
+}

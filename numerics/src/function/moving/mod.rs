@@ -1,0 +1,270 @@
+//! Kriging in a moving neighbourhood: value, derivatives and variance at a query from the points nearest to it.
+//!
+//! Nothing is factorized beforehand and the work grows with the queries alone, so clouds may have any size. With N the nearest points of a
+//! query q and `w = (K_NN + α_N)⁻¹ k(N, q)`, the mean is `wᵀy_N` and the variance `k₀ − wᵀk(N, q)`: the posterior given these
+//! values alone (Chilès and Delfiner 2012, sec. 3.6). A cloud of no more than [`NEIGHBOURS`] points is its own
+//! neighbourhood everywhere, and this is the dense posterior.
+//!
+//! Points whose correlation with the query is below 2⁻⁵⁰⁰ do not count: far from all points the mean is exactly that of the process.
+//!
+//! Gradient and Hessian are those of the function that the neighbours define: exact for it, but the means of two queries with other
+//! neighbours are not values of one function.
+
+mod batch;
+mod coarse;
+mod enough;
+mod fit;
+mod kriging;
+mod near;
+mod parts;
+mod quantities;
+#[cfg(test)]
+mod tests;
+
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::deviations::JetDeviations;
+use super::posterior::Variances;
+use crate::error::NumericsError;
+use crate::machine::instruction_set::InstructionSet;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbours;
+use crate::points::sampling::Sampling;
+use crate::solver::System;
+use crate::solver::choose::NEIGHBOURS;
+use crate::solver::trend::Trend;
+use crate::sums::jets::{JetOrder, Jets};
+pub use coarse::Coarse;
+use fit::{Fit, Room};
+use near::Near;
+pub(crate) use quantities::Functionals;
+use quantities::Quantities;
+
+/// A system that is solved around each query anew.
+pub struct Moving {
+    system: System,
+    near: Near,
+}
+
+/// What is asked at queries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MovingRequest<'a> {
+    pub order: JetOrder,
+    pub has_variances: bool,
+    /// Deviations of all that is asked for, derivatives included.
+    pub has_deviations: bool,
+    /// The mean of the function, if it has one.
+    pub trend: Option<&'a Trend>,
+}
+
+/// What is found there.
+pub struct MovingAnswer {
+    pub jets: Jets,
+    /// Variances of the latent function, if asked for.
+    pub variances: Option<Variances>,
+    /// Of the jets, if asked for.
+    pub deviations: Option<JetDeviations>,
+    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    pub n_dependent: usize,
+}
+
+/// What is asked of functionals of derivatives, up to an order.
+#[derive(Clone, Copy)]
+pub(crate) struct FunctionalsRequest<'a> {
+    pub(crate) order: JetOrder,
+    pub(crate) functionals: Functionals<'a>,
+    /// Of each query.
+    pub(crate) count: usize,
+    /// The mean of the function, if it has one.
+    pub(crate) trend: Option<&'a Trend>,
+}
+
+/// What is found of them.
+pub(crate) struct MovingFunctionals {
+    pub(crate) jets: Jets,
+    /// `[m, count]`.
+    pub(crate) deviations: Vec<f64>,
+    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    pub(crate) n_dependent: usize,
+}
+
+impl Moving {
+    /// Local kriging of a system, with how its cloud is sampled.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn new(
+        system: System,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let near = match system.kernel().stretched_cloud(system.cloud()) {
+            None => Near::Sampled(sampling),
+            Some(cloud) => Near::Stretched(Neighbours::of(&cloud, observer)?),
+        };
+        Ok(Self { system, near })
+    }
+
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Points of a neighbourhood.
+    pub fn n_neighbours(&self) -> usize {
+        NEIGHBOURS.min(self.system.n_points())
+    }
+
+    /// Bytes held on the heap, those of the cloud and its sampling included.
+    pub fn n_bytes(&self) -> usize {
+        self.system.n_bytes() + self.near.n_bytes()
+    }
+
+    /// Answers at queries `[m, d]` for values `[n]`, unit V.
+    ///
+    /// Variances and deviations take in what is not known of the mean.
+    ///
+    /// A negative variance is clamped only within `τ = 4ε(k₀ + (k k₀ + max α)|w|²)`, k the neighbours, and reported.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`]; [`NumericsError::KernelNotSmooth`] if derivatives
+    /// are asked of a kernel with a kink at a point of the cloud; [`NumericsError::DerivativesVary`] if their deviations are, where the process
+    /// has no such derivatives; [`NumericsError::NotPositiveDefinite`] with a variance below −τ;
+    /// [`NumericsError::Overflow`]; [`NumericsError::Cancelled`].
+    pub fn at(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        request: MovingRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<MovingAnswer, NumericsError> {
+        self.at_with(InstructionSet::best(), values, queries, request, observer)
+    }
+
+    fn at_with(
+        &self,
+        set: InstructionSet,
+        values: &[f64],
+        queries: &Cloud,
+        request: MovingRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<MovingAnswer, NumericsError> {
+        let (kernel, d, order) = (self.system.kernel(), queries.dimension(), request.order.degree());
+        let quantities = match request.has_deviations {
+            true => Quantities::derivatives(kernel, d, order)?,
+            false => Quantities::none(),
+        };
+        let asked = Asked { set, request, quantities, n_neighbours: self.n_neighbours() };
+        let Raw { jets, mut sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
+        let variances = clamped(sure.iter().step_by(n_sure).copied().collect());
+        let deviations = request.has_deviations.then(|| {
+            let values = sure.iter_mut().step_by(n_sure).zip(&variances.latent);
+            values.for_each(|(slot, variance)| *slot = if *slot < 0.0 { -0.0 } else { variance.sqrt() });
+            let clamped = of_clamped(&mut sure, n_sure);
+            JetDeviations { clamped, ..JetDeviations::of_packed(&sure, d, order) }
+        });
+        let variances = request.has_variances.then_some(variances);
+        Ok(MovingAnswer { jets, variances, deviations, n_dependent })
+    }
+
+    /// Jets at queries with the deviations `[m, count]` of functionals of their derivatives, `count` at each query.
+    ///
+    /// # Errors
+    /// Those of [`Moving::at`].
+    pub(crate) fn functionals_at(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        asked: FunctionalsRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<MovingFunctionals, NumericsError> {
+        let FunctionalsRequest { order, functionals, count, trend } = asked;
+        let quantities = Quantities::functionals(self.system.kernel(), functionals, count, order.degree())?;
+        let request = MovingRequest { order, has_variances: false, has_deviations: false, trend };
+        let (set, n_neighbours) = (InstructionSet::best(), self.n_neighbours());
+        let asked = Asked { set, request, quantities, n_neighbours };
+        let Raw { jets, sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
+        let deviations = sure.chunks_exact(n_sure).flat_map(|sure| &sure[1..]).map(|s| s.abs()).collect();
+        Ok(MovingFunctionals { jets, deviations, n_dependent })
+    }
+
+    fn run(
+        &self,
+        values: &[f64],
+        queries: &Cloud,
+        asked: Asked<'_>,
+        observer: &dyn Observer,
+    ) -> Result<Raw, NumericsError> {
+        let (set, trend) = (asked.set, asked.request.trend);
+        let cloud = self.system.cloud();
+        cloud.check_same_dimension(queries)?;
+        cloud.check_one_per_point(values)?;
+        observer.enter(Stage::Evaluate);
+        let (m, lanes) = (queries.n_points(), set.n_lanes());
+        let values = match trend {
+            None => Cow::Borrowed(values),
+            Some(trend) => Cow::Owned(trend.removed_from(values, cloud)),
+        };
+        let fit = Fit::new(self, &values, queries, asked);
+        let (width, n_sure) = (fit.layout.width(), 1 + fit.parts.n_quantities());
+        let (mut packed, mut sure) = (vec![0.0; m * width], vec![0.0; m * n_sure]);
+        let n_dependent = AtomicUsize::new(0);
+        let slots = packed.par_chunks_mut(lanes * width).zip(sure.par_chunks_mut(lanes * n_sure));
+        slots.enumerate().try_for_each_init(
+            || Room::new(&fit, set),
+            |room, (batch, (jets, sure))| {
+                observer.checkpoint()?;
+                room.put(&fit, batch * lanes, sure.len() / n_sure)?;
+                n_dependent.fetch_add(fit.answer(room, batch * lanes, jets, sure)?, Ordering::Relaxed);
+                Ok(())
+            },
+        )?;
+        let jets = Jets::of(fit.layout, packed);
+        let jets = match trend {
+            None => jets,
+            Some(trend) => jets.plus_linear(queries, &trend.gradient(), |x| trend.at(x)),
+        };
+        Ok(Raw { jets, sure, n_sure, n_dependent: n_dependent.into_inner() })
+    }
+}
+
+/// What is asked of batches.
+struct Asked<'a> {
+    set: InstructionSet,
+    request: MovingRequest<'a>,
+    quantities: Quantities<'a>,
+    /// Points of a neighbourhood.
+    n_neighbours: usize,
+}
+
+/// What batches find.
+struct Raw {
+    jets: Jets,
+    /// The variance of the value, then deviations of the other quantities, `[m, n_sure]`; −0 where rounding made a variance negative.
+    sure: Vec<f64>,
+    n_sure: usize,
+    n_dependent: usize,
+}
+
+/// The queries with a deviation of −0, which says that rounding made its variance negative; it is 0 then.
+fn of_clamped(deviations: &mut [f64], per_query: usize) -> Vec<usize> {
+    let mut clamped = Vec::new();
+    for (query, deviations) in deviations.chunks_exact_mut(per_query).enumerate() {
+        if deviations.iter().any(|deviation| deviation.is_sign_negative()) {
+            clamped.push(query);
+            deviations.iter_mut().for_each(|deviation| *deviation = deviation.abs());
+        }
+    }
+    clamped
+}
+
+/// Variances that rounding made negative, served as 0.
+fn clamped(mut latent: Vec<f64>) -> Variances {
+    let clamped = (0..latent.len()).filter(|&query| latent[query] < 0.0).collect();
+    latent.iter_mut().for_each(|variance| *variance = variance.max(0.0));
+    Variances { latent, clamped }
+}

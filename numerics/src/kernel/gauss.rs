@@ -1,0 +1,35 @@
+//! Gauss: φ(q) = exp(−q), so k = variance · exp(−|x − y|²/ℓ²), without a factor ½ (errata.md, "Settled").
+
+use pulp::Simd;
+
+use super::facts::{Facts, analytic_length_scale};
+use super::profile::Profile;
+use crate::machine::exp::exp_minus;
+use crate::machine::registers::Pack;
+use crate::points::sampling::Scales;
+
+pub(super) struct Gauss;
+
+impl Profile for Gauss {
+    /// φ, φ′, φ″ = e^{−q}, −e^{−q}, e^{−q}.
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        let e = exp_minus(q);
+        [e, -e, e]
+    }
+}
+
+impl Facts for Gauss {
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        analytic_length_scale(scales)
+    }
+
+    /// Four h₄: with the three nearest distances that surfaces want, the Laplacian of smooth values is off by a tenth, with these by 1e-8.
+    fn length_scale_of_values(&self, scales: &Scales) -> f64 {
+        (4.0 * scales.spacing).min(2.0 * scales.radius)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (0, 0.0)
+    }
+}

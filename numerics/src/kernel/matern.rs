@@ -1,0 +1,103 @@
+//! Half-integer Matérn, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q), with θ_p the reverse Bessel polynomials.
+//!
+//! Since s^ν K_ν(s) = √(π/2) e^{−s} θ_p(s) and (s^ν K_ν)′ = −s · s^{ν−1}K_{ν−1}, a derivative in q only lowers the index:
+//! d/dq [e^{−s} θ_p] = −ν e^{−s} θ_{p−1} (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and Williams 2006, eq. 4.16).
+
+use pulp::Simd;
+
+use super::facts::{Facts, SMOOTH_SPACINGS};
+use super::laplace::Laplace;
+use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
+use crate::machine::exp::exp_minus;
+use crate::machine::registers::Pack;
+use crate::points::sampling::Scales;
+
+/// The greatest order p, ν = p + ½.
+pub const MAX_MATERN_ORDER: u8 = 8;
+
+/// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
+const FAR: f64 = 1e3;
+
+pub(super) struct Matern {
+    pub(super) order: u8,
+}
+
+impl Profiles for Matern {
+    #[inline(always)]
+    fn run<S: Simd>(self, pairs: impl Pairs<S>) {
+        match self.order {
+            // s = r: the same formula, and one loop less to compile.
+            0 => Laplace { epsilon: 0.0 }.run(pairs),
+            1 => OfOrder::<1>.run(pairs),
+            2 => OfOrder::<2>.run(pairs),
+            order => OfAnyOrder { order }.run(pairs),
+        }
+    }
+}
+
+impl Facts for Matern {
+    fn refused(&self) -> Option<(&'static str, &'static str)> {
+        (self.order > MAX_MATERN_ORDER).then_some(("nu", "must be one of 0.5, 1.5, ..., 8.5"))
+    }
+
+    fn has_kink(&self) -> bool {
+        self.order == 0
+    }
+
+    fn has_second_derivatives(&self) -> bool {
+        self.order >= 2
+    }
+
+    fn cusp_width(&self) -> Option<f64> {
+        self.has_kink().then_some(0.0)
+    }
+
+    fn default_length_scale(&self, scales: &Scales) -> f64 {
+        (SMOOTH_SPACINGS * scales.spacing).min(2.0 * scales.radius)
+    }
+
+    fn canonical(&self) -> (u8, f64) {
+        (2, f64::from(self.order))
+    }
+}
+
+/// ν = P + ½ for the orders that are used most, P of 1 or 2.
+struct OfOrder<const P: u8>;
+
+impl<const P: u8> Profile for OfOrder<P> {
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        profile(q, P)
+    }
+}
+
+/// ν = order + ½ for any order: its loop is not unrolled.
+struct OfAnyOrder {
+    order: u8,
+}
+
+impl Profile for OfAnyOrder {
+    #[inline(always)]
+    fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3] {
+        profile(q, self.order)
+    }
+}
+
+/// φ, φ′, φ″ for an order of 1 or more.
+#[inline(always)]
+fn profile<S: Simd>(q: Pack<S>, order: u8) -> [Pack<S>; 3] {
+    let nu = f64::from(order) + 0.5;
+    let (s, inverse) = distance_and_inverse(2.0 * nu * q, FAR * FAR);
+    let (s_squared, one) = (s * s, Pack::splat(q.simd(), 1.0));
+    // θ_{p−2}, θ_{p−1}, θ_p from p = 1 on, with θ_{−1} = 1/s, which only order 1 meets; raised one by one by
+    // θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
+    let (mut lowest, mut lower, mut theta) = (if order == 1 { inverse } else { one }, one, 1.0 + s);
+    let mut at_zero = 1.0;
+    for p in 1..order {
+        let odd = f64::from(2 * p + 1);
+        (lowest, lower, theta) = (lower, theta, s_squared.mul_add(lower, odd * theta));
+        at_zero *= odd;
+    }
+    let e = exp_minus(s) * (1.0 / at_zero);
+    [e * theta, -nu * e * lower, nu * nu * e * lowest]
+}

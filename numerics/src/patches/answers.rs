@@ -1,0 +1,232 @@
+//! Normals, curvatures and deviations at many queries.
+
+use rayon::prelude::*;
+use smallvec::SmallVec;
+
+use super::Patches;
+use super::estimate::Estimate;
+use super::neighbourhood::Neighbourhood;
+use super::pooled::Weighted;
+use super::regression::{MAX_LANES, Model, n_terms};
+use super::room::{Purpose, Room};
+use crate::error::NumericsError;
+use crate::machine::instruction_set::InstructionSet;
+use crate::machine::small::{Small, zeros};
+use crate::machine::vector::norm;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+
+/// The surface at m queries, in flat arrays; entries of queries without answer are zero.
+pub struct PatchGeometry {
+    /// Whether there is an answer, `[m]`.
+    pub is_known: Vec<bool>,
+    /// Unit normals of either sign, `[m, d]`.
+    pub normals: Vec<f64>,
+    /// Minus the second derivatives of the height, over the tangent plane, in space, `[m, d, d]`, 1/L: the shape operator for these
+    /// normals.
+    pub shapes: Vec<f64>,
+    /// Whether the query is at the rim of its neighbourhood, `[m]`.
+    pub is_at_rim: Vec<bool>,
+    /// Height of the query above the surface along the normal, `[m]`, L.
+    pub heights: Vec<f64>,
+    /// `[m]`, radians.
+    pub normal_deviations: Vec<f64>,
+    /// Deviations of the curvatures, if asked for.
+    pub curvatures: Option<CurvatureDeviations>,
+}
+
+/// Standard deviations of curvatures, 1/L (1/L^{d−1} for Gauss), in flat arrays; principal ones ascending by the curvatures for the
+/// normals they come with.
+#[derive(Default)]
+pub struct CurvatureDeviations {
+    /// `[m, d−1]`
+    pub principal: Vec<f64>,
+    /// `[m]`
+    pub mean: Vec<f64>,
+    /// `[m]`
+    pub gaussian: Vec<f64>,
+    /// Whether the surface turns by a radian or more within the radius of the neighbourhood, `[m]`: too much for a quadric, and for
+    /// what deviations can say.
+    pub is_bent: Vec<bool>,
+}
+
+/// Largest curvature in units of the radius of the neighbourhood from which a surface is bent: half of what is off by half in spite of small
+/// deviations is beyond, and 2 % of what is right (docs/error-bars.md).
+const BENT: f64 = 1.0;
+
+/// Deviation of a normal below which its neighbourhood is flat enough for a stiffer process to give the slopes, radians.
+const FLAT: f64 = 0.03;
+
+impl PatchGeometry {
+    fn unknown(m: usize, d: usize, with_deviations: bool) -> Self {
+        let curvatures = with_deviations.then(|| CurvatureDeviations {
+            principal: vec![0.0; m * (d - 1)],
+            mean: vec![0.0; m],
+            gaussian: vec![0.0; m],
+            is_bent: vec![false; m],
+        });
+        Self {
+            is_known: vec![false; m],
+            normals: vec![0.0; m * d],
+            shapes: vec![0.0; m * d * d],
+            is_at_rim: vec![false; m],
+            heights: vec![0.0; m],
+            normal_deviations: vec![0.0; m],
+            curvatures,
+        }
+    }
+
+    /// The places of every `lanes` queries.
+    fn slots(&mut self, d: usize, lanes: usize) -> Vec<Slots<'_>> {
+        let n_slots = self.is_known.len().div_ceil(lanes);
+        let mut curvatures: Vec<Option<CurvatureSlots<'_>>> = Vec::new();
+        if let Some(deviations) = &mut self.curvatures {
+            let rest = deviations.mean.chunks_mut(lanes).zip(deviations.gaussian.chunks_mut(lanes));
+            let rest = rest.zip(deviations.is_bent.chunks_mut(lanes));
+            let all = deviations.principal.chunks_mut(lanes * (d - 1)).zip(rest);
+            let slots = |(principal, ((mean, gaussian), is_bent))| {
+                Some(CurvatureSlots { principal, mean, gaussian, is_bent })
+            };
+            curvatures.extend(all.map(slots));
+        }
+        curvatures.resize_with(n_slots, || None);
+        let vectors = self.normals.chunks_mut(lanes * d).zip(self.shapes.chunks_mut(lanes * d * d));
+        let numbers = self.heights.chunks_mut(lanes).zip(self.normal_deviations.chunks_mut(lanes));
+        let flags = self.is_known.chunks_mut(lanes).zip(self.is_at_rim.chunks_mut(lanes));
+        let all = vectors.zip(numbers).zip(flags).zip(curvatures);
+        all.map(|((((normals, shapes), (heights, normal_deviations)), (is_known, is_at_rim)), curvatures)| {
+            Slots { normals, shapes, heights, normal_deviations, is_known, is_at_rim, curvatures }
+        })
+        .collect()
+    }
+}
+
+/// The part of a [`PatchGeometry`] that belongs to the queries of one batch.
+struct Slots<'a> {
+    normals: &'a mut [f64],
+    shapes: &'a mut [f64],
+    heights: &'a mut [f64],
+    normal_deviations: &'a mut [f64],
+    is_known: &'a mut [bool],
+    is_at_rim: &'a mut [bool],
+    curvatures: Option<CurvatureSlots<'a>>,
+}
+
+struct CurvatureSlots<'a> {
+    principal: &'a mut [f64],
+    mean: &'a mut [f64],
+    gaussian: &'a mut [f64],
+    is_bent: &'a mut [bool],
+}
+
+impl Slots<'_> {
+    fn put(&mut self, lane: usize, place: &Neighbourhood, estimate: &Estimate, d: usize, are_points: bool) {
+        let k = d - 1;
+        self.is_known[lane] = true;
+        self.is_at_rim[lane] = place.is_at_rim;
+        let (normal, shape) = in_space(estimate, place, d);
+        self.normals[lane * d..][..d].copy_from_slice(&normal);
+        self.shapes[lane * d * d..][..d * d].copy_from_slice(&shape);
+        self.heights[lane] = -estimate.means[0] * place.radius;
+        self.normal_deviations[lane] = estimate.normal_deviation(d, are_points);
+        if let Some(curvatures) = &mut self.curvatures {
+            let found = estimate.curvatures(d, are_points);
+            let principal = curvatures.principal[lane * k..][..k].iter_mut();
+            principal.zip(&found.principal).for_each(|(slot, deviation)| *slot = deviation / place.radius);
+            curvatures.mean[lane] = found.mean / place.radius;
+            curvatures.gaussian[lane] = found.gaussian / place.radius.powi(k as i32);
+            curvatures.is_bent[lane] = found.bend >= BENT;
+        }
+    }
+}
+
+impl Patches {
+    /// Normals, curvatures and deviations at queries. `are_points` says that they are the points themselves, with their noise.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn at(
+        &self,
+        queries: &Cloud,
+        are_points: bool,
+        with_deviations: bool,
+        observer: &dyn Observer,
+    ) -> Result<PatchGeometry, NumericsError> {
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let mut geometry = PatchGeometry::unknown(m, d, with_deviations);
+        if self.count < n_terms(d) + 2 {
+            return Ok(geometry);
+        }
+        let of = |mixture: &[Weighted]| mixture.iter().map(|weighted| weighted.model).collect::<Vec<Model>>();
+        let (models, stiff) = (of(&self.models), of(&self.stiff));
+        let lanes = InstructionSet::best().n_lanes();
+        let slots = geometry.slots(d, lanes).into_par_iter().enumerate();
+        slots.try_for_each_init(
+            || Room::new(self.count, d, lanes),
+            |room, (batch, mut slots)| {
+                observer.checkpoint()?;
+                let first = batch * lanes;
+                let places = room.put(self, queries, first..(first + lanes).min(m));
+                let estimates = self.estimates(room, &places, [&models, &stiff], (d, are_points));
+                for (lane, (place, estimate)) in places.iter().zip(&estimates).enumerate() {
+                    if let (Some(place), Some(estimate)) = (place, estimate) {
+                        slots.put(lane, place, estimate, d, are_points);
+                    }
+                }
+                Ok(())
+            },
+        )?;
+        Ok(geometry)
+    }
+
+    /// What is known in each lane: by the models, but for the slopes of what is flat, which are those of the stiff ones.
+    fn estimates(
+        &self,
+        room: &mut Room,
+        places: &[Option<Neighbourhood>],
+        [models, stiff]: [&[Model]; 2],
+        (d, are_points): (usize, bool),
+    ) -> SmallVec<[Option<Estimate>; MAX_LANES]> {
+        room.krige(models, Purpose::Prediction);
+        let mut estimates = SmallVec::new();
+        for (place, kriged) in places.iter().zip(&room.kriged) {
+            estimates.push(place.as_ref().and_then(|_| Estimate::of(&self.models, kriged, d)));
+        }
+        let is_flat = |estimate: &Estimate| estimate.normal_deviation(d, are_points) < FLAT;
+        if stiff.is_empty() || !estimates.iter().flatten().any(is_flat) {
+            return estimates;
+        }
+        room.krige(stiff, Purpose::Prediction);
+        for (estimate, kriged) in estimates.iter_mut().zip(&room.kriged) {
+            if let Some(estimate) = estimate.as_mut().filter(|estimate| is_flat(estimate)) {
+                estimate.take_slopes(Estimate::of(&self.stiff, kriged, d), d);
+            }
+        }
+        estimates
+    }
+}
+
+/// Unit normal and shape operator in space.
+fn in_space(estimate: &Estimate, place: &Neighbourhood, d: usize) -> (Small, Small) {
+    let k = d - 1;
+    let axis = |i: usize| &place.frame[i * d..][..d];
+    let mut normal = Small::from_slice(axis(k));
+    for a in 0..k {
+        normal.iter_mut().zip(axis(a)).for_each(|(n, t)| *n -= estimate.means[1 + a] * t);
+    }
+    let length = norm(&normal);
+    normal.iter_mut().for_each(|n| *n /= length);
+    let hessian = estimate.hessian(d);
+    let mut shape = zeros(d * d);
+    for a in 0..k {
+        for b in 0..k {
+            let entry = -hessian[a * k + b] / (length * place.radius);
+            for (i, u) in axis(a).iter().enumerate() {
+                for (j, v) in axis(b).iter().enumerate() {
+                    shape[i * d + j] += entry * u * v;
+                }
+            }
+        }
+    }
+    (normal, shape)
+}

@@ -1,0 +1,108 @@
+//! What a surface is regressed on: the points of a cloud, or means of a few of them.
+
+use std::sync::Arc;
+
+use crate::error::NumericsError;
+use crate::machine::heap::vec_bytes;
+use crate::observer::Observer;
+use crate::points::cells::{Cells, mean, second_moments};
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbours;
+use crate::points::sampling::Sampling;
+
+/// Points, or means of points, with their neighbours.
+///
+/// The mean of m points has the m-th part of their noise, and a neighbourhood of so many means reaches √m times as far: that is how
+/// neighbourhoods grow with the noise at the same cost. Polynomials of second order are averaged exactly, by the second moments
+/// of the points about their mean.
+pub(crate) enum Support {
+    Points { cloud: Arc<Cloud>, sampling: Arc<Sampling> },
+    Means(Means),
+}
+
+pub(crate) struct Means {
+    cloud: Cloud,
+    neighbours: Neighbours,
+    /// Points of each mean, `[n]`.
+    counts: Vec<f64>,
+    /// Second moments about it, over the count, upper triangles `[n, d(d+1)/2]`, unit L².
+    moments: Vec<f64>,
+}
+
+impl Support {
+    /// Means of cells of at most `group` points.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let d = cloud.dimension();
+        let (mut coordinates, mut counts, mut moments) = (Vec::new(), Vec::new(), Vec::new());
+        for cell in Cells::of_all(cloud, group).iter() {
+            let mean = mean(cloud, cell);
+            let second = second_moments(cloud, cell, &mean);
+            moments.extend((0..d).flat_map(|a| (a..d).map(move |b| a * d + b)).map(|at| second[at]));
+            coordinates.extend_from_slice(&mean);
+            counts.push(cell.len() as f64);
+        }
+        let cloud = Cloud::new(coordinates, d)?;
+        let neighbours = Neighbours::of(&cloud, observer)?;
+        Ok(Self::Means(Means { cloud, neighbours, counts, moments }))
+    }
+
+    pub(crate) fn cloud(&self) -> &Cloud {
+        match self {
+            Self::Points { cloud, .. } => cloud,
+            Self::Means(means) => &means.cloud,
+        }
+    }
+
+    pub(crate) fn neighbours(&self) -> &Neighbours {
+        match self {
+            Self::Points { sampling, .. } => sampling.neighbours(),
+            Self::Means(means) => &means.neighbours,
+        }
+    }
+
+    /// Points per mean: 1 for points.
+    pub(crate) fn count(&self, at: usize) -> f64 {
+        match self {
+            Self::Points { .. } => 1.0,
+            Self::Means(means) => means.counts[at],
+        }
+    }
+
+    /// `uᵀMv` of the second moments M of a mean.
+    pub(crate) fn moment(&self, at: usize, u: &[f64], v: &[f64]) -> f64 {
+        let Self::Means(means) = self else { return 0.0 };
+        let d = u.len();
+        let moments = &means.moments[at * d * (d + 1) / 2..];
+        let (mut sum, mut next) = (0.0, 0);
+        for a in 0..d {
+            sum += moments[next] * u[a] * v[a];
+            next += 1;
+            for b in a + 1..d {
+                sum += moments[next] * (u[a] * v[b] + u[b] * v[a]);
+                next += 1;
+            }
+        }
+        sum
+    }
+
+    /// Whether its points stand for several of the cloud.
+    pub(crate) fn has_moments(&self) -> bool {
+        matches!(self, Self::Means(_))
+    }
+
+    /// Bytes held on the heap beside the cloud and its sampling.
+    pub(crate) fn n_bytes(&self) -> usize {
+        match self {
+            Self::Points { .. } => 0,
+            Self::Means(means) => {
+                means.cloud.n_bytes()
+                    + means.neighbours.n_bytes()
+                    + vec_bytes(&means.counts)
+                    + vec_bytes(&means.moments)
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! Local regression: a surface as heights over a tangent plane at every query, kriged from the nearest points.
+//!
+//! The surface around a query is a height over its tangent plane: a quadric, what its curvature entails beyond second order, a Gaussian
+//! process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample of neighbourhoods
+//! (`pooled`), and so does the size of the neighbourhoods, which grows with the noise (`means`). The posterior gives normal and
+//! curvatures with their deviations (`estimate`). Everything is local: work and memory are linear in points and queries.
+
+mod answers;
+mod estimate;
+mod means;
+mod neighbourhood;
+mod pooled;
+mod regression;
+mod room;
+
+use std::sync::Arc;
+
+use super::error::NumericsError;
+use super::machine::heap::vec_bytes;
+use super::observer::Observer;
+use super::points::cloud::Cloud;
+use super::points::sampling::{Sampling, median};
+use estimate::Estimate;
+use means::Support;
+use neighbourhood::{Neighbourhood, n_neighbours};
+use pooled::{LENGTH_SCALE, STIFF, Weighted, candidates, pool, responsibilities};
+use regression::{Kriged, Model, n_terms};
+use room::{Found, Purpose};
+
+pub use answers::{CurvatureDeviations, PatchGeometry};
+
+/// Neighbourhoods whose likelihood is pooled, or fewer than twice as many.
+const N_SITES: usize = 96;
+
+/// Those at most, where others choose them.
+pub const MAX_SITES: usize = 2 * N_SITES;
+
+/// Points per mean that are tried, one after the other.
+const GROUPS: [usize; 7] = [1, 3, 8, 24, 72, 216, 648];
+
+/// Means that a cloud must leave for it to be worth trying.
+const LEAST_MEANS: usize = 60;
+
+/// How much smaller deviations must become for larger neighbourhoods.
+const WORTH: f64 = 0.95;
+
+/// Local regressions of the surface that a cloud samples, d ≥ 2.
+pub struct Patches {
+    support: Support,
+    models: Vec<Weighted>,
+    /// For slopes where the surface is flat; none where there is no noise.
+    stiff: Vec<Weighted>,
+    count: usize,
+    noise: f64,
+    kernel: PatchKernel,
+    group: usize,
+}
+
+/// The covariance of the heights where most of the cloud is.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PatchKernel {
+    /// ℓ, unit L.
+    pub length_scale: f64,
+    /// s², unit L².
+    pub variance: f64,
+}
+
+impl Patches {
+    /// Chooses neighbourhoods and hyperparameters, as points of every spacing have them.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn of(
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let sites = cloud.select(&sampling.of_every_spacing(N_SITES));
+        Self::learned_at(&sites, cloud, sampling, observer)
+    }
+
+    /// Chooses them as the neighbourhoods of sites `[s, d]` have it. Parts of a cloud that hold the same
+    /// neighbourhoods of the same sites learn the same.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn learned_at(
+        sites: &Cloud,
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        if cloud.dimension() < 2 {
+            return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
+        }
+        let mut best: Option<(f64, Self)> = None;
+        for group in GROUPS {
+            if group > 1 && cloud.n_points() / group < LEAST_MEANS {
+                break;
+            }
+            let support = match group {
+                1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
+                _ => Support::means(&cloud, group, observer)?,
+            };
+            let (deviation, patches) = Self::over(sites, support, group, observer)?;
+            let is_exact = patches.noise == 0.0;
+            let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
+            if is_better {
+                best = Some((deviation, patches));
+            }
+            if !is_better || is_exact {
+                break;
+            }
+        }
+        best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
+    }
+
+    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise at
+    /// sites.
+    fn over(
+        sites: &Cloud,
+        support: Support,
+        group: usize,
+        observer: &dyn Observer,
+    ) -> Result<(f64, Self), NumericsError> {
+        let d = sites.dimension();
+        let count = n_neighbours(d, support.cloud().n_points());
+        let mut patches = Self {
+            support,
+            models: Vec::new(),
+            stiff: Vec::new(),
+            count,
+            noise: 0.0,
+            kernel: PatchKernel::default(),
+            group,
+        };
+        if count < n_terms(d) + 2 {
+            return Ok((f64::INFINITY, patches));
+        }
+        patches.models = patches.pooled(LENGTH_SCALE, sites, observer)?;
+        let chosen: Vec<Model> = patches.models.iter().map(|weighted| weighted.model).collect();
+        let whole = patches.krige_each(sites, &chosen, Purpose::Prediction, observer)?;
+        let estimates: Vec<(f64, f64, f64, f64)> =
+            whole.iter().flatten().filter_map(|(at, kriged)| patches.summary(at, kriged, d)).collect();
+        let middle = |of: fn(&(f64, f64, f64, f64)) -> f64| median(estimates.iter().map(of).collect());
+        let deviation = middle(|e| e.0).unwrap_or(f64::INFINITY);
+        patches.noise = middle(|e| e.1).unwrap_or(0.0).sqrt();
+        patches.kernel = PatchKernel {
+            length_scale: middle(|e| e.2).unwrap_or(1.0),
+            variance: middle(|e| e.3).unwrap_or(1.0),
+        };
+        if patches.noise > 0.0 {
+            patches.stiff = patches.pooled(STIFF, sites, observer)?;
+        }
+        Ok((deviation, patches))
+    }
+
+    /// The mixture of models of one length scale that makes neighbourhoods of these queries most likely.
+    fn pooled(
+        &self,
+        length_scale: f64,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Weighted>, NumericsError> {
+        let candidates = candidates(n_terms(queries.dimension()), length_scale);
+        let found = self.krige_each(queries, &candidates, Purpose::Likelihood, observer)?;
+        let logs = |(_, kriged): &Found| kriged.iter().map(|k| k.log_likelihood).collect();
+        Ok(pool(&candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
+    }
+
+    /// Largest deviation of a principal curvature, variance of the noise, ℓ and s² of one neighbourhood.
+    fn summary(&self, at: &Neighbourhood, kriged: &[Kriged], d: usize) -> Option<(f64, f64, f64, f64)> {
+        let estimate = Estimate::of(&self.models, kriged, d)?;
+        let deviations = estimate.curvatures(d, true).principal;
+        let shares = responsibilities(&self.models, kriged);
+        let (mut length_scale, mut variance, mut noise) = (0.0, 0.0, 0.0);
+        for ((share, kriged), weighted) in
+            shares.iter().zip(kriged).zip(&self.models).filter(|((s, _), _)| **s > 0.0)
+        {
+            length_scale += share * weighted.model.length_scale * at.radius;
+            variance += share * kriged.scale * at.radius.powi(2);
+            // Below what rounding leaves, there is none.
+            noise +=
+                share * if weighted.model.noise > 1e-7 { kriged.scale * weighted.model.noise } else { 0.0 };
+        }
+        Some((
+            deviations.iter().copied().fold(0.0, f64::max) / at.radius,
+            noise * at.radius.powi(2),
+            length_scale,
+            variance,
+        ))
+    }
+
+    /// σ: standard deviation of the noise of the points across the surface, unit L.
+    pub fn noise(&self) -> f64 {
+        self.noise
+    }
+
+    /// The covariance of the heights where most of the cloud is.
+    pub fn kernel(&self) -> PatchKernel {
+        self.kernel
+    }
+
+    /// Points that a neighbourhood reaches at most.
+    pub fn n_points_used(&self) -> usize {
+        self.count * self.group
+    }
+
+    /// Bytes held on the heap beside the cloud and its sampling.
+    pub fn n_bytes(&self) -> usize {
+        self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::random::Random;
+    use crate::machine::vector::norm;
+    use crate::observer::Unobserved;
+
+    #[test]
+    fn dimensions_without_regressions_take_no_neighbours_and_have_no_answers() {
+        for (dimension, has_answers) in [(4, true), (5, false), (8, false)] {
+            let mut raw = vec![0.0; 150 * dimension];
+            Random::of(5, 0).fill_normal(&mut raw);
+            let on_sphere = raw.chunks(dimension).flat_map(|x| x.iter().map(|c| c / norm(x)));
+            let cloud = Arc::new(Cloud::new(on_sphere.collect(), dimension).unwrap());
+            let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+            let patches = Patches::of(cloud.clone(), sampling, &Unobserved).unwrap();
+            assert_eq!(patches.n_points_used() > 0, has_answers, "d = {dimension}");
+            let found = patches.at(&cloud, true, true, &Unobserved).unwrap();
+            assert_eq!(found.is_known.contains(&true), has_answers, "d = {dimension}");
+        }
+    }
+}

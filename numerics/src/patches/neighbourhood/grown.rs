@@ -1,0 +1,227 @@
+//! A neighbourhood that grows while the surface over it is known to bend little.
+
+use super::growth::Growth;
+use super::quadric::{Sums, largest_curvature, principal_axes};
+use super::sheet::Sheet;
+use super::{Batch, Neighbourhood, Scratch, Support};
+use crate::machine::vector::{dot, norm, tangent_basis};
+use crate::points::neighbours::Neighbour;
+
+/// Cosine of 75°, and distance in units of the radius below which points have no direction.
+const RIM_COSINE: f64 = 0.26;
+const RIM_LEAST: f64 = 0.01;
+
+/// A neighbourhood that grows, in D dimensions with P terms of the trend.
+pub(super) struct Grown<const D: usize, const P: usize> {
+    /// The points are the first ones of the scratch.
+    n_used: usize,
+    radius: f64,
+    /// D − 1 tangents, then the normal.
+    frame: [[f64; D]; D],
+    /// Coefficients of the quadric, in units of the radius: value, slopes, second derivatives.
+    pub(super) quadric: [f64; P],
+}
+
+impl<const D: usize, const P: usize> Grown<D, P> {
+    pub(super) fn put(
+        support: &Support,
+        x: &[f64],
+        nearest: &mut [Neighbour],
+        batch: &mut Batch,
+        lane: usize,
+        scratch: &mut Scratch,
+    ) -> Option<Neighbourhood> {
+        scratch.arms.clear();
+        for found in nearest.iter() {
+            let point = support.cloud().point(found.point);
+            (0..D).for_each(|c| scratch.arms.push(point[c] - x[c]));
+        }
+        let (mut grown, reach) = Self::start(support, nearest, scratch)?;
+        grown.grow(reach, support, nearest, scratch);
+        grown.entail(support, nearest, scratch)?;
+        grown.put_into(support, nearest, batch, lane, scratch);
+        let radius = grown.radius;
+        let frame = grown.frame.as_flattened().iter().copied().collect();
+        let is_at_rim = grown.is_at_rim(scratch);
+        Some(Neighbourhood { frame, radius, is_at_rim })
+    }
+
+    /// The frame of the principal axes of the nearest points, or of the sheet of the query where there are two, whose
+    /// points then come first; turned to the tangent plane of their quadric. With the height up to which points are of
+    /// that sheet.
+    fn start(
+        support: &Support,
+        nearest: &mut [Neighbour],
+        scratch: &mut Scratch,
+    ) -> Option<(Self, Option<f64>)> {
+        let n_used = (P + 3).min(nearest.len());
+        if n_used < P {
+            return None;
+        }
+        let radius = nearest[n_used - 1].squared_distance.sqrt();
+        if radius <= 0.0 {
+            return None;
+        }
+        let axes = principal_axes(&scratch.arms[..n_used * D], D, radius);
+        let mut frame = [[0.0; D]; D];
+        frame.as_flattened_mut().copy_from_slice(&axes);
+        let sheet = Sheet::of_two(&scratch.arms, &frame[D - 1]);
+        if let Some(sheet) = &sheet {
+            // A sheet has more than half of the points that are looked at: enough to start from.
+            bring_forward(sheet, nearest, &mut scratch.arms);
+            frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&sheet.normal));
+            frame[D - 1] = sheet.normal;
+        }
+        let radius = nearest[n_used - 1].squared_distance.sqrt();
+        let mut grown = Self { n_used, radius, frame, quadric: [0.0; P] };
+        grown.look(support, nearest, scratch);
+        let mut sums = Sums::<P>::default();
+        for (at, found) in nearest[..n_used].iter().enumerate() {
+            sums.add(scratch.terms_at(at), scratch.heights[at], support.count(found.point));
+        }
+        grown.quadric = sums.fit()?.0;
+        grown.turn();
+        Some((grown, sheet.map(|sheet| sheet.reach)))
+    }
+
+    /// Takes in more points while the surface that is known bends little over them, without those of other sheets.
+    fn grow(
+        &mut self,
+        reach: Option<f64>,
+        support: &Support,
+        nearest: &mut [Neighbour],
+        scratch: &mut Scratch,
+    ) {
+        let unit = nearest.iter().fold(0.0, |unit: f64, found| unit.max(found.squared_distance)).sqrt();
+        (self.n_used, self.radius) = (nearest.len(), unit);
+        self.look(support, nearest, scratch);
+        let mut growth = Growth::<D, P>::up_to(reach.map_or(f64::INFINITY, |reach| reach / unit));
+        for count in [P + 3, 8 * P / 3, 4 * P, 5 * P, 6 * P, nearest.len()] {
+            if growth.take(count.min(nearest.len()), unit, support, nearest, scratch).is_none() {
+                break;
+            }
+        }
+        self.quadric = growth.quadric;
+        self.turn();
+        let kept = growth.keep(nearest, &mut scratch.arms);
+        (self.n_used, self.radius) = (kept, nearest[kept - 1].squared_distance.sqrt());
+    }
+
+    /// Coordinates in the frame, in units of the radius.
+    pub(super) fn look(&self, support: &Support, nearest: &[Neighbour], scratch: &mut Scratch) {
+        scratch.terms.clear();
+        scratch.heights.clear();
+        let inverse = 1.0 / self.radius;
+        for (arm, found) in scratch.arms.chunks_exact(D).zip(nearest).take(self.n_used) {
+            let mut local = [0.0; D];
+            for (slot, axis) in local.iter_mut().zip(&self.frame) {
+                *slot = (0..D).map(|c| axis[c] * arm[c]).sum::<f64>() * inverse;
+            }
+            let mut terms = [1.0; P];
+            terms[1..D].copy_from_slice(&local[..D - 1]);
+            let mut next = D;
+            for a in 0..D - 1 {
+                for b in a..D - 1 {
+                    terms[next] = local[a] * local[b] * if a == b { 0.5 } else { 1.0 };
+                    next += 1;
+                }
+            }
+            if support.count(found.point) > 1.0 {
+                self.spread(support, found.point, &mut terms);
+            }
+            scratch.terms.extend_from_slice(&terms);
+            scratch.heights.push(local[D - 1]);
+        }
+    }
+
+    /// Adds to products of the coordinates of a mean those of its points about it.
+    fn spread(&self, support: &Support, at: usize, terms: &mut [f64; P]) {
+        let mut next = D;
+        for a in 0..D - 1 {
+            for b in a..D - 1 {
+                let moment = support.moment(at, &self.frame[a], &self.frame[b]);
+                terms[next] += moment / self.radius.powi(2) * if a == b { 0.5 } else { 1.0 };
+                next += 1;
+            }
+        }
+    }
+
+    /// Largest absolute curvature times radius.
+    pub(super) fn bend(&self) -> f64 {
+        largest_curvature::<D, P>(&self.quadric)
+    }
+
+    /// Second derivatives as a matrix, in the upper left part.
+    pub(super) fn hessian(&self) -> [[f64; D]; D] {
+        super::quadric::hessian(&self.quadric)
+    }
+
+    /// Turns the frame into the tangent plane of the quadric at the query.
+    fn turn(&mut self) {
+        let mut normal = self.frame[D - 1];
+        for (slope, tangent) in self.quadric[1..D].iter().zip(&self.frame) {
+            normal.iter_mut().zip(tangent).for_each(|(n, t)| *n -= slope * t);
+        }
+        let length = norm(&normal);
+        normal.iter_mut().for_each(|n| *n /= length);
+        self.frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&normal));
+        self.frame[D - 1] = normal;
+    }
+
+    /// Whether the query is at the rim: in the plane, a sector of 150° has no points (see [`crate::points`], patches).
+    fn is_at_rim(&self, scratch: &Scratch) -> bool {
+        let terms = scratch.terms.as_chunks::<P>().0;
+        let mut away = [0.0; D];
+        for terms in terms {
+            (0..D - 1).for_each(|a| away[a] -= terms[1 + a]);
+        }
+        let length = norm(&away);
+        let along = |terms: &[f64; P]| (0..D - 1).map(|a| away[a] * terms[1 + a]).sum::<f64>();
+        let size = |terms: &[f64; P]| (0..D - 1).map(|a| terms[1 + a].powi(2)).sum::<f64>().sqrt();
+        // Points closer than a hundredth of the neighbourhood have no direction to speak of.
+        length > 0.0
+            && terms
+                .iter()
+                .filter(|terms| size(terms) > RIM_LEAST)
+                .all(|terms| along(terms) < RIM_COSINE * length * size(terms))
+    }
+
+    fn put_into(
+        &self,
+        support: &Support,
+        nearest: &[Neighbour],
+        batch: &mut Batch,
+        lane: usize,
+        scratch: &Scratch,
+    ) {
+        let terms = scratch.terms.as_chunks::<P>().0;
+        for (j, terms) in terms.iter().enumerate() {
+            batch.set_point(j, lane, true);
+            for a in 0..D - 1 {
+                batch.set_coordinate(a, j, lane, terms[1 + a]);
+            }
+            batch.set_coordinate(D - 1, j, lane, scratch.heights[j]);
+            batch.set_entailed(j, lane, scratch.raw[j] - scratch.heights[j]);
+            for (term, product) in terms[D..].iter().enumerate() {
+                batch.set_product(term, j, lane, *product);
+            }
+            batch.set_weight(j, lane, 1.0 / support.count(nearest[j].point));
+        }
+        batch.keep(lane, terms.len());
+    }
+}
+
+/// Brings the points of a sheet to the front, both parts ascending by their distance.
+fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], arms: &mut [f64]) {
+    let is_of_sheet = |arm: &[f64; D]| dot(arm, &sheet.normal).abs() <= sheet.reach;
+    let mut order: Vec<(bool, Neighbour, [f64; D])> = nearest
+        .iter()
+        .zip(arms.as_chunks::<D>().0)
+        .map(|(found, arm)| (!is_of_sheet(arm), *found, *arm))
+        .collect();
+    // Stable: the order of distances stays.
+    order.sort_by_key(|(is_of_other, ..)| *is_of_other);
+    for ((slot, place), (_, found, arm)) in nearest.iter_mut().zip(arms.as_chunks_mut::<D>().0).zip(&order) {
+        (*slot, *place) = (*found, *arm);
+    }
+}

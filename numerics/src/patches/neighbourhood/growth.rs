@@ -1,0 +1,111 @@
+//! How far a neighbourhood may grow, and which points are not of its sheet.
+
+use smallvec::SmallVec;
+
+use super::quadric::{Sums, largest_curvature};
+use super::{Scratch, Support};
+use crate::points::neighbours::Neighbour;
+
+/// Curvature times radius up to which a neighbourhood may grow: about the angle by which the normal turns.
+const MAX_BEND: f64 = 0.7;
+
+/// Standard error of a second derivative times √k, from k heights of unit noise over the unit disc.
+const DISC_ERROR: f64 = 8.5;
+
+/// Height above the quadric of nearer points, over the distance, beyond which a point is not of the same sheet; and how many
+/// deviations of what the quadric leaves come to that.
+const OTHER_SHEET: f64 = 0.3;
+const RESIDUALS: f64 = 3.0;
+
+/// A quadric over more and more points, in one frame and one unit.
+pub(super) struct Growth<const D: usize, const P: usize> {
+    sums: Sums<P>,
+    pub(super) quadric: [f64; P],
+    /// Deviation of the heights from it.
+    residual: f64,
+    /// Largest curvature that noise does not explain.
+    curvature: f64,
+    n_seen: usize,
+    /// Places that are taken, ascending.
+    taken: SmallVec<[u32; 64]>,
+    /// Height above the quadric beyond which a point is not of the same sheet in any case.
+    reach: f64,
+}
+
+impl<const D: usize, const P: usize> Growth<D, P> {
+    /// Nothing yet.
+    pub(super) fn up_to(reach: f64) -> Self {
+        Self {
+            sums: Sums::default(),
+            quadric: [0.0; P],
+            residual: 0.0,
+            curvature: 0.0,
+            n_seen: 0,
+            taken: SmallVec::new(),
+            reach,
+        }
+    }
+
+    /// Takes in the points up to `count`; `None` if the surface bends too much over them, or is not determined.
+    pub(super) fn take(
+        &mut self,
+        count: usize,
+        unit: f64,
+        support: &Support,
+        nearest: &[Neighbour],
+        scratch: &Scratch,
+    ) -> Option<()> {
+        let radius = nearest[count - 1].squared_distance.sqrt() / unit;
+        if self.curvature * radius > MAX_BEND {
+            return None;
+        }
+        let (mut sums, n_taken) = (self.sums, self.taken.len());
+        for (at, found) in nearest.iter().enumerate().take(count).skip(self.n_seen) {
+            let (terms, height) = (scratch.terms_at::<P>(at), scratch.heights[at]);
+            if self.n_seen == 0 || self.is_of_sheet(terms, height) {
+                sums.add(terms, height, support.count(found.point));
+                self.taken.push(at as u32);
+            }
+        }
+        let found = self.settle(&sums, radius);
+        match found {
+            Some(()) => (self.sums, self.n_seen) = (sums, count),
+            None if self.n_seen > 0 => self.taken.truncate(n_taken),
+            None => {}
+        }
+        found
+    }
+
+    /// The quadric of these points, if the surface bends little over them.
+    fn settle(&mut self, sums: &Sums<P>, radius: f64) -> Option<()> {
+        let (quadric, residual) = sums.fit()?;
+        let n_used = self.taken.len() as f64;
+        let freedom = (n_used - P as f64).max(1.0);
+        let noise = DISC_ERROR * (residual / freedom / n_used).sqrt() / (radius * radius);
+        let bend = largest_curvature::<D, P>(&quadric);
+        let curvature = (bend - 2.0 * noise).max(0.0);
+        // The first points are all that is known.
+        if !bend.is_finite() || self.n_seen > 0 && curvature * radius > MAX_BEND {
+            return None;
+        }
+        self.curvature = self.curvature.max(curvature);
+        (self.quadric, self.residual) = (quadric, (residual / freedom).sqrt());
+        Some(())
+    }
+
+    fn is_of_sheet(&self, terms: &[f64; P], height: f64) -> bool {
+        let expected: f64 = self.quadric.iter().zip(terms).map(|(q, t)| q * t).sum();
+        let distance = (terms[1..D].iter().map(|t| t * t).sum::<f64>() + height * height).sqrt();
+        let most = (OTHER_SHEET * distance).min(self.reach) + RESIDUALS * self.residual;
+        (height - expected).abs() <= most
+    }
+
+    /// Keeps what was taken in; the number of points.
+    pub(super) fn keep(&self, nearest: &mut [Neighbour], arms: &mut [f64]) -> usize {
+        for (to, from) in self.taken.iter().map(|&at| at as usize).enumerate() {
+            nearest.swap(to, from);
+            (0..D).for_each(|c| arms.swap(to * D + c, from * D + c));
+        }
+        self.taken.len()
+    }
+}

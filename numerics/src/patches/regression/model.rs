@@ -1,0 +1,58 @@
+//! The covariance of the heights, up to its scale.
+
+use smallvec::SmallVec;
+
+use super::{Squares, triangle};
+use crate::kernel::Family;
+
+/// Shape of the covariance: all but its scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Model {
+    /// φ.
+    pub family: Family,
+    /// ℓ in units of the radius of a patch.
+    pub length_scale: f64,
+    /// τ²: variance of the noise of a point over s².
+    pub noise: f64,
+    /// Terms of the trend: 1 + (d − 1) for a plane, d(d+1)/2 for a quadric.
+    pub n_trend: usize,
+}
+
+impl Model {
+    /// Variance of a third derivative of g along an axis over 15 s², in units of the radius: −8φ‴(0)/ℓ⁶ by the mixed derivatives of
+    /// a radial function.
+    pub(crate) fn third_derivative_variance(&self) -> f64 {
+        THIRD_DERIVATIVE * self.length_scale.powi(-6)
+    }
+}
+
+/// −8φ‴(0) of Matérn's kernel for ν = 9/2: φ‴ = −ν³ θ₁(0)/θ₄(0).
+const THIRD_DERIVATIVE: f64 = 8.0 * 4.5 * 4.5 * 4.5 / 105.0;
+
+/// Covariance of value, gradient and Hessian of g at one place over s².
+pub(super) fn prior_covariance(model: &Model, k: usize) -> Squares {
+    let p = triangle(k) + k + 1;
+    let scale = model.length_scale.powi(-2);
+    let [phi, first, second] = model.family.profile_at_zero();
+    let (slope, bend) = (2.0 * first * scale, 4.0 * second * scale * scale);
+    let mut prior = Squares::from_elem(0.0, p * p);
+    prior[0] = phi;
+    let mut pairs = SmallVec::<[(usize, usize); 16]>::new();
+    for a in 0..k {
+        prior[(1 + a) * p + 1 + a] = -slope;
+        pairs.extend((a..k).map(|b| (a, b)));
+    }
+    for (i, &(a, b)) in pairs.iter().enumerate() {
+        let row = k + 1 + i;
+        if a == b {
+            prior[row] = slope;
+            prior[row * p] = slope;
+        }
+        for (j, &(c, e)) in pairs.iter().enumerate() {
+            let is = |x: usize, y: usize| f64::from(u8::from(x == y));
+            prior[row * p + k + 1 + j] =
+                bend * (is(a, b) * is(c, e) + is(a, c) * is(b, e) + is(a, e) * is(b, c));
+        }
+    }
+    prior
+}

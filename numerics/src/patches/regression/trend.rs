@@ -1,0 +1,147 @@
+//! Likelihood, trend and derivatives from inner products of the rows below the factor.
+
+use pulp::Simd;
+use smallvec::SmallVec;
+
+use super::doubt::Doubt;
+use super::model::prior_covariance;
+use super::{Factored, Kriged, LEAST_HEIGHT, MAX_LANES, extra_rows, triangle};
+use crate::machine::registers::Pack;
+
+impl<S: Simd> Factored<'_, S> {
+    /// Inner products of the rows below give the likelihood, the trend and the derivatives.
+    #[inline(always)]
+    pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
+        let (p, p_trend) = (self.p, self.p_trend);
+        let n_kept = if predicts { 2 * p + 2 } else { p + 2 };
+        let start = self.matrix.len() - 2 * extra_rows(self.k + 1).pow(2);
+        for i in 0..n_kept {
+            for j in 0..=i {
+                let product = self.product(self.n + i, self.n + j);
+                product.write(self.matrix, start + i * n_kept + j);
+            }
+        }
+        // A = FᵀK⁻¹F = RRᵀ, then R⁻¹(b, U) with b = FᵀK⁻¹z and U = I − FᵀK⁻¹C, row by row.
+        let entry = |i: usize, j: usize| start + i.max(j) * n_kept + i.min(j);
+        let small = start + n_kept * n_kept;
+        let width = p_trend + 2 + p;
+        let one = Pack::<S, 1>::splat(self.simd, 1.0);
+        let zero = Pack::<S, 1>::splat(self.simd, 0.0);
+        let n_columns = if predicts { width } else { p_trend + 2 };
+        for i in 0..p_trend {
+            for j in 0..n_columns {
+                let mut value = if j < p_trend {
+                    self.at(entry(j, i))
+                } else if j < p_trend + 2 {
+                    self.at(entry(j - p_trend + p, i))
+                } else {
+                    let unit = if j - p_trend - 2 == i { one } else { zero };
+                    unit - self.at(entry(j - p_trend + p, i))
+                };
+                if j < i {
+                    continue;
+                }
+                // By columns of R: entry (i, j) of Rᵀ for j < p, of R⁻¹(b, U) beyond.
+                for l in 0..i {
+                    value = value - self.at(small + l * width + i) * self.at(small + l * width + j);
+                }
+                let value = if i == j { value.sqrt() } else { value / self.at(small + i * width + i) };
+                value.write(self.matrix, small + i * width + j);
+            }
+        }
+        // Forms of heights and of what is entailed in what the trend leaves of K⁻¹.
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            let mut quadratic = self.at(entry(p + i, p + j));
+            for l in 0..p_trend {
+                let row = small + l * width + p_trend;
+                quadratic = quadratic - self.at(row + i) * self.at(row + j);
+            }
+            quadratic.write(self.matrix, entry(p + i, p + j));
+        }
+        if predicts {
+            self.predict(start, n_kept, small, width);
+        }
+        self.lanes(start, n_kept, small, width, predicts)
+    }
+
+    /// Means and covariances over s² of the derivatives, in place of the products with C.
+    #[inline(always)]
+    fn predict(&mut self, start: usize, n_kept: usize, small: usize, width: usize) {
+        let (p, p_trend) = (self.p, self.p_trend);
+        let prior = prior_covariance(self.model, self.k);
+        for i in 0..p {
+            let row = start + (p + 2 + i) * n_kept;
+            let u_i = small + p_trend + 2 + i;
+            for data in 0..2 {
+                let mut mean = self.at(row + p + data);
+                for l in 0..p_trend {
+                    let b = self.at(small + l * width + p_trend + data);
+                    mean = self.at(u_i + l * width).mul_add(b, mean);
+                }
+                mean.write(self.matrix, row + p + data);
+            }
+            for j in 0..=i {
+                let u_j = small + p_trend + 2 + j;
+                let mut covariance = prior[i * p + j] - self.at(row + p + 2 + j);
+                for l in 0..p_trend {
+                    covariance = self.at(u_i + l * width).mul_add(self.at(u_j + l * width), covariance);
+                }
+                covariance.write(self.matrix, row + p + 2 + j);
+            }
+        }
+    }
+
+    /// The numbers of each lane.
+    #[inline(always)]
+    fn lanes(
+        &self,
+        start: usize,
+        n_kept: usize,
+        small: usize,
+        width: usize,
+        predicts: bool,
+    ) -> SmallVec<[Kriged; MAX_LANES]> {
+        let (n, p, p_trend) = (self.n, self.p, self.p_trend);
+        let numbers: &[f64] = bytemuck::cast_slice(&*self.matrix);
+        let lanes = S::F64_LANES;
+        let at = |register: usize, lane: usize| numbers[register * lanes + lane];
+        let mut found = SmallVec::new();
+        for lane in 0..lanes {
+            let n_points: f64 = self.batch.is_point[lane..].iter().step_by(lanes).sum();
+            let freedom = n_points - p_trend as f64;
+            let form = |i: usize, j: usize| at(start + (p + i) * n_kept + p + j, lane);
+            let log_k = log_sum((0..n).map(|i| at(triangle(i) + i, lane)));
+            let log_r = log_sum((0..p_trend).map(|i| at(small + i * width + i, lane)));
+            // An exact plane or sphere leaves nothing at all, and nothing has no logarithm.
+            let heights = form(0, 0).max(freedom * LEAST_HEIGHT * LEAST_HEIGHT);
+            let doubt = Doubt::of(heights, form(1, 0), form(1, 1).max(0.0), freedom);
+            let log_likelihood = log_k - log_r - doubt.log_penalty - 0.5 * freedom * doubt.quadratic.ln();
+            let scale = doubt.quadratic / freedom;
+            let mut kriged = Kriged { log_likelihood, scale, freedom, ..Kriged::default() };
+            if predicts {
+                let row = |i: usize| start + (p + 2 + i) * n_kept + p;
+                let effect = |i: usize| at(row(i) + 1, lane);
+                let covariance = |i: usize, j: usize| at(row(i.max(j)) + 2 + i.min(j), lane);
+                kriged.means = (0..p).map(|i| at(row(i), lane) - doubt.mean * effect(i)).collect();
+                let entry =
+                    |i: usize, j: usize| scale * covariance(i, j) + doubt.variance * effect(i) * effect(j);
+                kriged.covariance = (0..p * p).map(|at| entry(at / p, at % p)).collect();
+            }
+            found.push(kriged);
+        }
+        found
+    }
+}
+
+/// Σ ln of factors, which may be many: products of a few at a time stay within float64.
+fn log_sum(factors: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut product) = (0.0, 1.0);
+    for (i, factor) in factors.enumerate() {
+        product *= factor;
+        if i % 8 == 7 {
+            sum += f64::ln(product);
+            product = 1.0;
+        }
+    }
+    sum + product.ln()
+}

@@ -1,0 +1,124 @@
+//! Neighbourhoods solved several at a time, in room that a thread keeps.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::Patches;
+use super::neighbourhood::{Neighbourhood, Scratch};
+use super::regression::{Batch, Krige, Kriged, Model, Workspace};
+use crate::error::NumericsError;
+use crate::machine::instruction_set::InstructionSet;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbour;
+
+pub(super) type Found = (Neighbourhood, Vec<Kriged>);
+
+/// What a batch is solved for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Likelihood,
+    Prediction,
+}
+
+/// Room that a thread keeps from one batch to the next.
+pub(super) struct Room {
+    batch: Batch,
+    workspace: Workspace,
+    scratch: Scratch,
+    nearest: Vec<Neighbour>,
+    set: InstructionSet,
+    /// Whether no lane has a neighbourhood.
+    is_empty: bool,
+    /// By lane and model.
+    pub kriged: Vec<Vec<Kriged>>,
+}
+
+impl Room {
+    pub(super) fn new(count: usize, dimension: usize, lanes: usize) -> Self {
+        Self {
+            batch: Batch::new(dimension, count, lanes),
+            workspace: Workspace::new(dimension, count),
+            scratch: Scratch::default(),
+            nearest: Vec::new(),
+            set: InstructionSet::best(),
+            is_empty: true,
+            kriged: vec![Vec::new(); lanes],
+        }
+    }
+
+    /// Puts the neighbourhoods of some queries side by side.
+    pub(super) fn put(
+        &mut self,
+        patches: &Patches,
+        queries: &Cloud,
+        range: Range<usize>,
+    ) -> Vec<Option<Neighbourhood>> {
+        let support = &patches.support;
+        let mut places = Vec::with_capacity(range.len());
+        for (lane, query) in range.enumerate() {
+            let x = queries.point(query);
+            support.neighbours().nearest_positions_into(x, patches.count, &mut self.nearest);
+            let place =
+                Neighbourhood::put(support, x, &mut self.nearest, &mut self.batch, lane, &mut self.scratch);
+            if place.is_none() {
+                self.batch.keep(lane, 0);
+            }
+            places.push(place);
+        }
+        // Lanes without a neighbourhood do as one that has: their numbers are not looked at.
+        let filled = places.iter().position(Option::is_some);
+        self.is_empty = filled.is_none();
+        if let Some(filled) = filled {
+            let is_empty = |lane: usize| places.get(lane).is_none_or(Option::is_none);
+            for lane in (0..self.batch.lanes).filter(|&lane| is_empty(lane)) {
+                self.batch.copy_lane(filled, lane);
+            }
+        }
+        places
+    }
+
+    pub(super) fn krige(&mut self, models: &[Model], purpose: Purpose) {
+        self.kriged.iter_mut().for_each(Vec::clear);
+        if self.is_empty {
+            return;
+        }
+        for model in models {
+            let predicts = purpose != Purpose::Likelihood;
+            let krige = Krige { batch: &self.batch, model, workspace: &mut self.workspace, predicts };
+            for (slot, kriged) in self.kriged.iter_mut().zip(self.set.dispatch(krige)) {
+                slot.push(kriged);
+            }
+        }
+    }
+}
+
+impl Patches {
+    /// What models say at a few queries.
+    pub(super) fn krige_each(
+        &self,
+        queries: &Cloud,
+        models: &[Model],
+        purpose: Purpose,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Option<Found>>, NumericsError> {
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let lanes = InstructionSet::best().n_lanes();
+        let batches = (0..m.div_ceil(lanes)).into_par_iter().map_init(
+            || Room::new(self.count, d, lanes),
+            |room, batch| {
+                observer.checkpoint()?;
+                let first = batch * lanes;
+                let places = room.put(self, queries, first..(first + lanes).min(m));
+                room.krige(models, purpose);
+                let found = places.into_iter().enumerate();
+                Ok(found
+                    .map(|(lane, place)| place.map(|place| (place, room.kriged[lane].clone())))
+                    .collect::<Vec<_>>())
+            },
+        );
+        let batches: Vec<Vec<Option<Found>>> = batches.collect::<Result<_, NumericsError>>()?;
+        Ok(batches.into_iter().flatten().collect())
+    }
+}

@@ -1,0 +1,159 @@
+//! Nearest neighbours in a cloud, by a k-d tree over its distinct positions.
+
+mod build;
+mod grid;
+mod search;
+#[cfg(test)]
+mod tests;
+
+use super::cloud::Cloud;
+use crate::error::NumericsError;
+use crate::machine::heap::vec_bytes;
+use crate::observer::Observer;
+
+pub(crate) use grid::on_grid;
+
+/// Positions per leaf: scanning 12 of them costs about what two more levels of descent do.
+const LEAF_SIZE: usize = 12;
+
+/// A k-d tree over the positions of a cloud (Bentley 1975), any dimension.
+///
+/// Points at the same coordinates are one position, so that the work of a search does not depend on how often a position is
+/// repeated. Positions whose squared distance underflows are one position as well: coordinates are rounded to multiples of
+/// 2⁻⁵¹¹ (grid.rs), which changes none above 1e-137. Two positions therefore never have the distance 0.
+///
+/// Built in O(p log p) for p positions, by splits of the widest coordinate near its median. Ties of distance are broken by the
+/// smaller index of a point, so answers do not depend on the tree.
+#[derive(Debug, Clone)]
+pub struct Neighbours {
+    dimension: usize,
+    /// Positions leaf by leaf, `[p, d]`.
+    coordinates: Vec<f64>,
+    /// Points of the cloud, position by position, ascending within a position, `[n]`.
+    points: Vec<u32>,
+    /// Where the points of each position begin, and the end of the last one, `[p + 1]`.
+    starts: Vec<u32>,
+    nodes: Vec<Node>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Node {
+    /// A range of positions.
+    Leaf { start: u32, end: u32 },
+    /// The left child follows its parent, `right` is the index of the other. Coordinates along `axis` are at most `below` on the
+    /// left and at least `above` on the right.
+    Split { axis: u32, right: u32, below: f64, above: f64 },
+}
+
+/// A neighbour and its squared distance (unit L²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    pub point: usize,
+    pub squared_distance: f64,
+}
+
+/// Distances from a position to those around it, unit L.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distances {
+    pub nearest: f64,
+    /// Mean over the neighbours that were asked for.
+    pub mean: f64,
+}
+
+impl Neighbours {
+    /// Builds the tree. Clouds beyond 2³² points are out of reach of every solver and of the service's limits.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn of(cloud: &Cloud, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        build::tree(cloud, observer)
+    }
+
+    /// Number of distinct positions, p.
+    pub fn n_positions(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The points at a position, ascending.
+    pub fn points_at(&self, position: usize) -> &[u32] {
+        &self.points[self.starts[position] as usize..self.starts[position + 1] as usize]
+    }
+
+    fn coordinates_of(&self, position: usize) -> &[f64] {
+        &self.coordinates[position * self.dimension..][..self.dimension]
+    }
+
+    /// The first point at a position, which stands for all of them.
+    fn first_point(&self, position: usize) -> usize {
+        self.points[self.starts[position] as usize] as usize
+    }
+
+    /// The `count` nearest points to `x`, nearest first; fewer if the cloud has fewer.
+    pub fn nearest(&self, x: &[f64], count: usize) -> Vec<Neighbour> {
+        let mut found = Vec::new();
+        self.nearest_into(x, count, &mut found);
+        found
+    }
+
+    /// [`Neighbours::nearest`] into a list that is there already.
+    pub fn nearest_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        self.search(x, count, found);
+        if self.points.len() == self.n_positions() {
+            self.name_first_points(found);
+        } else {
+            self.name_all_points(found, count);
+        }
+    }
+
+    /// The `count` nearest positions, each by its first point, nearest first: repeated observations count once.
+    pub fn nearest_positions(&self, x: &[f64], count: usize) -> Vec<Neighbour> {
+        let mut found = Vec::new();
+        self.nearest_positions_into(x, count, &mut found);
+        found
+    }
+
+    /// [`Neighbours::nearest_positions`] into a list that is there already.
+    pub fn nearest_positions_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
+        self.search(x, count, found);
+        self.name_first_points(found);
+    }
+
+    /// Distances from a position to its `count` nearest others, with a list to put them into; `None` if there are none.
+    pub fn distances(&self, position: usize, count: usize, found: &mut Vec<Neighbour>) -> Option<Distances> {
+        self.search(self.coordinates_of(position), count.saturating_add(1), found);
+        // The first one is the position itself: no other has the distance 0.
+        let others = found.get(1..)?;
+        let distances = others.iter().map(|neighbour| neighbour.squared_distance.sqrt());
+        let nearest = distances.clone().next()?;
+        Some(Distances { nearest, mean: distances.sum::<f64>() / others.len() as f64 })
+    }
+
+    /// Turns positions into their first points.
+    fn name_first_points(&self, found: &mut [Neighbour]) {
+        found.iter_mut().for_each(|neighbour| neighbour.point = self.first_point(neighbour.point));
+    }
+
+    /// Turns positions, nearest first, into the `count` nearest of all their points.
+    fn name_all_points(&self, found: &mut Vec<Neighbour>, count: usize) {
+        let mut named: Vec<Neighbour> = Vec::with_capacity(count);
+        for tied in found.chunk_by(|a, b| a.squared_distance == b.squared_distance) {
+            let n_left = count - named.len();
+            let n_nearer = named.len();
+            for &Neighbour { point: position, squared_distance } in tied {
+                let points = self.points_at(position).iter().take(n_left);
+                named.extend(points.map(|&point| Neighbour { point: point as usize, squared_distance }));
+            }
+            named[n_nearer..].sort_unstable_by_key(|neighbour| neighbour.point);
+            named.truncate(count);
+        }
+        *found = named;
+    }
+
+    /// Bytes held on the heap.
+    pub fn n_bytes(&self) -> usize {
+        vec_bytes(&self.coordinates)
+            + vec_bytes(&self.points)
+            + vec_bytes(&self.starts)
+            + vec_bytes(&self.nodes)
+    }
+}

@@ -1,0 +1,194 @@
+//! A criterion for many α at once.
+//!
+//! With `K = QDQᵀ`, `(K + αI)⁻¹ = Q(D + αI)⁻¹Qᵀ` for every α. Where there is a mean, likewise `P = U(D + αI)⁻¹Uᵀ` with the eigenvectors U of K
+//! restricted to what is orthogonal to the functions of the mean. One eigendecomposition serves all α (Golub, Heath and Wahba 1979, sec. 3).
+//!
+//! Nothing looks at the observer within an eigendecomposition. So a large matrix is factorized for each of a few α instead: two to four times as
+//! many flops for 61 of them, but all in products of matrices.
+
+use std::f64::consts::TAU;
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef};
+use rayon::prelude::*;
+
+use super::criterion::{Criterion, Parts};
+use super::evaluation::Evaluator;
+use super::parameters::Hyperparameters;
+use super::spectrum::Spectrum;
+use super::subject::Subject;
+use crate::error::NumericsError;
+use crate::kernel::Kernel;
+use crate::machine::vector::dot;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::parallelism;
+use crate::solver::trend::{Mean, solve_gram};
+use crate::sums::regularization::Regularization;
+
+/// α that are looked at together, as columns of a matrix.
+pub(super) const ALPHAS_AT_ONCE: usize = 256;
+
+/// Points up to which a matrix is decomposed for any number of α, within a second.
+const SMALL: usize = 1000;
+
+/// Number of α up to which a larger matrix is factorized for each of them.
+const FEW: usize = 120;
+
+/// Whether one eigendecomposition serves all of so many α.
+pub(super) fn is_decomposed(n_points: usize, n_alphas: usize) -> bool {
+    n_points <= SMALL || n_alphas > FEW
+}
+
+/// The score with each α as the noise of every point, `[len(alphas)]`, greater is better; NaN where `K + αI` is not positive definite in float64.
+/// The noise of the hyperparameters does not count.
+///
+/// # Errors
+/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite; those of [`Hyperparameters::kernel_on`];
+/// [`NumericsError::LengthMismatch`]; [`NumericsError::MeanNotDetermined`]; [`NumericsError::Cancelled`].
+pub fn alpha_path(
+    (cloud, values, mean): (&Cloud, &[f64], Mean),
+    at: &Hyperparameters,
+    alphas: &[f64],
+    criterion: Criterion,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    for &alpha in alphas {
+        Regularization::uniform(alpha)?;
+    }
+    let subject = Subject::of(cloud, values, mean)?;
+    match is_decomposed(cloud.n_points(), alphas.len()) {
+        true => by_spectrum(&subject, at, alphas, criterion, observer),
+        false => by_factors(&subject, at, alphas, criterion, observer),
+    }
+}
+
+/// A factorization for each α.
+fn by_factors(
+    subject: &Subject<'_>,
+    at: &Hyperparameters,
+    alphas: &[f64],
+    criterion: Criterion,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let mut evaluator = Evaluator::new(subject, criterion, false);
+    let score = |&alpha: &f64| {
+        let at = Hyperparameters { noise: Regularization::uniform(alpha)?, ..at.clone() };
+        Ok(evaluator.score(&at, observer)?.map_or(f64::NAN, |state| state.score))
+    };
+    alphas.iter().map(score).collect()
+}
+
+/// One eigendecomposition for all α.
+fn by_spectrum(
+    subject: &Subject<'_>,
+    at: &Hyperparameters,
+    alphas: &[f64],
+    criterion: Criterion,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let cloud = subject.cloud;
+    let kernel = at.kernel_on(cloud)?;
+    let is_restricted = criterion.needs_diagonal() && subject.n_functions > 0;
+    let spectrum = Spectrum::of(subject, (cloud, &kernel), is_restricted, observer)?;
+    observer.enter(Stage::Evaluate);
+    match criterion {
+        Criterion::MarginalLikelihood => spectrum.likelihoods(subject, alphas, observer),
+        Criterion::LeaveOneOut => spectrum.left_out(alphas, observer),
+        Criterion::GeneralizedCrossValidation => spectrum.cross_validations(alphas, observer),
+    }
+}
+
+/// So many α that matter at most, ascending in equal ratios: from where the eigenvalues of K are rounding to where it is all noise.
+pub fn default_alphas(n_points: usize, kernel: &Kernel, n_alphas: usize) -> Vec<f64> {
+    let (n, k0) = (n_points as f64, kernel.at_zero());
+    let (min, max) = ((16.0 * n * n * f64::EPSILON * k0).max(1e-12 * k0), n * k0);
+    let ratio = |step: usize| step as f64 / (n_alphas.max(2) - 1) as f64;
+    (0..n_alphas).map(|step| min * (max / min).powf(ratio(step))).collect()
+}
+
+impl Spectrum {
+    /// `Σ w z² + ln det`, with z the values without the mean, in O(np²) for each α.
+    fn likelihoods(
+        &self,
+        subject: &Subject<'_>,
+        alphas: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        let (n, p) = (self.n, subject.n_functions);
+        let turned = |function: &[f64]| -> Vec<f64> {
+            self.vectors.par_chunks_exact(n).map(|u| dot(u, function)).collect()
+        };
+        let functions: Vec<Vec<f64>> = subject.functions.chunks_exact(n).map(turned).collect();
+        let score = |&alpha: &f64| {
+            observer.checkpoint()?;
+            let Some(inverse) = self.inverse(alpha) else { return Ok(f64::NAN) };
+            let product = |a: &[f64], b: &[f64]| -> f64 {
+                inverse.iter().zip(a.iter().zip(b)).map(|(w, (a, b))| w * a * b).sum()
+            };
+            let gram = Mat::from_fn(p, p, |a, b| product(&functions[a], &functions[b]));
+            let moments = Mat::from_fn(p, 1, |a, _| product(&functions[a], &self.values));
+            let mut rest = self.values.clone();
+            if p > 0 {
+                let Some(solved) = solve_gram(&gram, moments) else { return Ok(f64::NAN) };
+                for (a, function) in functions.iter().enumerate() {
+                    rest.iter_mut().zip(function).for_each(|(rest, f)| *rest -= solved[(a, 0)] * f);
+                }
+            }
+            let log_determinant = -inverse.iter().map(|w| w.ln()).sum::<f64>();
+            Ok(-0.5 * (product(&rest, &rest) + log_determinant + n as f64 * TAU.ln()))
+        };
+        alphas.par_iter().map(score).collect()
+    }
+
+    /// `P_ii = Σ_k U_ik²/(D_k + α)` and `Λ = U(D + α)⁻¹UᵀY`: two products of matrices for many α.
+    fn left_out(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let (n, r) = (self.n, self.eigenvalues.len());
+        let squares: Vec<f64> = self.vectors.par_iter().map(|u| u * u).collect();
+        let squares = MatRef::from_column_major_slice(&squares, n, r);
+        let mut scores = Vec::with_capacity(alphas.len());
+        for alphas in alphas.chunks(ALPHAS_AT_ONCE) {
+            observer.checkpoint()?;
+            let undefined = || vec![f64::NAN; r];
+            let inverses: Vec<f64> =
+                alphas.iter().flat_map(|&alpha| self.inverse(alpha).unwrap_or_else(undefined)).collect();
+            let diagonals = product(squares, &inverses, alphas.len());
+            observer.checkpoint()?;
+            let turned: Vec<f64> =
+                inverses.iter().zip(self.values.iter().cycle()).map(|(w, y)| w * y).collect();
+            let weights = product(self.vectors(), &turned, alphas.len());
+            let score = |(weights, diagonal): (&[f64], &[f64])| {
+                let parts =
+                    Parts { energy: 0.0, log_determinant: 0.0, weights, diagonal, relative_noise: &[] };
+                Criterion::LeaveOneOut.score(&parts)
+            };
+            scores.extend(weights.chunks_exact(n).zip(diagonals.chunks_exact(n)).map(score));
+        }
+        Ok(scores)
+    }
+
+    /// `−n Σ (w UᵀY)²/(Σ w)²`.
+    fn cross_validations(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let score = |&alpha: &f64| {
+            observer.checkpoint()?;
+            let Some(inverse) = self.inverse(alpha) else { return Ok(f64::NAN) };
+            let misfit: f64 = inverse.iter().zip(&self.values).map(|(w, y)| (w * y).powi(2)).sum();
+            let freedom: f64 = inverse.iter().sum();
+            Ok(-(self.n as f64) * misfit / (freedom * freedom))
+        };
+        alphas.iter().map(score).collect()
+    }
+}
+
+/// `[n, r]` times `[r, m]`, column by column.
+fn product(left: MatRef<'_, f64>, right: &[f64], m: usize) -> Vec<f64> {
+    let (n, r) = (left.nrows(), left.ncols());
+    let mut found = vec![0.0; n * m];
+    let out = MatMut::from_column_major_slice_mut(&mut found, n, m);
+    let par = parallelism(2.0 * (n * r * m) as f64);
+    matmul(out, Accum::Replace, left, MatRef::from_column_major_slice(right, r, m), 1.0, par);
+    found
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,208 @@
+//! The likeliest cell of the grid.
+
+use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
+use super::likelihood::{Evidence, Score};
+use crate::error::NumericsError;
+use crate::observer::Observer;
+
+/// Steps of a search from nothing, in ratios; those of length scales are half as many.
+const STRIDES: [isize; 3] = [4, 2, 1];
+
+/// Steps of a search from what was found on some of the values.
+const FINE: [isize; 1] = [1];
+
+/// What a step has to gain.
+const GAIN: f64 = 1e-6;
+
+/// How much less likely a kernel may be than the best one, in logarithms, to be as good a guess.
+const AS_LIKELY: f64 = 1.0;
+
+/// Scores of cells, as far as they were asked for.
+pub(super) struct Search<'a> {
+    evidence: &'a Evidence<'a>,
+    grid: &'a Grid,
+    scores: Vec<Option<Option<Score>>>,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(evidence: &'a Evidence<'a>, grid: &'a Grid) -> Self {
+        Self { evidence, grid, scores: vec![None; N_CELLS] }
+    }
+
+    /// The best cell of each family. `None` if no kernel explains the values in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn best(
+        &mut self,
+        observer: &dyn Observer,
+    ) -> Result<Option<[Cell; N_FAMILIES]>, NumericsError> {
+        let Some(mut from) = self.least_of(self.grid.beginnings(), observer)? else { return Ok(None) };
+        let mut best = [from; N_FAMILIES];
+        for (family, best) in best.iter_mut().enumerate() {
+            from = self.descend(self.grid.of_family(from, family), &STRIDES, observer)?;
+            if family == 0 && self.is_mostly_noise(from, observer)? {
+                let rough = self.descend(self.grid.rough(family), &STRIDES, observer)?;
+                from = self.least_of([from, rough].into_iter(), observer)?.unwrap_or(from);
+            }
+            *best = from;
+        }
+        let is_explained = best.iter().any(|cell| self.scores[cell.slot()].flatten().is_some());
+        Ok(is_explained.then_some(best))
+    }
+
+    /// The best cell of each family near one that was found on some of the values.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn best_from(
+        &mut self,
+        found: Cell,
+        observer: &dyn Observer,
+    ) -> Result<[Cell; N_FAMILIES], NumericsError> {
+        let first = self.descend(found, &FINE, observer)?;
+        let mut best = [first; N_FAMILIES];
+        for (family, best) in best.iter_mut().enumerate().filter(|(family, _)| *family != first.family) {
+            *best = self.descend(self.grid.of_family(first, family), &FINE, observer)?;
+        }
+        Ok(best)
+    }
+
+    /// Of all kernels of a family that are [`AS_LIKELY`] as the best one, that with the shortest length
+    /// scale: bands from the best alone are those of a kernel that happens to fit, and where values leave the
+    /// length scale open it is mostly too long. The noise is the likeliest for it.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn shortest(&mut self, best: Cell, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+        let most = self.height(best, observer)? + AS_LIKELY;
+        let mut found = best;
+        while let Some(next) = self.shorter(found, observer)? {
+            if self.height(next, observer)? > most {
+                break;
+            }
+            found = next;
+        }
+        Ok(found)
+    }
+
+    /// The next shorter length scale with the likeliest noise for it, if there is one.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn shorter(
+        &mut self,
+        cell: Cell,
+        observer: &dyn Observer,
+    ) -> Result<Option<Cell>, NumericsError> {
+        let straight = self.grid.moved(cell, Step { lengths: -1, ratios: 0 });
+        let along = self.grid.moved(cell, along_ridge(cell.family, -1));
+        match self.least_of(straight.into_iter().chain(along), observer)? {
+            Some(from) => self.line(from, Step { lengths: 0, ratios: 1 }, observer).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    fn is_mostly_noise(&mut self, cell: Cell, observer: &dyn Observer) -> Result<bool, NumericsError> {
+        let Some(score) = self.score(cell, observer)? else { return Ok(false) };
+        Ok(self.against_noise(cell, score) > 0.0)
+    }
+
+    /// The first of the best.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn least_of(
+        &mut self,
+        cells: impl Iterator<Item = Cell>,
+        observer: &dyn Observer,
+    ) -> Result<Option<Cell>, NumericsError> {
+        let mut best = None;
+        for cell in cells {
+            let height = self.height(cell, observer)?;
+            if best.is_none_or(|(_, least)| height < least) {
+                best = Some((cell, height));
+            }
+        }
+        Ok(best.map(|(cell, _)| cell))
+    }
+
+    /// Goes on in every direction that gains, with these strides, one after the other.
+    fn descend(
+        &mut self,
+        mut at: Cell,
+        strides: &[isize],
+        observer: &dyn Observer,
+    ) -> Result<Cell, NumericsError> {
+        for &stride in strides {
+            let lengths = (stride + 1) / 2;
+            let across = [Step { lengths: 0, ratios: stride }, Step { lengths, ratios: 0 }];
+            let directions = [across[0], across[1], along_ridge(at.family, lengths)];
+            let mut is_moving = true;
+            while is_moving {
+                is_moving = false;
+                for direction in directions {
+                    let next = self.line(at, direction, observer)?;
+                    is_moving |= next != at;
+                    at = next;
+                }
+            }
+        }
+        Ok(at)
+    }
+
+    /// As far as it gains along a direction or against it, by steps that double while they gain.
+    fn line(&mut self, begin: Cell, direction: Step, observer: &dyn Observer) -> Result<Cell, NumericsError> {
+        for sign in [1, -1] {
+            let (mut at, mut factor) = (begin, sign);
+            while let Some(next) = self.grid.moved(at, direction.times(factor)) {
+                if self.height(next, observer)? >= self.height(at, observer)? - GAIN {
+                    break;
+                }
+                at = next;
+                factor *= 2;
+            }
+            if at != begin {
+                return Ok(at);
+            }
+        }
+        Ok(begin)
+    }
+
+    /// `−ln` of how likely a cell is, by the values and beforehand; infinite where it does not explain them
+    /// in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn height(&mut self, cell: Cell, observer: &dyn Observer) -> Result<f64, NumericsError> {
+        let Some(score) = self.score(cell, observer)? else { return Ok(f64::INFINITY) };
+        Ok(score.negative_log + self.against_noise(cell, score))
+    }
+
+    fn against_noise(&self, cell: Cell, score: Score) -> f64 {
+        self.grid.against_noise(cell, score.variance, self.evidence.values.mean_square)
+    }
+
+    /// What the values say of a cell; `None` if it does not explain them in float64.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn score(
+        &mut self,
+        cell: Cell,
+        observer: &dyn Observer,
+    ) -> Result<Option<Score>, NumericsError> {
+        if let Some(known) = self.scores[cell.slot()] {
+            return Ok(known);
+        }
+        let found = match self.grid.kernel(cell) {
+            Some((kernel, ratio)) => {
+                let variance = self.grid.variance(cell, self.evidence.values.unit);
+                self.evidence.score(&kernel, ratio, variance, observer)?
+            }
+            None => None,
+        };
+        self.scores[cell.slot()] = Some(found);
+        Ok(found)
+    }
+}

@@ -1,0 +1,136 @@
+use super::*;
+use crate::observer::Unobserved;
+use crate::testing::{Random, fibonacci_sphere};
+
+/// A smooth field on a sphere, with noise of a deviation.
+fn field(n: usize, noise: f64) -> (Cloud, Vec<f64>) {
+    let cloud = fibonacci_sphere(n);
+    let mut random = Random(n as u64 + 1);
+    let noises: Vec<f64> = (0..n).map(|_| random.normal()).collect();
+    let smooth = |x: &[f64]| (2.0 * x[0]).sin() + x[1] * x[2];
+    let values = cloud.points().enumerate().map(|(i, x)| smooth(x) + noise * noises[i]);
+    (cloud.clone(), values.collect())
+}
+
+fn learned(cloud: &Cloud, values: &[f64], noise: Noise<'_>) -> Learned {
+    let sampling = Sampling::of(cloud, &Unobserved).unwrap();
+    let observed = Observed { cloud, sampling: &sampling, values, noise, mean: Mean::Constant };
+    learn(observed, &Unobserved).unwrap()
+}
+
+#[test]
+fn exact_values_are_taken_as_exact_and_noise_is_found() {
+    for n in [100, 256, 900] {
+        let (cloud, values) = field(n, 0.0);
+        assert!(learned(&cloud, &values, Noise::Unknown).ratio < 1.01e-10, "{n}");
+        for noise in [0.003, 0.03, 0.2] {
+            let (cloud, values) = field(n, noise);
+            let found = learned(&cloud, &values, Noise::Unknown);
+            let deviation = (found.ratio * found.variance).sqrt();
+            // A hundred values tell their noise to a tenth; the grid is as wide as a third.
+            assert!((0.6..1.6).contains(&(deviation / noise)), "{n} {noise}: {deviation}");
+        }
+    }
+}
+
+#[test]
+fn neither_units_nor_offsets_change_what_is_learned() {
+    let (cloud, values) = field(200, 0.02);
+    let plain = learned(&cloud, &values, Noise::Unknown);
+    for (factor, offset) in [(1e-6, 0.0), (1e6, -1e6), (1.0, 1e6), (1e140, 0.0), (1e-140, 0.0)] {
+        let moved: Vec<f64> = values.iter().map(|v| factor * v + offset).collect();
+        let found = learned(&cloud, &moved, Noise::Unknown);
+        assert_eq!((found.family, found.ratio), (plain.family, plain.ratio));
+        assert_eq!(found.length_scale, plain.length_scale);
+        let variance = factor * factor * plain.variance;
+        assert!((found.variance / variance - 1.0).abs() < 1e-6, "{}", found.variance);
+    }
+    let scaled = Cloud::new(cloud.coordinates().iter().map(|x| 1e3 * x).collect(), 3).unwrap();
+    let found = learned(&scaled, &values, Noise::Unknown);
+    assert!((found.length_scale / plain.length_scale - 1e3).abs() < 1e-9 && found.ratio == plain.ratio);
+}
+
+#[test]
+fn a_noise_that_is_known_is_kept() {
+    let (cloud, values) = field(200, 0.05);
+    let found = learned(&cloud, &values, Noise::Uniform(0.0025));
+    assert!((found.ratio * found.variance / 0.0025 - 1.0).abs() < 1e-12);
+    let alike = learned(&cloud, &values, Noise::PerPoint(&[0.0025; 200]));
+    assert_eq!((alike.family, alike.ratio), (found.family, found.ratio));
+    let (cloud, values) = field(200, 0.0);
+    assert_eq!(learned(&cloud, &values, Noise::Uniform(0.0)).ratio, 0.0);
+}
+
+#[test]
+fn rough_fields_get_rough_kernels() {
+    let cloud = fibonacci_sphere(400);
+    let step: Vec<f64> = cloud.points().map(|x| (x[0] / 0.05).tanh()).collect();
+    assert_eq!(learned(&cloud, &step, Noise::Unknown).family, Family::Matern { order: 2 });
+    let smooth: Vec<f64> = cloud.points().map(|x| (2.0 * x[0]).sin()).collect();
+    assert_eq!(learned(&cloud, &smooth, Noise::Unknown).family, Family::Gauss);
+}
+
+#[test]
+fn a_hot_spot_shortens_the_length_scale_and_outliers_do_not() {
+    let (cloud, plain) = field(2000, 0.01);
+    let length = |values: &[f64]| learned(&cloud, values, Noise::Unknown).length_scale;
+    let expected = length(&plain);
+    // A two-hundredth of the sphere.
+    let spot = |x: &[f64]| (-(1.0 - x[0]) / 0.01).exp();
+    let with_spot: Vec<f64> = plain.iter().zip(cloud.points()).map(|(value, x)| value + spot(x)).collect();
+    let found = length(&with_spot);
+    assert!(found < 0.4 * expected, "{found} of {expected}");
+    // One value in 500, by 10 and by 100 deviations of the noise. The family may be another, with half the
+    // length.
+    for off in [0.1, 1.0] {
+        let error = |i: usize| if i % 500 == 250 { off } else { 0.0 };
+        let with_outliers: Vec<f64> = plain.iter().enumerate().map(|(i, value)| value + error(i)).collect();
+        let found = length(&with_outliers);
+        assert!(found > 0.4 * expected, "{off}: {found} of {expected}");
+    }
+}
+
+#[test]
+fn a_place_that_no_length_scale_explains_is_named() {
+    let (cloud, plain) = field(1000, 0.01);
+    let place = |values: &[f64]| learned(&cloud, values, Noise::Unknown).disagreement?.place;
+    assert_eq!(place(&plain), None);
+    let is_above = |x: &[f64]| x[0] + 0.3 * x[1] > 0.0;
+    let step = plain.iter().zip(cloud.points()).map(|(value, x)| value + f64::from(u8::from(is_above(x))));
+    let found = place(&step.collect::<Vec<f64>>()).unwrap();
+    // Points are 0.11 apart.
+    let x = cloud.point(found.point);
+    assert!((x[0] + 0.3 * x[1]).abs() < 0.2, "{x:?}");
+    assert!((12..=32).contains(&found.n_points) && found.deviations > 1.4, "{found:?}");
+}
+
+#[test]
+fn few_values_and_equal_ones_decide_nothing() {
+    let family = Family::Matern { order: 2 };
+    for n in [1, 2, 7] {
+        let (cloud, values) = field(n, 0.0);
+        assert_eq!(learned(&cloud, &values, Noise::Unknown).family, family);
+    }
+    let cloud = fibonacci_sphere(50);
+    assert!(learned(&cloud, &[3.0; 50], Noise::Unknown).ratio < 1.01e-10);
+    let together = Cloud::new(vec![1.0; 60], 3).unwrap();
+    let values: Vec<f64> = (0..20).map(f64::from).collect();
+    assert!(learned(&together, &values, Noise::Unknown).variance > 0.0);
+}
+
+#[test]
+fn points_that_coincide_have_a_mean_though_some_have_no_noise() {
+    // Twice the same points, every third exactly measured; alone, and in groups.
+    for n in [60, 500] {
+        let (half, values) = field(n, 0.0);
+        let cloud = Cloud::new(half.coordinates().repeat(2), 3).unwrap();
+        let values = values.repeat(2);
+        let noise: Vec<f64> = (0..2 * n).map(|i| if i % 3 == 0 { 0.0 } else { 1e-4 }).collect();
+        let sampling = Sampling::of(&cloud, &Unobserved).unwrap();
+        let (mean, noise) = (Mean::Constant, Noise::PerPoint(&noise));
+        let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+        let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
+        assert!(learn_mean(observed, &kernel, &Unobserved).unwrap().trend.is_some(), "{n}");
+        assert!(learn(observed, &Unobserved).unwrap().trend.is_some(), "{n}");
+    }
+}

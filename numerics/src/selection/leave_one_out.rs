@@ -1,0 +1,138 @@
+//! What each value is predicted to be from all others.
+//!
+//! With `P = W − WF(FᵀWF)⁻¹FᵀW`, `W = (K + N)⁻¹` and `Λ = PY`, the value of point i is predicted by all others as `Y_i − Λ_i/P_ii` with the
+//! variance `1/P_ii`, its own noise included, and the coefficients of the mean are those that the others have (Rasmussen and Williams 2006,
+//! eqs. 5.12 and 5.13; Dubrule 1983).
+
+use std::f64::consts::TAU;
+
+use faer::{ColRef, MatMut};
+use rayon::prelude::*;
+
+use super::criterion::Criterion;
+use super::evaluation::{Evaluator, UNDETERMINED, never_definite};
+use super::parameters::Hyperparameters;
+use super::subject::Subject;
+use crate::error::NumericsError;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::trend::{Mean, Trend};
+use crate::solver::{Solution, Solver};
+use crate::sums::regularization::Regularization;
+
+/// Columns of `L⁻¹` that are held at once.
+const COLUMNS_PER_BLOCK: usize = 512;
+
+/// Predictions of each value from all others, `[n]` each, in the order of the points; NaN where the mean is not determined without the point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeaveOneOut {
+    /// Unit V.
+    pub means: Vec<f64>,
+    /// Of the latent function, no noise added; unit V². What rounding makes negative is 0.
+    pub variances: Vec<f64>,
+    /// Of the value, its own noise included; unit V².
+    pub observation_variances: Vec<f64>,
+    /// `ln p(Y_i | Y_{−i})`, with its own noise.
+    pub log_predictive_densities: Vec<f64>,
+}
+
+impl LeaveOneOut {
+    /// From Λ and `P_ii`.
+    fn of(values: &[f64], weights: &[f64], diagonal: &[f64], noise: &Regularization, factor: f64) -> Self {
+        let each = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..values.len()).map(|i| if diagonal[i] > 0.0 { of(i) } else { f64::NAN }).collect()
+        };
+        let means = each(&|i| values[i] - weights[i] / diagonal[i]);
+        let observation_variances = each(&|i| factor / diagonal[i]);
+        let variances = each(&|i| (observation_variances[i] - factor * noise.at(i)).max(0.0));
+        let log_predictive_densities = each(&|i| {
+            let misfit = weights[i] * weights[i] / (factor * diagonal[i]);
+            -0.5 * ((TAU * observation_variances[i]).ln() + misfit)
+        });
+        Self { means, variances, observation_variances, log_predictive_densities }
+    }
+
+    /// Sum of the log densities: the score of [`Criterion::LeaveOneOut`].
+    pub fn score(&self) -> f64 {
+        self.log_predictive_densities.iter().sum()
+    }
+}
+
+/// The predictions under a system that is factorized, with kernel and noise `factor` times as large as the solver has them; n³ flops.
+///
+/// # Errors
+/// [`NumericsError::LengthMismatch`]; [`NumericsError::NotPositiveDefinite`] without a Cholesky factor; [`NumericsError::MeanNotDetermined`] where
+/// the mean is not determined without one of the points; [`NumericsError::Cancelled`].
+pub fn leave_one_out(
+    solver: &Solver,
+    solution: &Solution,
+    values: &[f64],
+    factor: f64,
+    observer: &dyn Observer,
+) -> Result<LeaveOneOut, NumericsError> {
+    solver.cloud().check_one_per_point(values)?;
+    observer.enter(Stage::Solve);
+    let mut diagonal = inverse_diagonal(solver, observer)?;
+    if let Some(trend) = &solution.trend {
+        remove_mean(&mut diagonal, solver, trend)?;
+    }
+    Ok(LeaveOneOut::of(values, &solution.weights, &diagonal, solver.regularization(), factor))
+}
+
+/// The predictions under hyperparameters, from a factorization of its own; 2n³/3 flops. Points without which the mean is not determined have none.
+///
+/// # Errors
+/// Those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`]; [`NumericsError::NotPositiveDefinite`];
+/// [`NumericsError::MeanNotDetermined`] by all points; [`NumericsError::Cancelled`].
+pub fn leave_one_out_with(
+    (cloud, values, mean): (&Cloud, &[f64], Mean),
+    at: &Hyperparameters,
+    observer: &dyn Observer,
+) -> Result<LeaveOneOut, NumericsError> {
+    let subject = Subject::of(cloud, values, mean)?;
+    at.noise.check_matches(cloud)?;
+    observer.enter(Stage::Factor);
+    let mut evaluator = Evaluator::new(&subject, Criterion::LeaveOneOut, false);
+    let state = evaluator.state(at, observer)?.ok_or_else(|| never_definite(at, values.len()))?;
+    let (weights, diagonal) = state.into_weights_and_diagonal();
+    Ok(LeaveOneOut::of(values, &weights, &diagonal, &at.noise, 1.0))
+}
+
+/// `W_ii = |L⁻¹e_i|²`, some columns at a time.
+fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+    let n = solver.n_points();
+    let mut buffer = vec![0.0; n * COLUMNS_PER_BLOCK.min(n)];
+    let mut diagonal = Vec::with_capacity(n);
+    while diagonal.len() < n {
+        observer.checkpoint()?;
+        let first = diagonal.len();
+        let n_columns = COLUMNS_PER_BLOCK.min(n - first);
+        let columns = &mut buffer[..n * n_columns];
+        columns.fill(0.0);
+        columns.chunks_exact_mut(n).enumerate().for_each(|(k, column)| column[first + k] = 1.0);
+        solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, n_columns), observer)?;
+        let norm = |column: &[f64]| ColRef::from_slice(column).squared_norm_l2();
+        diagonal.extend(columns.par_chunks_exact(n).map(norm).collect::<Vec<f64>>());
+    }
+    Ok(diagonal)
+}
+
+/// Subtracts the diagonal of `WF(FᵀWF)⁻¹FᵀW`.
+fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend) -> Result<(), NumericsError> {
+    let (n, basis) = (diagonal.len(), trend.basis());
+    let functionals = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;
+    let mut weights = basis.columns(solver.cloud());
+    solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, basis.n_functions()));
+    for (i, p) in diagonal.iter_mut().enumerate() {
+        let pairs = weights.chunks_exact(n).zip(functionals.chunks_exact(n));
+        let left = *p - pairs.map(|(weight, functional)| weight[i] * functional[i]).sum::<f64>();
+        if left.is_nan() || left <= UNDETERMINED * *p {
+            return Err(NumericsError::MeanNotDetermined);
+        }
+        *p = left;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

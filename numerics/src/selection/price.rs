@@ -1,0 +1,96 @@
+//! What model selection takes, known before it begins.
+
+use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
+use super::criterion::Criterion;
+use super::select::SIDE_BY_SIDE;
+use crate::solver::choose::Price;
+
+/// Evaluations that a descent over so many free numbers takes, mostly: some 50 for 6 of them and 70 to 110 for 12 were counted
+/// (`bench/peers/model_selection.py`).
+pub fn expected_evaluations(n_free: usize) -> usize {
+    if n_free == 0 { 1 } else { 40 + 6 * n_free }
+}
+
+/// What so many evaluations take: with all slopes n³ for the likelihood, twice that for others, a third of it without slopes, and a pass over
+/// the pairs.
+///
+/// `n_descents` are families times starts: those of up to 1,024 points run side by side, on `n_threads`, with memory of their own.
+pub fn selection_price(
+    (n_points, dimension): (usize, usize),
+    criterion: Criterion,
+    n_free: usize,
+    n_evaluations: usize,
+    (n_descents, n_threads): (usize, usize),
+) -> Price {
+    let (n, d) = (n_points as f64, dimension as f64);
+    let cubes = match criterion {
+        Criterion::MarginalLikelihood if n_free == 0 => 1.0 / 3.0,
+        Criterion::MarginalLikelihood => 1.0,
+        _ if n_free == 0 => 2.0 / 3.0,
+        Criterion::LeaveOneOut | Criterion::GeneralizedCrossValidation => 2.0,
+    };
+    let evaluation = n * n * (cubes * n + 40.0 + 2.0 * d + 4.0 * n_free as f64);
+    let side_by_side = if n_points <= SIDE_BY_SIDE { n_descents.min(n_threads).max(1) } else { 1 };
+    let beside = n_points.saturating_mul(4 * dimension + 20);
+    let n_numbers = n_points.saturating_mul(n_points).saturating_mul(3).saturating_add(beside);
+    Price {
+        n_bytes: n_numbers.saturating_mul(side_by_side).saturating_mul(size_of::<f64>()),
+        flops: n_evaluations as f64 * evaluation,
+    }
+}
+
+/// What a path of so many α takes: an eigendecomposition, and a product of matrices for what needs the diagonal of the inverse; or a
+/// factorization for each α.
+pub fn alpha_path_price(
+    (n_points, dimension): (usize, usize),
+    criterion: Criterion,
+    n_functions: usize,
+    n_alphas: usize,
+) -> Price {
+    if !is_decomposed(n_points, n_alphas) {
+        return selection_price((n_points, dimension), criterion, 0, n_alphas, (1, 1));
+    }
+    let (n, d, m, p) = (n_points as f64, dimension as f64, n_alphas as f64, n_functions as f64);
+    let each = match criterion {
+        Criterion::MarginalLikelihood => n * (10.0 + 4.0 * (p + 1.0) * (p + 1.0)),
+        Criterion::LeaveOneOut => 4.0 * n * n,
+        Criterion::GeneralizedCrossValidation => 10.0 * n,
+    };
+    let n_matrices = 5;
+    let beside = n_points.saturating_mul(4 * dimension + 4 * n_functions + 20);
+    let n_numbers = n_points.saturating_mul(n_points).saturating_mul(n_matrices).saturating_add(beside);
+    let at_once = n_points.saturating_mul(4 * ALPHAS_AT_ONCE.min(n_alphas));
+    Price {
+        n_bytes: n_numbers.saturating_add(at_once).saturating_mul(size_of::<f64>()),
+        flops: 9.0 * n.powi(3) + n * n * (20.0 + d + 4.0 * p) + m * each,
+    }
+}
+
+/// What predictions of all values from all others take: beside a solver, or with a factorization of their own.
+pub fn leave_one_out_price(n_points: usize, n_functions: usize) -> Price {
+    let n = n_points as f64;
+    let n_numbers = n_points.saturating_mul(3 * n_points.min(512) + 3 * n_functions + 20);
+    let with_factor = n_points.saturating_mul(2 * n_points);
+    Price { n_bytes: n_numbers.max(with_factor).saturating_mul(size_of::<f64>()), flops: n.powi(3) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_of_anything_never_costs_less() {
+        let criteria =
+            [Criterion::MarginalLikelihood, Criterion::LeaveOneOut, Criterion::GeneralizedCrossValidation];
+        for criterion in criteria {
+            for (few, many) in [(10, 100), (100, 3000), (3000, 1 << 40)] {
+                let price = |n: usize| selection_price((n, 3), criterion, 4, n, (6, 2));
+                let path = |n: usize| alpha_path_price((n, 3), criterion, 4, n);
+                for (small, large) in [(price(few), price(many)), (path(few), path(many))] {
+                    assert!(small.flops < large.flops && small.n_bytes < large.n_bytes);
+                }
+            }
+        }
+        assert_eq!(selection_price((1 << 40, 3), Criterion::LeaveOneOut, 4, 1, (1, 1)).n_bytes, usize::MAX);
+    }
+}

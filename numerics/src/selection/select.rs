@@ -1,0 +1,200 @@
+//! The best of several families and starts.
+
+use rayon::prelude::*;
+
+use super::criterion::Criterion;
+use super::descent::{Found, Side, descend, finish, side};
+use super::evaluation::{Evaluator, never_definite};
+use super::parameters::{Hyperparameters, Parameter, Variation};
+use super::space::Space;
+use super::subject::Subject;
+use crate::error::NumericsError;
+use crate::kernel::Family;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::trend::{Mean, Trend};
+
+/// Evaluations of one descent, at most.
+pub const MAX_EVALUATIONS: usize = 200;
+
+/// Points up to which descents run side by side, one on each thread: a factorization of so few does not keep two threads busy.
+pub(super) const SIDE_BY_SIDE: usize = 1024;
+
+/// What is searched.
+#[derive(Debug, Clone, Copy)]
+pub struct Selection<'a> {
+    pub cloud: &'a Cloud,
+    /// Y, `[n]`, unit V.
+    pub values: &'a [f64],
+    pub mean: Mean,
+    pub criterion: Criterion,
+    /// Where the search begins, and what is held where it does not vary.
+    pub start: &'a Hyperparameters,
+    /// What is free. Nothing: the start is evaluated.
+    pub vary: &'a [Variation],
+    /// Each is tried; none: that of the start. Laplace with the ε that it has here where that does not vary.
+    pub families: &'a [Family],
+    /// Further starts, spread over the logarithms of the bounds.
+    pub restarts: usize,
+    /// Of the further starts.
+    pub seed: u64,
+    /// Of each descent; [`MAX_EVALUATIONS`].
+    pub max_evaluations: usize,
+}
+
+/// What is best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selected {
+    pub hyperparameters: Hyperparameters,
+    /// Greater is better.
+    pub score: f64,
+    /// Derivatives of the score in the logarithms of what is free, one for each free number: [`Parameter::LengthScales`] has one for each axis.
+    pub gradient: Vec<f64>,
+    /// What each of them belongs to, with the bound that it is at, if it is at one.
+    pub free: Vec<(Parameter, Option<Side>)>,
+    /// Evaluations of the criterion in all.
+    pub evaluations: usize,
+    /// Whether no slope is left that could be followed: below 0.01 for a factor of e, of a log likelihood.
+    pub converged: bool,
+    /// The mean that generalised least squares find, in coordinates of the cloud.
+    pub trend: Option<Trend>,
+    /// The families as they were asked for, each with its best score; `None` if its matrix was not positive definite from any start.
+    pub families: Vec<(Family, Option<f64>)>,
+}
+
+/// Searches the best hyperparameters: from the start and further ones with every family, each by a descent of its own.
+///
+/// The start is moved into the bounds first. What is found is the same for any number of threads but for rounding.
+///
+/// # Errors
+/// [`NumericsError::InvalidVariation`] with the entry; those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`] of values or noise;
+/// [`NumericsError::MeanNotDetermined`], for leave-one-out also where it is not without one of the points; [`NumericsError::NotPositiveDefinite`] if the matrix is that at no start; [`NumericsError::Cancelled`].
+pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
+    let Selection { cloud, vary, start, .. } = *selection;
+    let subject = Subject::of(cloud, selection.values, selection.mean)?;
+    start.noise.check_matches(cloud)?;
+    if selection.criterion == Criterion::LeaveOneOut {
+        subject.check_without_one()?;
+    }
+    let families = if selection.families.is_empty() { &[start.family] } else { selection.families };
+    check_epsilon(families, vary)?;
+    let mut spaces = Vec::with_capacity(families.len());
+    for &family in families {
+        let base = Hyperparameters { family, ..start.clone() };
+        let space = Space::of(&base, vary, cloud.dimension())?;
+        // What cannot be at the start is refused by name, not searched.
+        space.at(&space.start()).kernel_on(cloud)?;
+        spaces.push(space);
+    }
+    observer.enter(Stage::Factor);
+    let jobs: Vec<(&Space, Vec<f64>)> = spaces.iter().flat_map(|space| starts(space, selection)).collect();
+    let ended = run_all(&subject, selection, &jobs, observer)?;
+    best_of(&subject, selection, (families, &spaces), ended, observer)
+}
+
+/// Varying ε without a family that has one is a mistake.
+fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<(), NumericsError> {
+    let has_epsilon = families.iter().any(|family| matches!(family, Family::Laplace { .. }));
+    match vary.iter().position(|variation| variation.parameter == Parameter::Epsilon) {
+        Some(entry) if !has_epsilon => {
+            let requirement = "must not be epsilon, which only laplace has";
+            Err(NumericsError::InvalidVariation { entry, requirement })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The start of a space and further ones: a sequence of low discrepancy (Roberts 2018) from an offset that the seed decides.
+fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Vec<f64>)> {
+    let bounds = space.bounds();
+    let dimension = bounds.len();
+    // The root of x^(d+1) = x + 1.
+    let root = (0..64).fold(2.0f64, |x, _| (1.0 + x).powf(1.0 / (dimension as f64 + 1.0)));
+    let mut seed = selection.seed;
+    let offsets: Vec<f64> = bounds.iter().map(|_| uniform(&mut seed)).collect();
+    let restart = |k: usize| {
+        let coordinate = |(c, &(min, max)): (usize, &(f64, f64))| {
+            let share = (offsets[c] + (k + 1) as f64 / root.powi(c as i32 + 1)).fract();
+            min + share * (max - min)
+        };
+        bounds.iter().enumerate().map(coordinate).collect()
+    };
+    let n_restarts = if dimension == 0 { 0 } else { selection.restarts };
+    let all = std::iter::once(space.start()).chain((0..n_restarts).map(restart));
+    all.map(|start| (space, start)).collect()
+}
+
+/// The next number in [0, 1) (SplitMix64: Steele, Lea and Flood 2014).
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// All descents, in their order.
+fn run_all(
+    subject: &Subject<'_>,
+    selection: &Selection<'_>,
+    jobs: &[(&Space, Vec<f64>)],
+    observer: &dyn Observer,
+) -> Result<Vec<(Option<Found>, usize)>, NumericsError> {
+    let is_alone = jobs.len() > 1 && subject.n_points() <= SIDE_BY_SIDE;
+    let evaluator = || Evaluator::new(subject, selection.criterion, is_alone);
+    let job = |evaluator: &mut Evaluator<'_>, (space, start): &(&Space, Vec<f64>)| {
+        descend(evaluator, space, start, selection.max_evaluations, observer)
+    };
+    if is_alone {
+        jobs.par_iter().with_max_len(1).map_init(evaluator, job).collect()
+    } else {
+        let mut evaluator = evaluator();
+        jobs.iter().map(|start| job(&mut evaluator, start)).collect()
+    }
+}
+
+/// The best of what the descents of every family found, in their order, brought to its end.
+fn best_of(
+    subject: &Subject<'_>,
+    selection: &Selection<'_>,
+    (families, spaces): (&[Family], &[Space]),
+    ended: Vec<(Option<Found>, usize)>,
+    observer: &dyn Observer,
+) -> Result<Selected, NumericsError> {
+    let mut evaluations: usize = ended.iter().map(|(_, evaluations)| evaluations).sum();
+    let per_family = ended.len() / families.len();
+    let mut scores = vec![None; families.len()];
+    let mut best: Option<(usize, Found, usize)> = None;
+    for (at, (found, used)) in ended.into_iter().enumerate() {
+        let Some(found) = found else { continue };
+        let family = at / per_family;
+        scores[family] = Some(scores[family].map_or(found.score, |score: f64| score.max(found.score)));
+        if best.as_ref().is_none_or(|(_, best, _)| best.score < found.score) {
+            best = Some((family, found, used));
+        }
+    }
+    let Some((family, found, used)) = best else {
+        let start = spaces[0].at(&spaces[0].start());
+        return Err(never_definite(&start, subject.n_points()));
+    };
+    let space = &spaces[family];
+    let mut evaluator = Evaluator::new(subject, selection.criterion, false);
+    let left = selection.max_evaluations.saturating_sub(used);
+    let (found, used) = finish(&mut evaluator, space, found, left, observer)?;
+    evaluations += used;
+    scores[family] = Some(found.score);
+    let sides = found.logarithms.iter().zip(space.bounds()).map(|(&x, bounds)| side(x, bounds));
+    Ok(Selected {
+        free: space.parameters().zip(sides).collect(),
+        hyperparameters: found.hyperparameters,
+        score: found.score,
+        gradient: found.gradient,
+        evaluations,
+        converged: found.converged,
+        trend: evaluator.trend(),
+        families: families.iter().copied().zip(scores).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests;

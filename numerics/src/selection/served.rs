@@ -1,0 +1,32 @@
+//! Whether a solver serves what a search finds.
+
+use super::evaluation::{Evaluator, State};
+use super::parameters::Hyperparameters;
+use crate::solver::MAX_RELATIVE_RESIDUAL;
+
+/// A solver refuses variances and determinants below ε. Near there the factors of two orders of summation have
+/// estimates that differ by a factor of a few.
+const LEAST_RECIPROCAL_CONDITION: f64 = 16.0 * f64::EPSILON;
+
+/// Backward errors of solves by Cholesky are a few roundings.
+const BACKWARD_ERROR: f64 = 4.0 * f64::EPSILON;
+
+/// Noise of so many times `√n ‖K + N‖₁` passes both tests whatever the values: `‖W‖₁ ≤ √n/α`, `‖Λ‖ ≤ ‖Y‖/α`.
+const SURE: f64 = 1e-10;
+
+impl Evaluator<'_> {
+    /// Whether a solver with the hyperparameters of the last score has a residual that is small enough, and
+    /// gives variances and determinants: what is selected is served when it is sent back.
+    pub(super) fn is_served(&self, at: &Hyperparameters, state: &State) -> bool {
+        let (n, norm1) = (self.n_points(), self.matrices.norm1());
+        let root = (n as f64).sqrt();
+        let least_noise = (0..n).map(|i| at.noise.at(i)).fold(f64::INFINITY, f64::min);
+        if least_noise >= SURE * root * norm1 {
+            return true;
+        }
+        let greatest = state.weights.iter().fold(0.0f64, |greatest, weight| greatest.max(weight.abs()));
+        let residual = BACKWARD_ERROR * root * norm1 * greatest;
+        residual <= MAX_RELATIVE_RESIDUAL * self.subject.rest()
+            && self.matrices.reciprocal_condition() >= LEAST_RECIPROCAL_CONDITION
+    }
+}

@@ -1,0 +1,134 @@
+//! A Cholesky factorization as numbers: taken out of one process and put into another.
+
+use std::sync::Arc;
+
+use super::cholesky::Cholesky;
+use super::{Dense, Factorization};
+use crate::error::NumericsError;
+use crate::machine::pages::SpareBuffer;
+use crate::solver::system::System;
+
+/// What a factorization is beside its system.
+#[derive(Clone, Copy)]
+pub struct Factor<'a> {
+    /// L as it lies in memory, see packed.rs.
+    pub numbers: &'a [f64],
+    /// `(K + αI)⁻¹·1`, `[n]`.
+    pub weights_of_one: &'a [f64],
+    /// `‖K + αI‖₁`.
+    pub norm1: f64,
+    pub reciprocal_condition: f64,
+}
+
+/// A factor that is being put together, in its order.
+pub struct FactorBuilder {
+    factor: Cholesky,
+    n_filled: usize,
+}
+
+impl FactorBuilder {
+    /// Memory for the factor of n points.
+    ///
+    /// # Errors
+    /// [`NumericsError::OutOfMemory`].
+    pub fn new(spare: &Arc<SpareBuffer>, n_points: usize) -> Result<Self, NumericsError> {
+        Ok(Self { factor: Cholesky::blank(spare, n_points)?, n_filled: 0 })
+    }
+
+    /// Numbers that are missing.
+    pub fn n_missing(&self) -> usize {
+        self.factor.numbers().len() - self.n_filled
+    }
+
+    /// Takes the next numbers. What is beyond the last one is not taken.
+    pub fn push(&mut self, numbers: impl Iterator<Item = f64>) {
+        let rest = &mut self.factor.numbers_mut()[self.n_filled..];
+        self.n_filled += rest.iter_mut().zip(numbers).map(|(to, from)| *to = from).count();
+    }
+
+    /// The solver of a system, as it was; nothing unless all numbers are there and as many as the system has. That they are those of the
+    /// system is for the caller to know.
+    pub(in crate::solver) fn finish(
+        self,
+        system: System,
+        weights_of_one: Vec<f64>,
+        norm1: f64,
+        reciprocal_condition: f64,
+    ) -> Option<Dense> {
+        let n = system.n_points();
+        let is_whole = self.n_missing() == 0 && self.factor.n_points() == n && weights_of_one.len() == n;
+        let factorization = Factorization::Cholesky(self.factor);
+        is_whole.then_some(Dense { system, factorization, norm1, reciprocal_condition, weights_of_one })
+    }
+}
+
+impl Dense {
+    /// The factor, where there is one.
+    pub(in crate::solver) fn factor(&self) -> Option<Factor<'_>> {
+        match &self.factorization {
+            Factorization::Cholesky(factor) => Some(Factor {
+                numbers: factor.numbers(),
+                weights_of_one: &self.weights_of_one,
+                norm1: self.norm1,
+                reciprocal_condition: self.reciprocal_condition,
+            }),
+            Factorization::PivotedCholesky { .. } => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::{Family, Kernel};
+    use crate::observer::Unobserved;
+    use crate::points::cloud::Cloud;
+    use crate::solver::Solver;
+    use crate::sums::regularization::Regularization;
+    use faer::MatMut;
+
+    fn system(n: usize) -> System {
+        let points = (0..3 * n).map(|i| (i as f64 * 0.7).sin() * 3.0 + i as f64 * 0.01).collect();
+        let kernel = Kernel::new(Family::Gauss, 0.4, 1.5).unwrap();
+        let cloud = Arc::new(Cloud::new(points, 3).unwrap());
+        System::new(cloud, kernel, Regularization::uniform(1e-3).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_factor_that_is_put_together_again_solves_to_the_same_bits() {
+        for n in [1, 2, 7, 64, 505] {
+            let solver = Solver::dense(system(n), &Unobserved).unwrap();
+            let Factor { numbers, weights_of_one, norm1, reciprocal_condition } = solver.factor().unwrap();
+            let mut builder = FactorBuilder::new(&SpareBuffer::up_to(0), n).unwrap();
+            for piece in numbers.chunks(100) {
+                builder.push(piece.iter().copied());
+            }
+            let of = |solver: &Solver| {
+                let mut x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+                solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut x, n, 1));
+                (x, solver.log_determinant().unwrap())
+            };
+            let again =
+                Solver::restore(builder, system(n), weights_of_one.to_vec(), norm1, reciprocal_condition)
+                    .unwrap();
+            assert_eq!(of(&again), of(&solver), "{n}");
+            assert_eq!(again.reciprocal_condition(), solver.reciprocal_condition());
+        }
+    }
+
+    #[test]
+    fn what_is_not_whole_is_no_factor() {
+        let solver = Solver::dense(system(9), &Unobserved).unwrap();
+        let Factor { numbers, weights_of_one, norm1, reciprocal_condition } = solver.factor().unwrap();
+        for (n_numbers, n_points, n_weights) in
+            [(numbers.len() - 1, 9, 9), (numbers.len(), 8, 9), (numbers.len(), 9, 8)]
+        {
+            let mut builder = FactorBuilder::new(&SpareBuffer::up_to(0), 9).unwrap();
+            builder.push(numbers[..n_numbers].iter().copied());
+            let weights = weights_of_one[..n_weights].to_vec();
+            assert!(
+                Solver::restore(builder, system(n_points), weights, norm1, reciprocal_condition).is_none()
+            );
+        }
+    }
+}

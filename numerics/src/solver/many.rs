@@ -1,0 +1,80 @@
+//! Weights for many lists of values at once: solves and residuals in matrix products.
+
+use std::borrow::Cow;
+
+use faer::MatMut;
+
+use super::solution::Candidate;
+use super::trend::{Mean, Trend};
+use super::{Method, Solution, Solver};
+use crate::error::NumericsError;
+use crate::observer::{Observer, Stage};
+use crate::sums::many::values_of_each;
+
+/// Lists that are solved together.
+const LISTS_PER_BLOCK: usize = 256;
+
+impl Solution {
+    /// [`Solution::with_mean`] of each of k lists of values `[k, n]`.
+    ///
+    /// # Errors
+    /// Those of [`Solution::with_mean`]; [`NumericsError::LengthMismatch`] for lists that are not whole.
+    pub fn of_each(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Self>, NumericsError> {
+        let n = solver.n_points();
+        let lists = values.chunks_exact(n);
+        if !lists.remainder().is_empty() {
+            solver.cloud().check_one_per_point(lists.remainder())?;
+        }
+        // Least squares gain by a step of refinement each (Solution::of).
+        if solver.method() != Method::Cholesky {
+            return lists.map(|list| Self::with_mean(solver, list, mean, observer)).collect();
+        }
+        observer.enter(Stage::Solve);
+        let trends = Trend::fit_each(solver, values, mean)?;
+        let rest = match &trends {
+            None => Cow::Borrowed(values),
+            Some(trends) => {
+                let rest =
+                    lists.zip(trends).flat_map(|(list, trend)| trend.removed_from(list, solver.cloud()));
+                Cow::Owned(rest.collect())
+            }
+        };
+        let mut solutions = Vec::with_capacity(rest.len() / n);
+        for lists in rest.chunks(LISTS_PER_BLOCK * n) {
+            Self::add_block(solver, lists, &mut solutions, observer)?;
+        }
+        for (solution, trend) in solutions.iter_mut().zip(trends.into_iter().flatten()) {
+            solution.trend = Some(trend);
+        }
+        Ok(solutions)
+    }
+
+    fn add_block(
+        solver: &Solver,
+        lists: &[f64],
+        solutions: &mut Vec<Self>,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
+        let (n, cloud) = (solver.n_points(), solver.cloud());
+        let mut weights = lists.to_vec();
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, lists.len() / n));
+        if weights.iter().any(|weight| !weight.is_finite()) {
+            return Err(NumericsError::WeightsOverflow);
+        }
+        let at_points = values_of_each(cloud, solver.kernel(), &weights, cloud, observer)?;
+        let parts = lists.chunks_exact(n).zip(weights.chunks_exact(n)).zip(at_points.chunks_exact(n));
+        for ((list, weights), at_points) in parts {
+            let found = Candidate::evaluated(solver, list, weights.to_vec(), at_points.to_vec());
+            solutions.push(match found.wants_refinement(solver, list) {
+                true => Self::of(solver, list, observer)?,
+                false => found.accept(solver, list, false)?.0,
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,269 @@
+//! The mean of a function: few known functions with coefficients found together with the weights.
+//!
+//! With `u = Σ_a β_a f_a + Σ_j λ_j k(·, x_j)` and F the `f_a` at the points, generalised least squares take
+//! `β = (FᵀWF)⁻¹FᵀWY`, `Λ = W(Y − Fβ)`, W = (K + αI)⁻¹: universal kriging, and the posterior under a flat prior on β (Rasmussen and
+//! Williams 2006, sec. 2.7; Chilès and Delfiner 2012, sec. 3.4).
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, MatMut, Side};
+use rayon::prelude::*;
+
+use super::Solver;
+use crate::error::NumericsError;
+use crate::machine::heap::vec_bytes;
+use crate::machine::vector::dot;
+use crate::points::cloud::Cloud;
+
+/// Which functions the mean is a combination of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Mean {
+    /// None: far from the points the function tends to 0.
+    #[default]
+    Zero,
+    /// The constant.
+    Constant,
+    /// The constant and the coordinates.
+    Linear,
+}
+
+impl Mean {
+    /// Functions in dimension d.
+    pub fn n_functions(self, dimension: usize) -> usize {
+        match self {
+            Self::Zero => 0,
+            Self::Constant => 1,
+            Self::Linear => 1 + dimension,
+        }
+    }
+}
+
+/// A mean is not determined where the points leave one of its functions to rounding: the least share of its square that must be left.
+const DEPENDENT: f64 = 1e-12;
+
+/// The functions of a mean, about the centre of a cloud and in units of its size.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Basis {
+    mean: Mean,
+    centre: Vec<f64>,
+    size: f64,
+}
+
+impl Basis {
+    pub(crate) fn of(mean: Mean, cloud: &Cloud) -> Self {
+        let (min, max) = cloud.bounding_box();
+        let centre = min.iter().zip(&max).map(|(a, b)| 0.5 * (a + b)).collect();
+        let radius = cloud.radius();
+        Self { mean, centre, size: if radius > 0.0 { radius } else { 1.0 } }
+    }
+
+    pub(crate) fn n_functions(&self) -> usize {
+        self.mean.n_functions(self.centre.len())
+    }
+
+    /// The functions at a point, `[p]`.
+    pub(crate) fn at(&self, x: &[f64], functions: &mut [f64]) {
+        let (Some((constant, linear)), true) = (functions.split_first_mut(), self.mean != Mean::Zero) else {
+            return;
+        };
+        *constant = 1.0;
+        let scaled = x.iter().zip(&self.centre).map(|(x, centre)| (x - centre) / self.size);
+        linear.iter_mut().zip(scaled).for_each(|(function, x)| *function = x);
+    }
+
+    /// Adds the derivatives of the functions along a vector.
+    pub(crate) fn add_slopes(&self, along: &[f64], functions: &mut [f64]) {
+        let slopes = functions.iter_mut().skip(1).zip(along);
+        slopes.for_each(|(function, component)| *function += component / self.size);
+    }
+
+    /// `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values. `None` if the points do not tell the functions
+    /// apart.
+    pub(crate) fn functionals(&self, solver: &Solver) -> Option<Vec<f64>> {
+        let (n, p) = (solver.n_points(), self.n_functions());
+        let columns = self.columns(solver.cloud());
+        let mut weights = columns.clone();
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(&mut weights, n, p));
+        let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
+        let solved = solve_gram(&gram, Mat::from_fn(p, n, |a, i| weights[a * n + i]))?;
+        Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
+    }
+
+    /// Turns rows that weigh what the mean leaves of the values, `[rows, n]`, into those that weigh the values: with `exact` what a row is to be on each
+    /// of the functions, `row − (row F − exact)(FᵀWF)⁻¹FᵀW`. A row without that is left as it is. `None` if the points do not tell the functions apart.
+    pub(crate) fn make_exact(
+        &self,
+        solver: &Solver,
+        rows: &mut [f64],
+        exact: impl Fn(usize) -> Option<Vec<f64>> + Sync,
+    ) -> Option<()> {
+        let n = solver.n_points();
+        let (of_values, columns) = (self.functionals(solver)?, self.columns(solver.cloud()));
+        rows.par_chunks_mut(n).enumerate().for_each(|(index, row)| {
+            let Some(exact) = exact(index) else { return };
+            let found = columns.chunks_exact(n).map(|function| dot(function, row));
+            let excess: Vec<f64> = found.zip(&exact).map(|(found, exact)| found - exact).collect();
+            for (functional, excess) in of_values.chunks_exact(n).zip(&excess) {
+                row.iter_mut().zip(functional).for_each(|(entry, f)| *entry -= excess * f);
+            }
+        });
+        Some(())
+    }
+
+    /// The functions at the points of a cloud, one column for each: `[n, p]` column by column.
+    pub(crate) fn columns(&self, cloud: &Cloud) -> Vec<f64> {
+        let (n, p) = (cloud.n_points(), self.n_functions());
+        let (mut columns, mut functions) = (vec![0.0; n * p], vec![0.0; p]);
+        for (i, x) in cloud.points().enumerate() {
+            self.at(x, &mut functions);
+            functions.iter().enumerate().for_each(|(a, f)| columns[a * n + i] = *f);
+        }
+        columns
+    }
+}
+
+/// A mean with its coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trend {
+    basis: Basis,
+    coefficients: Vec<f64>,
+    /// `(FᵀWF)⁻¹` `[p, p]`, the covariance of the coefficients under the kernel that they were found with; empty where they are known.
+    covariance: Vec<f64>,
+}
+
+/// How well the coefficients of a mean are known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrendUncertainty<'a> {
+    pub(crate) basis: &'a Basis,
+    /// `[p, p]`, under the kernel that they were found with.
+    pub(crate) covariance: &'a [f64],
+}
+
+impl Trend {
+    /// With coefficients that are known, one for each function.
+    pub(crate) fn new(basis: Basis, coefficients: Vec<f64>) -> Self {
+        Self { basis, coefficients, covariance: Vec::new() }
+    }
+
+    /// With coefficients that were found, and their covariance `[p, p]` under the kernel that they were found with.
+    pub(crate) fn found(basis: Basis, coefficients: Vec<f64>, covariance: Vec<f64>) -> Self {
+        Self { basis, coefficients, covariance }
+    }
+
+    /// How well the coefficients are known, unless they are given.
+    pub(crate) fn uncertainty(&self) -> Option<TrendUncertainty<'_>> {
+        let Self { basis, covariance, .. } = self;
+        (!covariance.is_empty()).then_some(TrendUncertainty { basis, covariance })
+    }
+
+    /// The mean of values `[n]` under a solver; `None` for [`Mean::Zero`].
+    ///
+    /// # Errors
+    /// [`NumericsError::MeanNotDetermined`] if the points do not tell its functions apart.
+    pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
+        Ok(Self::fit_each(solver, values, mean)?.map(|mut trends| trends.remove(0)))
+    }
+
+    /// The mean of each of k lists of values `[k, n]`.
+    ///
+    /// # Errors
+    /// Those of [`Trend::fit`].
+    pub(super) fn fit_each(
+        solver: &Solver,
+        values: &[f64],
+        mean: Mean,
+    ) -> Result<Option<Vec<Self>>, NumericsError> {
+        if mean == Mean::Zero {
+            return Ok(None);
+        }
+        let (cloud, n) = (solver.cloud(), solver.n_points());
+        let basis = Basis::of(mean, cloud);
+        let columns = basis.columns(cloud);
+        let mut weights = solver.weights_of_one().to_vec();
+        weights.extend_from_slice(&columns[n..]);
+        let p = basis.n_functions();
+        solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));
+        // What all values of a list share is taken off first: it would cost digits of what they do not share.
+        let lists = values.chunks_exact(n);
+        let shared: Vec<f64> = lists.clone().map(|list| list.iter().sum::<f64>() / n as f64).collect();
+        let moments: Vec<f64> = lists
+            .zip(&shared)
+            .flat_map(|(list, shared)| {
+                let rest: Vec<f64> = list.iter().map(|value| value - shared).collect();
+                weights.chunks_exact(n).map(|weights| dot(weights, &rest)).collect::<Vec<f64>>()
+            })
+            .collect();
+        let gram = Mat::from_fn(p, p, |a, b| dot(&columns[a * n..][..n], &weights[b * n..][..n]));
+        let right = |a: usize, b: usize| match b.checked_sub(p) {
+            Some(list) => moments[list * p + a],
+            None => f64::from(u8::from(a == b)),
+        };
+        let right = Mat::from_fn(p, p + shared.len(), right);
+        let solved = solve_gram(&gram, right).ok_or(NumericsError::MeanNotDetermined)?;
+        let column = |b: usize| solved.col(b).iter().copied();
+        let covariance: Vec<f64> = (0..p).flat_map(column).collect();
+        let trend = |(list, shared): (usize, &f64)| {
+            let mut coefficients: Vec<f64> = column(p + list).collect();
+            coefficients[0] += shared;
+            Self { basis: basis.clone(), coefficients, covariance: covariance.clone() }
+        };
+        Ok(Some(shared.iter().enumerate().map(trend).collect()))
+    }
+
+    /// `m(x)`.
+    pub(crate) fn at(&self, x: &[f64]) -> f64 {
+        let mut functions = vec![0.0; self.coefficients.len()];
+        self.basis.at(x, &mut functions);
+        dot(&functions, &self.coefficients)
+    }
+
+    /// `∇m`, the same everywhere.
+    pub(crate) fn gradient(&self) -> Vec<f64> {
+        let slopes = self.coefficients[1..].iter().map(|slope| slope / self.basis.size);
+        slopes.chain(std::iter::repeat(0.0)).take(self.basis.centre.len()).collect()
+    }
+
+    /// Values without the mean, `[n]`.
+    pub(crate) fn removed_from(&self, values: &[f64], cloud: &Cloud) -> Vec<f64> {
+        cloud.points().zip(values).map(|(x, value)| value - self.at(x)).collect()
+    }
+
+    pub(crate) fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// The mean as a function of the coordinates: the constant, then the slopes, if it has any.
+    pub fn of_coordinates(&self) -> Vec<f64> {
+        let slopes: Vec<f64> = self.coefficients[1..].iter().map(|slope| slope / self.basis.size).collect();
+        let at_centre: f64 = slopes.iter().zip(&self.basis.centre).map(|(slope, x)| slope * x).sum();
+        std::iter::once(self.coefficients[0] - at_centre).chain(slopes).collect()
+    }
+
+    /// Functions of the mean.
+    pub fn n_functions(&self) -> usize {
+        self.coefficients.len()
+    }
+
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.coefficients) + vec_bytes(&self.covariance) + vec_bytes(&self.basis.centre)
+    }
+}
+
+/// `G⁻¹` times some columns, G symmetric and positive definite; `None` if it is not by [`DEPENDENT`].
+pub(crate) fn solve_gram(gram: &Mat<f64>, columns: Mat<f64>) -> Option<Mat<f64>> {
+    let p = gram.nrows();
+    // In units of its diagonal, so that the functions may have any size.
+    let roots: Vec<f64> = (0..p).map(|a| gram[(a, a)].sqrt()).collect();
+    if roots.iter().any(|root| root.is_nan() || *root <= 0.0) {
+        return None;
+    }
+    let scaled = Mat::from_fn(p, p, |a, b| gram[(a, b)] / (roots[a] * roots[b]));
+    let factor = scaled.llt(Side::Lower).ok()?;
+    let pivots = factor.L().diagonal().column_vector();
+    if pivots.iter().any(|pivot| pivot * pivot < DEPENDENT) {
+        return None;
+    }
+    let right = Mat::from_fn(p, columns.ncols(), |a, b| columns[(a, b)] / roots[a]);
+    let solved = factor.solve(right);
+    Some(Mat::from_fn(p, columns.ncols(), |a, b| solved[(a, b)] / roots[a]))
+}

@@ -1,0 +1,293 @@
+//! Value, gradient and Hessian of a kernel expansion at many queries, in one fused pass over the points per query.
+
+mod centres;
+mod pass;
+mod tiles;
+
+use rayon::prelude::*;
+
+use super::nodes::{Nodes, blocked};
+use crate::error::NumericsError;
+use crate::kernel::Kernel;
+use crate::machine::heap::vec_bytes;
+use crate::machine::small::{Small, zeros};
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::duplicates::Positions;
+use pass::{Expansion, Pass};
+
+/// Queries per task; a task of one query at n = 2,000 is about 5 µs of work.
+const QUERIES_PER_TASK: usize = 8;
+
+/// `u(x) = Σ_j λ_j k(x, x_j)` with its derivatives up to an order, at m queries.
+#[derive(Clone)]
+pub struct Jets {
+    packed: Vec<f64>,
+    layout: Layout,
+}
+
+/// Which derivatives a pass computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JetOrder {
+    Value,
+    Gradient,
+    Hessian,
+    /// The Hessian, and the sums of absolute values that bound the rounding errors of value and gradient.
+    HessianWithMagnitudes,
+}
+
+impl JetOrder {
+    /// Of the highest derivatives.
+    pub fn degree(self) -> usize {
+        match self {
+            Self::Value => 0,
+            Self::Gradient => 1,
+            Self::Hessian | Self::HessianWithMagnitudes => 2,
+        }
+    }
+}
+
+/// One query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two magnitudes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    order: JetOrder,
+    dimension: usize,
+}
+
+impl Layout {
+    pub(crate) fn new(order: JetOrder, dimension: usize) -> Self {
+        Self { order, dimension }
+    }
+
+    fn gradient(self) -> usize {
+        1
+    }
+
+    fn hessian(self) -> usize {
+        1 + self.dimension
+    }
+
+    fn magnitudes(self) -> usize {
+        self.hessian() + self.dimension * (self.dimension + 1) / 2
+    }
+
+    pub(crate) fn width(self) -> usize {
+        match self.order {
+            JetOrder::Value => 1,
+            JetOrder::Gradient => self.hessian(),
+            JetOrder::Hessian => self.magnitudes(),
+            JetOrder::HessianWithMagnitudes => self.magnitudes() + 2,
+        }
+    }
+
+    /// Sums over the points that a jet with a Hessian is made of: those of its entries, and `Σλφ′`.
+    fn n_sums(self) -> usize {
+        self.magnitudes() + 1
+    }
+
+    /// Turns the sums `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′` into as much of a jet as there is room for: factors
+    /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian. Where the kernel stretches coordinates, D are differences of
+    /// those, and derivatives along an axis come with its factor.
+    ///
+    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
+    pub(crate) fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
+        let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
+        let trace = 2.0 * variance * sums[self.magnitudes()] * inverse * inverse;
+        let (mut row, mut column) = (0, 0);
+        for (at, (slot, sum)) in jet.iter_mut().zip(sums).enumerate() {
+            let sum = variance * sum;
+            *slot = match at {
+                0 => sum,
+                at if at < self.hessian() => 2.0 * sum * inverse * inverse * kernel.stretch(at - 1),
+                _ => {
+                    let entry = 4.0 * sum * inverse * inverse * inverse * inverse;
+                    let entry = if row == column { entry + trace } else { entry };
+                    let entry = entry * kernel.stretch(row) * kernel.stretch(column);
+                    column += 1;
+                    if column == self.dimension {
+                        row += 1;
+                        column = row;
+                    }
+                    entry
+                }
+            };
+        }
+    }
+}
+
+impl Jets {
+    /// Evaluates the expansion with `weights` (one per point of `cloud`) at the queries.
+    ///
+    /// Each query is summed in the order of the points, whatever the number of threads. The caller has checked that the
+    /// kernel has the derivatives asked for ([`check_smooth_at`]).
+    ///
+    /// # Errors
+    /// [`NumericsError::Overflow`] where a result leaves float64, [`NumericsError::Cancelled`].
+    pub fn evaluate(
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        Self::over(&Nodes::of(cloud), kernel, weights, queries, order, observer)
+    }
+
+    /// The same over points that are laid out already.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn over(
+        nodes: &Nodes,
+        kernel: &Kernel,
+        weights: &[f64],
+        queries: &Cloud,
+        order: JetOrder,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        debug_assert_eq!(nodes.dimension(), queries.dimension());
+        let layout = Layout { order, dimension: nodes.dimension() };
+        let (weights, width) = (blocked(weights), layout.width());
+        let expansion = Expansion { nodes, kernel, weights: &weights };
+        let mut packed = vec![0.0; queries.n_points() * width];
+        packed.par_chunks_mut(width * QUERIES_PER_TASK).enumerate().try_for_each(|(task, jets)| {
+            observer.checkpoint()?;
+            let first = task * QUERIES_PER_TASK;
+            nodes.dispatch(Pass { expansion, queries, first, jets, layout });
+            match jets.iter().position(|x| !x.is_finite()) {
+                Some(at) => Err(NumericsError::Overflow { query: first + at / width }),
+                None => Ok(()),
+            }
+        })?;
+        Ok(Self { packed, layout })
+    }
+
+    /// [`Jets::evaluate`] at the points of the cloud themselves to the second order, by half of the pairs where that pays: the
+    /// order of the sums is another then, and depends on the number of points alone.
+    ///
+    /// # Errors
+    /// Those of [`Jets::evaluate`].
+    pub fn at_points(
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        if cloud.dimension() > centres::MAX_DIMENSION || cloud.n_points() < centres::MIN_POINTS {
+            return Self::evaluate(cloud, kernel, weights, cloud, JetOrder::Hessian, observer);
+        }
+        Self::by_half_of_the_pairs(&Nodes::of(cloud), cloud, kernel, weights, observer)
+    }
+
+    fn by_half_of_the_pairs(
+        nodes: &Nodes,
+        cloud: &Cloud,
+        kernel: &Kernel,
+        weights: &[f64],
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let layout = Layout { order: JetOrder::Hessian, dimension: cloud.dimension() };
+        let expansion = Expansion { nodes, kernel, weights: &blocked(weights) };
+        let packed = centres::jets(expansion, cloud, layout, observer)?;
+        Ok(Self { packed, layout })
+    }
+
+    /// Of numbers that were summed elsewhere, `[m, width]`.
+    pub(crate) fn of(layout: Layout, packed: Vec<f64>) -> Self {
+        Self { packed, layout }
+    }
+
+    /// With a linear function added, given by its value at a query and its gradient `[d]`.
+    pub fn plus_linear(mut self, queries: &Cloud, gradient: &[f64], value: impl Fn(&[f64]) -> f64) -> Self {
+        let layout = self.layout;
+        for (jet, x) in self.packed.chunks_exact_mut(layout.width()).zip(queries.points()) {
+            jet[0] += value(x);
+            let slopes = jet[layout.gradient()..].iter_mut().zip(gradient);
+            slopes.for_each(|(slot, slope)| *slot += slope);
+        }
+        self
+    }
+
+    pub fn n_queries(&self) -> usize {
+        self.packed.len() / self.layout.width()
+    }
+
+    pub fn dimension(&self) -> usize {
+        self.layout.dimension
+    }
+
+    /// Bytes held on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        vec_bytes(&self.packed)
+    }
+
+    fn jet(&self, query: usize) -> &[f64] {
+        let width = self.layout.width();
+        &self.packed[query * width..][..width]
+    }
+
+    /// u at a query, unit of the values.
+    pub fn value(&self, query: usize) -> f64 {
+        self.jet(query)[0]
+    }
+
+    /// u at every query, `[m]`.
+    pub fn values(&self) -> Vec<f64> {
+        (0..self.n_queries()).map(|query| self.value(query)).collect()
+    }
+
+    /// ∇u at a query, `[d]`.
+    pub fn gradient(&self, query: usize) -> &[f64] {
+        &self.jet(query)[self.layout.gradient()..][..self.layout.dimension]
+    }
+
+    /// ∇u at every query, `[m, d]`.
+    pub fn gradients(&self) -> Vec<f64> {
+        (0..self.n_queries()).flat_map(|query| self.gradient(query)).copied().collect()
+    }
+
+    /// D²u at a query, symmetric `[d, d]`.
+    pub fn hessian(&self, query: usize) -> Small {
+        let d = self.layout.dimension;
+        let mut packed = self.jet(query)[self.layout.hessian()..].iter();
+        let mut full = zeros(d * d);
+        for a in 0..d {
+            for (b, &entry) in (a..d).zip(&mut packed) {
+                full[a * d + b] = entry;
+                full[b * d + a] = entry;
+            }
+        }
+        full
+    }
+
+    /// D²u at every query, `[m, d, d]`.
+    pub fn hessians(&self) -> Vec<f64> {
+        (0..self.n_queries()).flat_map(|query| self.hessian(query)).collect()
+    }
+
+    /// `Σ|λ_j||k_j|` and `Σ|λ_j||∇k_j|` at a query; order [`JetOrder::HessianWithMagnitudes`] only.
+    pub(crate) fn magnitudes(&self, query: usize) -> (f64, f64) {
+        let jet = self.jet(query);
+        let at = self.layout.magnitudes();
+        (jet[at], jet[at + 1])
+    }
+}
+
+/// Refuses queries at which a kernel with a kink has no gradient.
+///
+/// # Errors
+/// [`NumericsError::KernelNotSmooth`] with the first query that is a point of the cloud.
+pub fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<(), NumericsError> {
+    if !kernel.has_kink() {
+        return Ok(());
+    }
+    let positions = Positions::of(cloud);
+    match queries.points().enumerate().find_map(|(query, x)| Some((query, positions.find(x)?))) {
+        Some((query, point)) => Err(NumericsError::KernelNotSmooth { query, point }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,183 @@
+//! The sums over all points for some consecutive queries, block by block.
+
+use pulp::{Simd, WithSimd};
+
+use super::tiles::{ProfileBlock, Sum};
+use super::{JetOrder, Layout};
+use crate::kernel::{Kernel, Pairs};
+use crate::machine::registers::{Block, Pack};
+use crate::points::cloud::Cloud;
+use crate::sums::nodes::Nodes;
+
+/// `Σ_j λ_j k(·, x_j)`.
+#[derive(Clone, Copy)]
+pub(super) struct Expansion<'a> {
+    pub(super) nodes: &'a Nodes,
+    pub(super) kernel: &'a Kernel,
+    pub(super) weights: &'a [Block],
+}
+
+/// The jets of the queries from `first` on.
+pub(super) struct Pass<'a> {
+    pub(super) expansion: Expansion<'a>,
+    pub(super) queries: &'a Cloud,
+    pub(super) first: usize,
+    pub(super) jets: &'a mut [f64],
+    pub(super) layout: Layout,
+}
+
+impl WithSimd for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match self.layout.order {
+            JetOrder::Value => self.run::<S, 0>(simd),
+            JetOrder::Gradient => self.run::<S, 1>(simd),
+            JetOrder::Hessian | JetOrder::HessianWithMagnitudes => self.run::<S, 2>(simd),
+        }
+    }
+}
+
+impl Pass<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const ORDER: usize>(self, simd: S) {
+        let Self { expansion, queries, first, jets, layout } = self;
+        let (kernel, has_magnitudes) = (expansion.kernel, layout.order == JetOrder::HessianWithMagnitudes);
+        let mut sums = Sums::new(simd, layout.dimension);
+        let mut numbers = vec![0.0; layout.n_sums()];
+        for (k, jet) in jets.chunks_exact_mut(layout.width()).enumerate() {
+            let x = queries.point(first + k);
+            sums.clear(simd);
+            for block in 0..expansion.weights.len() {
+                sums.add::<ORDER>(simd, expansion, block, x);
+                if has_magnitudes {
+                    let weights = &expansion.weights[block];
+                    sums.block.add_magnitudes(simd, weights, kernel, &mut sums.magnitudes);
+                }
+            }
+            sums.write::<ORDER>(&mut numbers);
+            let (jet, magnitudes) = jet.split_at_mut(jet.len() - if has_magnitudes { 2 } else { 0 });
+            layout.finish(kernel, &numbers, jet);
+            if let [value, slope] = magnitudes {
+                let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
+                *value = variance * sums.magnitudes[0].sum_lanes();
+                *slope = 2.0 * variance * sums.magnitudes[1].sum_lanes() * inverse;
+            }
+        }
+    }
+}
+
+/// What a pass has summed up for a query, and the block at hand.
+pub(super) struct Sums<S: Simd> {
+    /// `Σλφ`.
+    value: Sum<S>,
+    /// `Σλφ′`, which enters the whole diagonal of the Hessian.
+    trace: Sum<S>,
+    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
+    magnitudes: [Sum<S>; 2],
+    /// `Σλφ′D_a`.
+    gradient: Vec<Sum<S>>,
+    /// `Σλφ″D_aD_b`, a ≤ b, row by row.
+    hessian: Vec<Sum<S>>,
+    pub(super) block: ProfileBlock,
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S, d: usize) -> Self {
+        let zero = Sum::splat(simd, 0.0);
+        Self {
+            value: zero,
+            trace: zero,
+            magnitudes: [zero; 2],
+            gradient: vec![zero; d],
+            hessian: vec![zero; d * (d + 1) / 2],
+            block: ProfileBlock::zero(d),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn clear(&mut self, simd: S) {
+        let zero = Sum::splat(simd, 0.0);
+        (self.value, self.trace, self.magnitudes) = (zero, zero, [zero; 2]);
+        self.gradient.fill(zero);
+        self.hessian.fill(zero);
+    }
+
+    /// Adds what the points of a block give x.
+    #[inline(always)]
+    pub(super) fn add<const ORDER: usize>(
+        &mut self,
+        simd: S,
+        expansion: Expansion<'_>,
+        block: usize,
+        x: &[f64],
+    ) {
+        expansion.kernel.profiles(Weighted::<S, ORDER> { simd, expansion, block, x, sums: self });
+        if ORDER >= 1 {
+            let weights = &expansion.weights[block];
+            self.block.add_to::<S, ORDER>(simd, weights, &mut self.gradient, &mut self.hessian);
+        }
+    }
+
+    /// Writes the sums up to an order, in that of [`Layout::finish`].
+    #[inline(always)]
+    pub(super) fn write<const ORDER: usize>(&self, numbers: &mut [f64]) {
+        let d = self.gradient.len();
+        numbers[0] = self.value.sum_lanes();
+        if ORDER == 0 {
+            return;
+        }
+        for (number, sum) in numbers[1..].iter_mut().zip(&self.gradient) {
+            *number = sum.sum_lanes();
+        }
+        if ORDER == 1 {
+            return;
+        }
+        for (number, sum) in numbers[1 + d..].iter_mut().zip(&self.hessian) {
+            *number = sum.sum_lanes();
+        }
+        numbers[1 + d + self.hessian.len()] = self.trace.sum_lanes();
+    }
+}
+
+/// Computes a block's differences and profiles, and adds up what needs no difference.
+struct Weighted<'a, S: Simd, const ORDER: usize> {
+    simd: S,
+    expansion: Expansion<'a>,
+    block: usize,
+    x: &'a [f64],
+    sums: &'a mut Sums<S>,
+}
+
+impl<S: Simd, const ORDER: usize> Pairs<S> for Weighted<'_, S, ORDER> {
+    type Others = ();
+
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
+        let Expansion { nodes, kernel, .. } = self.expansion;
+        let differences = &mut self.sums.block.differences;
+        let q = nodes.scaled_distances(self.simd, (self.block, at), self.x, kernel, |c, difference| {
+            if ORDER >= 1 {
+                difference.store(&mut differences[c], at);
+            }
+        });
+        (q, ())
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (): (), [phi, slope, bend]: [Pack<S>; 3]) {
+        let weight = Pack::load(self.simd, &self.expansion.weights[self.block], at);
+        let sums = &mut *self.sums;
+        sums.value = weight.add_products_to(phi, sums.value);
+        if ORDER >= 1 {
+            slope.store(&mut sums.block.profiles[1], at);
+        }
+        if ORDER >= 2 {
+            sums.trace = weight.add_products_to(slope, sums.trace);
+            phi.store(&mut sums.block.profiles[0], at);
+            bend.store(&mut sums.block.profiles[2], at);
+        }
+    }
+}

@@ -1,0 +1,339 @@
+//! The surface of local regressions, with one side chosen for all of it.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::coarse::outward_directions;
+use super::curvature::principal_curvatures;
+use super::degeneracy::{DegeneracyReason, is_far};
+use super::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
+use super::request::{GeometryRequest, Orientation};
+use super::served::{Deviations, Served, ServedBy, Verdict};
+use super::sure::least_ratio;
+use crate::error::NumericsError;
+use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::machine::vector::{dot, norm};
+use crate::observer::{Observer, Stage};
+use crate::patches::{CurvatureDeviations, PatchGeometry, Patches};
+use crate::points::cloud::Cloud;
+use crate::points::neighbourhoods::Neighbourhoods;
+use crate::points::neighbours::Neighbour;
+use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+
+/// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
+const SAYS_SIGN: f64 = 0.2;
+
+/// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
+/// that are off by 30°.
+const UNCERTAIN_NORMAL: f64 = 0.3;
+
+/// Curvature times the radius of the cloud up to which a surface counts as flat.
+const FLAT: f64 = 0.1;
+
+/// What is known of a surface beside its points.
+#[derive(Clone, Copy, Default)]
+pub struct Given<'a> {
+    /// Normals of the points, `[n, d]`, of any length but 0: they say which side is outward.
+    pub normals: Option<&'a Cloud>,
+    /// Where noise and shape are learned, `[s, d]`; see [`Patches::learned_at`].
+    pub sites: Option<&'a Cloud>,
+}
+
+/// Local regressions of a cloud with consistently oriented normals, d ≥ 2.
+pub struct LocalSurface {
+    cloud: Arc<Cloud>,
+    sampling: Arc<Sampling>,
+    patches: Patches,
+    /// What they say at the points, normals outward.
+    at_points: PatchGeometry,
+    orientation: SurfaceOrientation,
+    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    is_ambiguous: Vec<bool>,
+    radius: f64,
+    /// What a curvature is of its deviation at least where it is known well enough to be used.
+    least_ratio: f64,
+}
+
+impl LocalSurface {
+    /// Regresses the surface at every point and chooses its side.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn of(
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        given: Given<'_>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        observer.enter(Stage::Evaluate);
+        let patches = match given.sites {
+            None => Patches::of(cloud.clone(), sampling.clone(), observer)?,
+            Some(sites) => Patches::learned_at(sites, cloud.clone(), sampling.clone(), observer)?,
+        };
+        let mut at_points = patches.at(&cloud, true, true, observer)?;
+        let oriented = orient(&cloud, &sampling, &patches, &at_points, given.normals, observer)?;
+        let d = cloud.dimension();
+        let outward = |point: usize| &oriented.normals[point * d..][..d];
+        at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
+        let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
+        let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
+        // What is not known, or bent, is not sure either.
+        let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
+        let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
+        let least_ratio = least_ratio(&ratios);
+        Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius, least_ratio })
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        &self.cloud
+    }
+
+    pub fn orientation(&self) -> SurfaceOrientation {
+        self.orientation
+    }
+
+    pub(super) fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
+    pub fn patches(&self) -> &Patches {
+        &self.patches
+    }
+
+    /// `|h|` of the heights h of the points above the surface, L.
+    pub fn misfit(&self) -> f64 {
+        norm(&self.at_points.heights)
+    }
+
+    /// Bytes held on the heap beside the cloud and its sampling.
+    pub fn n_bytes(&self) -> usize {
+        self.patches.n_bytes()
+            + self.at_points.n_bytes()
+            + vec_bytes(&self.is_ambiguous)
+            + block_bytes(arc_payload::<Self>())
+    }
+
+    /// What is known at queries: that of a function with |∇u| = 1 that grows outward.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub(super) fn serve(
+        &self,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<Served, NumericsError> {
+        observer.enter(Stage::Evaluate);
+        let are_points = *queries == *self.cloud;
+        let found;
+        let geometry = match are_points {
+            true => &self.at_points,
+            false => {
+                let mut own = self.patches.at(queries, false, true, observer)?;
+                self.turn_outward(queries, &mut own);
+                found = own;
+                &found
+            }
+        };
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let sign = match request.orientation {
+            Orientation::Outward => 1.0,
+            // Functions of a surface grow inward.
+            Orientation::Gradient => -1.0,
+        };
+        let verdict = |query: usize| {
+            let reason = self.reason(queries.point(query), geometry, query, request, are_points);
+            Verdict { sign, by: ServedBy::Local, reason }
+        };
+        Ok(Served {
+            dimension: d,
+            gradients: geometry.normals.clone(),
+            hessians: geometry.shapes.clone(),
+            verdicts: (0..m).into_par_iter().map(verdict).collect(),
+            levels: geometry.heights.iter().map(|height| 1.0 - height).collect(),
+            deviations: request.has_deviations.then(|| deviations(geometry, sign, d)),
+        })
+    }
+
+    fn reason(
+        &self,
+        x: &[f64],
+        geometry: &PatchGeometry,
+        query: usize,
+        request: &GeometryRequest,
+        is_point: bool,
+    ) -> Option<DegeneracyReason> {
+        if !geometry.is_known[query] {
+            return Some(DegeneracyReason::VanishingGradient);
+        }
+        let mut point = query;
+        if !is_point {
+            let nearest = self.sampling.neighbours().nearest(x, 1);
+            let is_near =
+                |found: &&Neighbour| !is_far(found.squared_distance, self.sampling.spacing(found.point));
+            let Some(found) = nearest.first().filter(is_near) else {
+                return Some(DegeneracyReason::FarFromCloud);
+            };
+            point = found.point;
+        }
+        if self.is_ambiguous[point] {
+            return Some(DegeneracyReason::AmbiguousSide);
+        }
+        let is_resolved = match request.checks_curvatures {
+            true => self.is_resolved(geometry, query),
+            false => geometry.normal_deviations[query] <= UNCERTAIN_NORMAL,
+        };
+        (!is_resolved).then_some(DegeneracyReason::UnderResolved)
+    }
+
+    /// Whether the curvatures are known well enough to be used.
+    fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
+        let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
+        ratio.is_some_and(|ratio| ratio >= self.least_ratio)
+    }
+
+    /// Turns normals to the side of those of the points nearby.
+    fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
+        let d = self.cloud.dimension();
+        let mut found = Vec::new();
+        geometry.turn(|query, normal| {
+            let neighbours = self.sampling.neighbours();
+            neighbours.nearest_into(queries.point(query), SPACING_NEIGHBOURS, &mut found);
+            let along: f64 = found
+                .iter()
+                .map(|found| {
+                    // Near a thin sheet the point on this side of it decides.
+                    let spacing = self.sampling.spacing(found.point);
+                    let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
+                    weight * dot(&self.at_points.normals[found.point * d..][..d], normal)
+                })
+                .sum();
+            if along < 0.0 { -1.0 } else { 1.0 }
+        });
+    }
+}
+
+/// The largest principal curvature over the largest deviation of one, infinite for deviations of 0; `None` where nothing is
+/// known, and where the surface bends more than deviations say.
+fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Option<f64> {
+    let deviations = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query])?;
+    let (normal, shape) = (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
+    let (curvatures, _) = principal_curvatures(normal, shape, 1.0);
+    let largest = curvatures.iter().fold(FLAT / radius, |a: f64, k| a.max(k.abs()));
+    let deviations = &deviations.principal[query * (d - 1)..][..d - 1];
+    let deviation = deviations.iter().fold(0.0, |a: f64, &deviation| a.max(deviation));
+    let ratio = if deviation > 0.0 { largest / deviation } else { f64::INFINITY };
+    (geometry.is_known[query] && !ratio.is_nan()).then_some(ratio)
+}
+
+/// Signs of the normals of patches: those of a coarse signature function, by whole regions.
+fn orient(
+    cloud: &Cloud,
+    sampling: &Sampling,
+    patches: &Patches,
+    geometry: &PatchGeometry,
+    given: Option<&Cloud>,
+    observer: &dyn Observer,
+) -> Result<Oriented, NumericsError> {
+    let (n, d) = (cloud.n_points(), cloud.dimension());
+    let outward = match given {
+        Some(given) => given.coordinates().to_vec(),
+        None => outward_directions(cloud, patches.noise(), observer)?,
+    };
+    let mut normals = geometry.normals.clone();
+    let mut has_sign = vec![false; n];
+    for (point, normal) in normals.chunks_exact_mut(d).enumerate() {
+        let direction = &outward[point * d..][..d];
+        let along = dot(normal, direction);
+        has_sign[point] = along.abs() > SAYS_SIGN * norm(direction);
+        if along < 0.0 {
+            normal.iter_mut().for_each(|c| *c = -*c);
+        }
+    }
+    let count = super::orientation::n_around(cloud);
+    let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
+    let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
+    let sampled = Sampled { cloud, sampling, around: &around, observer };
+    Oriented::of_directions(&sampled, directions, given.is_some())
+}
+
+/// Deviations in the order of the curvatures for normals of this sign.
+fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
+    let empty = CurvatureDeviations::default();
+    let curvatures = geometry.curvatures.as_ref().unwrap_or(&empty);
+    let mut principal = curvatures.principal.clone();
+    if sign < 0.0 {
+        principal.chunks_exact_mut(d - 1).for_each(<[f64]>::reverse);
+    }
+    Deviations {
+        is_known: geometry.is_known.clone(),
+        normal: geometry.normal_deviations.clone(),
+        principal,
+        mean: curvatures.mean.clone(),
+        gaussian: curvatures.gaussian.clone(),
+    }
+}
+
+impl PatchGeometry {
+    /// Multiplies normals and what changes sign with them.
+    fn turn(&mut self, mut sign: impl FnMut(usize, &[f64]) -> f64) {
+        let m = self.is_known.len();
+        let d = self.normals.len() / m.max(1);
+        for query in 0..m {
+            if !self.is_known[query] || sign(query, &self.normals[query * d..][..d]) > 0.0 {
+                continue;
+            }
+            self.normals[query * d..][..d].iter_mut().for_each(|c| *c = -*c);
+            self.shapes[query * d * d..][..d * d].iter_mut().for_each(|c| *c = -*c);
+            self.heights[query] = -self.heights[query];
+            if let Some(curvatures) = &mut self.curvatures {
+                curvatures.principal[query * (d - 1)..][..d - 1].reverse();
+            }
+        }
+    }
+
+    /// Bytes held on the heap.
+    fn n_bytes(&self) -> usize {
+        let lists = [&self.normals, &self.shapes, &self.heights, &self.normal_deviations];
+        let of_curvatures = |c: &CurvatureDeviations| {
+            vec_bytes(&c.principal) + vec_bytes(&c.mean) + vec_bytes(&c.gaussian) + vec_bytes(&c.is_bent)
+        };
+        lists.into_iter().map(vec_bytes).sum::<usize>()
+            + vec_bytes(&self.is_known)
+            + vec_bytes(&self.is_at_rim)
+            + self.curvatures.as_ref().map_or(0, of_curvatures)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observer::Unobserved;
+    use crate::surface::Surface;
+    use crate::surface::geometry::Geometry;
+    use crate::testing::fibonacci_sphere;
+
+    fn geometry(cloud: Cloud) -> Geometry {
+        let cloud = Arc::new(cloud);
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        let surface =
+            Surface::from(LocalSurface::of(cloud.clone(), sampling, Given::default(), &Unobserved).unwrap());
+        let request = GeometryRequest { has_deviations: true, ..GeometryRequest::CURVATURES };
+        Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap()
+    }
+
+    #[test]
+    fn surfaces_that_leave_nothing_to_regress_have_answers_everywhere() {
+        // On a fine sphere the closed form leaves less than rounding; on a plane nothing at all.
+        let sphere = geometry(fibonacci_sphere(20_000));
+        assert!(sphere.is_null().iter().all(|is_null| !is_null));
+        let curvatures = sphere.curvatures(&Unobserved).unwrap();
+        assert!(curvatures.principal.iter().all(|kappa| (kappa - 1.0).abs() < 1e-5));
+        let grid = (0..400).flat_map(|i| [f64::from(i % 20), f64::from(i / 20), 3.0]).collect();
+        let plane = geometry(Cloud::new(grid, 3).unwrap());
+        assert!(plane.is_null().iter().all(|is_null| !is_null));
+        assert!(plane.normals().chunks_exact(3).all(|normal| normal[2].abs() > 1.0 - 1e-12));
+        assert!(plane.curvatures(&Unobserved).unwrap().principal.iter().all(|kappa| kappa.abs() < 1e-9));
+    }
+}

@@ -1,0 +1,112 @@
+//! The surface that a cloud samples, by the function whose level surface it is or by local regressions.
+
+pub mod degeneracy;
+pub mod geometry;
+pub mod local;
+pub mod operators;
+pub mod served;
+pub mod signature;
+pub mod sure;
+
+mod coarse;
+mod curvature;
+mod orientation;
+mod request;
+mod winding;
+
+use super::error::NumericsError;
+use super::function::interpolant::Interpolant;
+use super::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbours;
+use geometry::GeometryRequest;
+use local::LocalSurface;
+pub use orientation::SurfaceOrientation;
+use served::Served;
+use signature::SignatureSurface;
+
+/// A surface with consistently oriented normals at the points, d ≥ 2.
+///
+/// Made once: it costs one evaluation at all points, and looks at the neighbours of each.
+pub enum Surface {
+    /// Level surface of a global function; large beside the other.
+    Signature(Box<SignatureSurface>),
+    /// Local regressions.
+    Local(Box<LocalSurface>),
+}
+
+impl Surface {
+    /// The surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    ///
+    /// # Errors
+    /// Those of [`SignatureSurface::of`].
+    pub fn of(
+        signature: Interpolant,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        Ok(SignatureSurface::of(signature, given, observer)?.into())
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        match self {
+            Self::Signature(surface) => surface.cloud(),
+            Self::Local(surface) => surface.cloud(),
+        }
+    }
+
+    /// The function u whose level surface this is, if there is one.
+    pub fn signature(&self) -> Option<&Interpolant> {
+        match self {
+            Self::Signature(surface) => Some(surface.signature()),
+            Self::Local(_) => None,
+        }
+    }
+
+    pub fn orientation(&self) -> SurfaceOrientation {
+        match self {
+            Self::Signature(surface) => surface.orientation(),
+            Self::Local(surface) => surface.orientation(),
+        }
+    }
+
+    /// Who is near whom among its points.
+    pub fn neighbours(&self) -> &Neighbours {
+        match self {
+            Self::Signature(surface) => surface.sampling().neighbours(),
+            Self::Local(surface) => surface.sampling().neighbours(),
+        }
+    }
+
+    /// Bytes held on the heap beside the factor and the cloud.
+    pub fn n_bytes(&self) -> usize {
+        match self {
+            Self::Signature(surface) => surface.n_bytes(),
+            Self::Local(surface) => surface.n_bytes(),
+        }
+    }
+
+    fn serve(
+        &self,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &dyn Observer,
+    ) -> Result<Served, NumericsError> {
+        match self {
+            Self::Signature(surface) => signature::serve(surface, queries, request, observer),
+            Self::Local(surface) => surface.serve(queries, request, observer),
+        }
+    }
+}
+
+impl From<SignatureSurface> for Surface {
+    fn from(surface: SignatureSurface) -> Self {
+        Self::Signature(Box::new(surface))
+    }
+}
+
+impl From<LocalSurface> for Surface {
+    fn from(surface: LocalSurface) -> Self {
+        Self::Local(Box::new(surface))
+    }
+}

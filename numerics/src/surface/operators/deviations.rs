@@ -1,0 +1,144 @@
+//! How sure operators applied to values are.
+//!
+//! Two things are not known: the function, of which the posterior has the covariance of all derivatives, and the surface under it. With δν and δH
+//! the errors of the normal and of `H = tr Dν`, and P the projection onto the tangent plane, `Δ_M u` is off by
+//! `−(2PD²uν + HP∇u)·δν − ∂_νu δH`, and `∇_M u` by `−∂_νu δν − (∇u·δν)ν`. Where the geometry has deviations, they add to those of the
+//! function in squares.
+
+use super::super::geometry::Geometry;
+use super::{Operator, regular};
+use crate::error::NumericsError;
+use crate::function::functionals::{FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance};
+use crate::function::interpolant::Interpolant;
+use crate::machine::vector::{dot, norm};
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::sums::jets::{JetOrder, Jets};
+
+/// Standard deviations of `Δ_M u`, `[m]`, unit V/L²; 0 at null queries. Kernel and noise are `factor` times those of the solver.
+///
+/// # Errors
+/// [`NumericsError::DerivativesVary`] where the process has no second derivatives; [`NumericsError::NotPositiveDefinite`] without a Cholesky
+/// factor; those of [`Interpolant::at`].
+pub fn laplace_beltrami_deviations(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    factor: f64,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let of = Applied { geometry, interpolant, factor, queries };
+    let mut total = of.of_function(Operator::LaplaceBeltrami, observer)?;
+    if geometry.deviations().is_some() {
+        let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
+        add_surface_to_laplace_beltrami(geometry, &jets, &mut total);
+    }
+    Ok(total)
+}
+
+/// Adds what is not known of the surface, as far as its deviations are, to the deviations of a function known by its jets, `[m]`.
+pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+    let Some(known) = geometry.deviations() else { return };
+    for query in regular(geometry) {
+        let (normal, gradient, hessian) = (geometry.normal(query), jets.gradient(query), jets.hessian(query));
+        let trace = geometry.trace_of_shape_operator(query);
+        let d = normal.len();
+        let along = dot(gradient, normal);
+        let turned: Vec<f64> =
+            (0..d).map(|c| 2.0 * dot(&hessian[c * d..][..d], normal) + trace * gradient[c]).collect();
+        let normal_part = dot(&turned, normal);
+        let tangential: Vec<f64> = turned.iter().zip(normal).map(|(t, n)| t - normal_part * n).collect();
+        let of_normal = known.normal[query] * norm(&tangential);
+        let of_trace = (d - 1) as f64 * known.mean[query] * along;
+        total[query] = norm(&[total[query], of_normal, of_trace]);
+    }
+}
+
+/// Standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L; 0 at null queries. Kernel and noise are `factor` times those of the
+/// solver.
+///
+/// # Errors
+/// Those of [`laplace_beltrami_deviations`], for first derivatives.
+pub fn surface_gradient_deviations(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    factor: f64,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let of = Applied { geometry, interpolant, factor, queries };
+    let mut total = of.of_function(Operator::SurfaceGradient, observer)?;
+    if geometry.deviations().is_some() {
+        let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
+        add_surface_to_gradient(geometry, &jets, &mut total);
+    }
+    Ok(total)
+}
+
+/// The same for the components of the surface gradient, `[m, d]`.
+pub(super) fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+    let Some(known) = geometry.deviations() else { return };
+    let d = jets.dimension();
+    for query in regular(geometry) {
+        let (normal, gradient) = (geometry.normal(query), jets.gradient(query));
+        let along = dot(gradient, normal);
+        let tangential: Vec<f64> = gradient.iter().zip(normal).map(|(g, n)| g - along * n).collect();
+        for (c, slot) in total[query * d..][..d].iter_mut().enumerate() {
+            let across = along * (1.0 - normal[c] * normal[c]).max(0.0).sqrt();
+            let tilted = norm(&tangential) * normal[c];
+            *slot = norm(&[*slot, known.normal[query] * across, known.normal[query] * tilted]);
+        }
+    }
+}
+
+/// An operator on a function.
+pub(super) struct Applied<'a> {
+    pub(super) geometry: &'a Geometry,
+    pub(super) interpolant: &'a Interpolant,
+    pub(super) factor: f64,
+    pub(super) queries: &'a Cloud,
+}
+
+impl Applied<'_> {
+    /// The function's part: `[m]` or `[m, d]`.
+    fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
+        let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
+        let order = operator.order();
+        if !has_variance(solver.kernel(), order) {
+            return Err(NumericsError::DerivativesVary { order });
+        }
+        let width = operator.n_components(self.queries.dimension());
+        let all: Vec<usize> = regular(self.geometry).collect();
+        let mut total = vec![0.0; self.queries.n_points() * width];
+        for some in all.chunks((FUNCTIONALS_PER_BLOCK / width).max(1)) {
+            let functionals: Vec<JetFunctional> =
+                some.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect();
+            let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;
+            for (query, found) in some.iter().zip(found.found.chunks_exact(width)) {
+                total[query * width..][..width].copy_from_slice(found);
+            }
+        }
+        Ok(total)
+    }
+}
+
+/// The operator at a query, a functional for each of its components.
+pub(super) fn functionals(geometry: &Geometry, operator: Operator, query: usize) -> Vec<JetFunctional> {
+    let normal = geometry.normal(query);
+    let d = normal.len();
+    let projection = |a: usize, b: usize| f64::from(u8::from(a == b)) - normal[a] * normal[b];
+    match operator {
+        Operator::SurfaceGradient => (0..d)
+            .map(|c| {
+                let row: Vec<f64> = (0..d).map(|b| projection(c, b)).collect();
+                JetFunctional::derivative(query, &row)
+            })
+            .collect(),
+        Operator::LaplaceBeltrami => {
+            let trace = geometry.trace_of_shape_operator(query);
+            let along: Vec<f64> = normal.iter().map(|n| -trace * n).collect();
+            let of_hessian = (0..d * d).map(|at| projection(at / d, at % d)).collect();
+            vec![JetFunctional { of_hessian, ..JetFunctional::derivative(query, &along) }]
+        }
+    }
+}

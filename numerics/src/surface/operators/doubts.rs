@@ -1,0 +1,229 @@
+//! Answers of operators that the values do not bear out.
+//!
+//! A kernel that is learned is the one that the values want, and its deviations say how far off answers are. A kernel that is given may be none that the
+//! values want: too wide for what they show, with less noise than they have, or about 0 where they have an offset. There, errors are those of the answers
+//! that are served if the values come from the process that would have been learned.
+
+use rayon::prelude::*;
+
+use super::super::geometry::Geometry;
+use super::deviations::functionals;
+use super::{Operator, regular};
+use crate::error::NumericsError;
+use crate::function::errors::{Process, errors_under};
+use crate::function::functionals::{JetFunctional, deviations, has_variance};
+use crate::function::interpolant::Interpolant;
+use crate::kernel::Kernel;
+use crate::machine::vector::norm;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::{Neighbour, Neighbours};
+use crate::points::thinning::thinned_points;
+use crate::selection::Learned;
+use crate::sums::regularization::Regularization;
+
+/// Functionals whose errors are found: what they take is little beside a factorization of as many points as need them.
+pub const JUDGED_FUNCTIONALS: usize = 256;
+
+/// Queries that are judged themselves whose errors another may have: the greatest of them.
+const AROUND: usize = 4;
+
+/// Deviations beyond this share of the root mean square of what there is leave little of it: an error of half of that is two and a half of them.
+const UNCERTAIN: f64 = 0.2;
+
+/// Where fewer than this share of the answers seem sure, the rest are those whose errors were taken for too small.
+const BELIEVED: f64 = 0.1;
+
+/// Halvings of an interval of 52 binary digits: to three digits.
+const STEPS: usize = 16;
+
+/// Queries that what is expected beforehand counts like.
+const N_BEFOREHAND: usize = 4;
+
+/// What there is to judge: an operator on a function, of which kernel and noise are `factor` times those of the solver.
+#[derive(Clone, Copy)]
+pub struct Judged<'a> {
+    pub geometry: &'a Geometry,
+    pub interpolant: &'a Interpolant,
+    pub factor: f64,
+    pub queries: &'a Cloud,
+    /// What was found, `[m, k]`.
+    pub found: &'a [f64],
+    /// What is learned from the values, where the kernel is given.
+    pub learned: Option<&'a Learned>,
+}
+
+impl Judged<'_> {
+    /// The queries, ascending, at which little is left of `∇_M u`; see [`Judged::laplace_beltrami`].
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn surface_gradient(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
+        self.judge(Operator::SurfaceGradient, observer)
+    }
+
+    /// The queries, ascending, at which little is left of `Δ_M u`: by the errors at queries that are spread as all are, [`JUDGED_FUNCTIONALS`] of them at
+    /// most; each of the others has the greatest of those around. All of them for a kernel whose process has no second derivatives.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn laplace_beltrami(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
+        self.judge(Operator::LaplaceBeltrami, observer)
+    }
+
+    /// The queries, ascending, at which deviations that are known leave little, `[m, k]`.
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidKernelParameter`] for a process beyond float64.
+    pub fn by_deviations(self, deviations: &[f64]) -> Result<Vec<usize>, NumericsError> {
+        let (kernel, factor) = self.process()?;
+        let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
+        let k = findings.n_components();
+        let operator = if k == 1 { Operator::LaplaceBeltrami } else { Operator::SurfaceGradient };
+        let some: Vec<usize> = regular(self.geometry).take(findings.n_judged()).collect();
+        Ok(findings.doubtful(deviations, &self.functionals(operator, &some)))
+    }
+
+    fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
+        let regular: Vec<usize> = regular(self.geometry).collect();
+        let has_derivatives = has_variance(self.interpolant.solver.kernel(), operator.order());
+        if regular.is_empty() || !has_derivatives {
+            return Ok(regular);
+        }
+        let (kernel, factor) = self.process()?;
+        let findings = Findings { geometry: self.geometry, found: self.found, kernel: &kernel, factor };
+        let k = findings.n_components();
+        let places = self.queries.select(&regular);
+        let chosen = thinned_points(&places, findings.n_judged());
+        let judged: Vec<usize> = chosen.iter().map(|&at| regular[at]).collect();
+        let functionals = self.functionals(operator, &judged);
+        let errors = self.errors(&functionals, observer)?;
+        let errors: Vec<f64> = errors.chunks_exact(k).map(norm).collect();
+        let most = findings.most(judged.into_iter().zip(errors.iter().copied()), &functionals);
+        let coarse = places.select(&chosen);
+        let near = Neighbours::of(&coarse, observer)?;
+        let is_doubtful = |found: &mut Vec<Neighbour>, at: usize| {
+            observer.checkpoint()?;
+            near.nearest_into(places.point(at), AROUND, found);
+            let count = if found[0].squared_distance == 0.0 { 1 } else { found.len() };
+            Ok(!found[..count].iter().all(|n| errors[n.point] <= most))
+        };
+        let doubtful: Vec<bool> =
+            (0..regular.len()).into_par_iter().map_init(Vec::new, is_doubtful).collect::<Result<_, _>>()?;
+        let n_sure = doubtful.iter().filter(|is_doubtful| !**is_doubtful).count();
+        let is_believed = n_sure as f64 >= BELIEVED * regular.len() as f64;
+        let is_left = |&(_, is_doubtful): &(usize, bool)| is_doubtful || !is_believed;
+        Ok(regular.into_iter().zip(doubtful).filter(is_left).map(|(query, _)| query).collect())
+    }
+
+    fn functionals(&self, operator: Operator, judged: &[usize]) -> Vec<JetFunctional> {
+        judged.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect()
+    }
+
+    /// The kernel of the process that the values come from, and by how much it is scaled. What is learned beside a kernel that stretches coordinates
+    /// is learned in those.
+    fn process(&self) -> Result<(Kernel, f64), NumericsError> {
+        let own = self.interpolant.solver.kernel();
+        let Some(learned) = self.learned else { return Ok((own.clone(), self.factor)) };
+        let kernel = match own.length_scales() {
+            None => Kernel::new(learned.family, learned.length_scale, 1.0)?,
+            Some(axes) => {
+                let scaled = axes.iter().map(|axis| axis / own.length_scale() * learned.length_scale);
+                Kernel::of_axes(learned.family, &scaled.collect::<Vec<f64>>(), 1.0)?
+            }
+        };
+        Ok((kernel, learned.variance))
+    }
+
+    fn errors(
+        &self,
+        functionals: &[JetFunctional],
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        let (interpolant, queries) = (self.interpolant, self.queries);
+        let (solver, solution) = (&*interpolant.solver, &*interpolant.solution);
+        let (kernel, factor) = (&self.process()?.0, self.process()?.1);
+        if let Some(Learned { ratio, trend, .. }) = self.learned {
+            let process = Process { kernel, noise: *ratio, factor, trend: trend.as_ref() };
+            return errors_under(&process, interpolant, queries, functionals, observer);
+        }
+        match deviations((solver, solution, factor), queries, functionals, observer) {
+            // The fallback has no variances, but it has weights.
+            Err(NumericsError::NotPositiveDefinite { .. }) => {
+                let noise = match solver.regularization() {
+                    Regularization::Uniform(alpha) => *alpha,
+                    Regularization::PerPoint(_) => 0.0,
+                };
+                let process = Process { kernel, noise, factor, trend: solution.trend.as_ref() };
+                errors_under(&process, interpolant, queries, functionals, observer)
+            }
+            found => found.map(|found| found.found),
+        }
+    }
+}
+
+/// What an operator was found to be, on a process with a kernel that is scaled by a factor.
+pub(super) struct Findings<'a> {
+    pub(super) geometry: &'a Geometry,
+    /// `[m, k]`.
+    pub(super) found: &'a [f64],
+    pub(super) kernel: &'a Kernel,
+    pub(super) factor: f64,
+}
+
+impl Findings<'_> {
+    fn n_components(&self) -> usize {
+        self.found.len() / self.geometry.n_queries()
+    }
+
+    /// Queries that are looked at, at most.
+    pub(super) fn n_judged(&self) -> usize {
+        (JUDGED_FUNCTIONALS / self.n_components()).max(1)
+    }
+
+    /// The queries, ascending, at which deviations `[m, k]` leave little; `functionals` are those of some of them.
+    pub(super) fn doubtful(&self, deviations: &[f64], functionals: &[JetFunctional]) -> Vec<usize> {
+        let k = self.n_components();
+        let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
+        let most = self.most(regular(self.geometry).map(of), functionals);
+        // Also where there is no number.
+        let is_sure = |(_, deviation): &(usize, f64)| *deviation <= most;
+        regular(self.geometry).map(of).filter(|of| !is_sure(of)).map(|(query, _)| query).collect()
+    }
+
+    /// The deviation that leaves little of what there is, from deviations at some queries.
+    ///
+    /// Squares of what was found are those of what there is and of the errors. Where errors differ as much as they do between points of
+    /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982). A few queries may all
+    /// lie where there is nothing: what the process has beforehand counts like [`N_BEFOREHAND`] more.
+    fn most(&self, deviations: impl Iterator<Item = (usize, f64)>, functionals: &[JetFunctional]) -> f64 {
+        let k = self.n_components();
+        let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(self.kernel)).sum();
+        let beforehand = (prior * k as f64 / functionals.len().max(1) as f64).sqrt() * self.factor.sqrt();
+        let lengths = deviations.map(|(query, error)| (norm(&self.found[query * k..][..k]), error));
+        let lengths: Vec<(f64, f64)> = lengths.chain([(beforehand, 0.0); N_BEFOREHAND]).collect();
+        // In units of the greatest, whose square may have no number. Without one nothing is sure.
+        let unit = lengths.iter().map(|(found, _)| *found).fold(0.0, f64::max);
+        let squared = |&(found, error): &(f64, f64)| ((found / unit).powi(2), (error / unit).powi(2));
+        let squares: Vec<(f64, f64)> = lengths.iter().map(squared).collect();
+        // Errors that the process does not expect would count as what there is: it is no more than what the process has beforehand.
+        UNCERTAIN * (unit * spread_beside_errors(&squares).sqrt()).min(beforehand)
+    }
+}
+
+/// s² of f² and e².
+fn spread_beside_errors(squares: &[(f64, f64)]) -> f64 {
+    let n = squares.len() as f64;
+    let excess = |s: f64| squares.iter().map(|(found, error)| found / (s + error)).sum::<f64>() - n;
+    let mut most = squares.iter().map(|(found, _)| found).sum::<f64>() / n;
+    let mut least = most * f64::EPSILON;
+    if least == 0.0 || excess(least) <= 0.0 {
+        return 0.0;
+    }
+    // It falls, and is negative at the mean of f². By halves of the logarithm.
+    for _ in 0..STEPS {
+        let middle = (least * most).sqrt();
+        if excess(middle) > 0.0 { least = middle } else { most = middle }
+    }
+    least
+}

@@ -1,0 +1,117 @@
+//! Operators on values that are kriged around each query: of clouds of any size.
+//!
+//! Value and derivatives at a query are those of the function that its neighbourhood defines, with deviations from the same weights. Where
+//! the values are noisy, the neighbourhood is one of means of near points, which reaches further.
+
+use super::super::geometry::Geometry;
+use super::deviations::{add_surface_to_gradient, add_surface_to_laplace_beltrami, functionals};
+use super::doubts::Findings;
+use super::{Operator, laplace_beltrami_of, regular, surface_gradient_of};
+use crate::error::NumericsError;
+use crate::function::functionals::JetFunctional;
+use crate::function::moving::{FunctionalsRequest, Moving, MovingFunctionals};
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::solver::trend::Trend;
+use crate::sums::jets::JetOrder;
+
+/// A function through values, kriged around each query.
+#[derive(Clone, Copy)]
+pub struct Kriged<'a> {
+    pub moving: &'a Moving,
+    /// `[n]`, unit V.
+    pub values: &'a [f64],
+    pub trend: Option<&'a Trend>,
+    /// By which kernel and noise are to be multiplied.
+    pub factor: f64,
+}
+
+/// An operator on it.
+pub struct OfKriged {
+    /// `[m, k]`; 0 at null queries.
+    pub values: Vec<f64>,
+    /// Standard deviations, likewise.
+    pub deviations: Vec<f64>,
+    /// The queries, ascending, at which little is left of what was found.
+    pub uncertain: Vec<usize>,
+    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    pub n_dependent: usize,
+}
+
+/// `∇_M u` at the queries of a geometry, `[m, d]`, unit V/L.
+///
+/// # Errors
+/// [`NumericsError::DerivativesVary`] where the process has no first derivatives; those of [`Moving::at`].
+pub fn surface_gradient_of_kriged(
+    geometry: &Geometry,
+    function: Kriged<'_>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<OfKriged, NumericsError> {
+    function.with(Operator::SurfaceGradient, geometry, queries, observer)
+}
+
+/// `Δ_M u` at the queries of a geometry, `[m]`, unit V/L².
+///
+/// # Errors
+/// [`NumericsError::DerivativesVary`] where the process has no second derivatives; those of [`Moving::at`].
+pub fn laplace_beltrami_of_kriged(
+    geometry: &Geometry,
+    function: Kriged<'_>,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<OfKriged, NumericsError> {
+    function.with(Operator::LaplaceBeltrami, geometry, queries, observer)
+}
+
+impl Kriged<'_> {
+    fn with(
+        self,
+        operator: Operator,
+        geometry: &Geometry,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<OfKriged, NumericsError> {
+        let order = match operator {
+            Operator::SurfaceGradient => JetOrder::Gradient,
+            Operator::LaplaceBeltrami => JetOrder::Hessian,
+        };
+        let (d, count) = (queries.dimension(), operator.n_components(queries.dimension()));
+        let of_query = |query: usize| match geometry.is_null()[query] {
+            true => vec![JetFunctional::derivative(query, &vec![0.0; d]); count],
+            false => functionals(geometry, operator, query),
+        };
+        let asked = FunctionalsRequest { order, functionals: &of_query, count, trend: self.trend };
+        let coarse = self.moving.surest(queries, order, observer)?;
+        let found = match &coarse {
+            None => self.moving.functionals_at(self.values, queries, asked, observer)?,
+            Some(coarse) => {
+                let means = coarse.means(self.values);
+                coarse.moving().functionals_at(&means, queries, asked, observer)?
+            }
+        };
+        Ok(self.judged(operator, geometry, found))
+    }
+
+    fn judged(self, operator: Operator, geometry: &Geometry, found: MovingFunctionals) -> OfKriged {
+        let MovingFunctionals { jets, mut deviations, n_dependent } = found;
+        let values = match operator {
+            Operator::SurfaceGradient => surface_gradient_of(geometry, &jets),
+            Operator::LaplaceBeltrami => laplace_beltrami_of(geometry, &jets),
+        };
+        let root = self.factor.sqrt();
+        deviations.iter_mut().for_each(|deviation| *deviation *= root);
+        match operator {
+            Operator::SurfaceGradient => add_surface_to_gradient(geometry, &jets, &mut deviations),
+            Operator::LaplaceBeltrami => add_surface_to_laplace_beltrami(geometry, &jets, &mut deviations),
+        }
+        let kernel = self.moving.system().kernel();
+        let findings = Findings { geometry, found: &values, kernel, factor: self.factor };
+        let some: Vec<JetFunctional> = regular(geometry)
+            .take(findings.n_judged())
+            .flat_map(|q| functionals(geometry, operator, q))
+            .collect();
+        let uncertain = findings.doubtful(&deviations, &some);
+        OfKriged { values, deviations, uncertain, n_dependent }
+    }
+}

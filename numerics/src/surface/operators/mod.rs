@@ -1,0 +1,370 @@
+//! Surface gradient and Laplace–Beltrami operator, applied to values and as matrices.
+//!
+//! The surface comes as a [`Geometry`], the values as an [`Interpolant`]: both may live on different clouds and kernels (the
+//! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
+//! to each kernel translate, by a solve with m right-hand sides.
+
+mod deviations;
+mod doubts;
+mod kriged;
+mod resolution;
+mod stencils;
+
+use std::sync::Arc;
+
+use faer::MatMut;
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::curvature::tangential_trace;
+use super::geometry::Geometry;
+use crate::error::NumericsError;
+use crate::function::interpolant::Interpolant;
+use crate::kernel::{Kernel, Pairs};
+use crate::machine::registers::{BLOCK, Block, Pack};
+use crate::machine::vector::dot;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::solver::Solver;
+use crate::solver::trend::{Basis, Mean};
+use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
+use crate::sums::nodes::Nodes;
+pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
+pub use doubts::{JUDGED_FUNCTIONALS, Judged};
+pub use kriged::{Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged};
+pub use stencils::{RowKind, SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
+
+/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn surface_gradient(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    Ok(surface_gradient_of(geometry, &interpolant.at(queries, JetOrder::Gradient, observer)?))
+}
+
+/// The same of a function that is known by its jets.
+fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
+    let d = jets.dimension();
+    let mut gradients = vec![0.0; jets.n_queries() * d];
+    for query in regular(geometry) {
+        let (gradient, normal) = (jets.gradient(query), geometry.normal(query));
+        let along = dot(gradient, normal);
+        for (c, slot) in gradients[query * d..][..d].iter_mut().enumerate() {
+            *slot = gradient[c] - along * normal[c];
+        }
+    }
+    gradients
+}
+
+/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at null queries.
+///
+/// Minus before the last term: errata.md, 1. On the unit circle Δ cos θ = −cos θ. Independent of the orientation of ν.
+///
+/// # Errors
+/// Those of [`Interpolant::at`].
+pub fn laplace_beltrami(
+    geometry: &Geometry,
+    interpolant: &Interpolant,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    Ok(laplace_beltrami_of(geometry, &interpolant.at(queries, JetOrder::Hessian, observer)?))
+}
+
+/// The same of a function that is known by its jets.
+fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
+    let mut values = vec![0.0; jets.n_queries()];
+    for query in regular(geometry) {
+        let normal = geometry.normal(query);
+        let along = dot(jets.gradient(query), normal);
+        values[query] =
+            tangential_trace(&jets.hessian(query), normal) - geometry.trace_of_shape_operator(query) * along;
+    }
+    values
+}
+
+/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of null queries are zero.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+pub fn surface_gradient_matrices(
+    geometry: &Geometry,
+    solver: &Arc<Solver>,
+    queries: &Cloud,
+    mean: Mean,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let matrix = operator_matrix(geometry, solver, queries, Operator::SurfaceGradient, observer)?;
+    with_mean(matrix, geometry, solver, mean, Operator::SurfaceGradient)
+}
+
+/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+pub fn laplace_beltrami_matrix(
+    geometry: &Geometry,
+    solver: &Arc<Solver>,
+    queries: &Cloud,
+    mean: Mean,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let matrix = operator_matrix(geometry, solver, queries, Operator::LaplaceBeltrami, observer)?;
+    with_mean(matrix, geometry, solver, mean, Operator::LaplaceBeltrami)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Operator {
+    SurfaceGradient,
+    LaplaceBeltrami,
+}
+
+impl Operator {
+    /// Of the highest derivative.
+    fn order(self) -> usize {
+        match self {
+            Self::SurfaceGradient => 1,
+            Self::LaplaceBeltrami => 2,
+        }
+    }
+
+    /// Rows per query.
+    fn n_components(self, dimension: usize) -> usize {
+        match self {
+            Self::SurfaceGradient => dimension,
+            Self::LaplaceBeltrami => 1,
+        }
+    }
+}
+
+/// Fills B, `[components, m, n]` row-major, and solves `Wᵀ` for its rows in place: that buffer is the answer.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+/// [`NumericsError::Cancelled`].
+fn operator_matrix(
+    geometry: &Geometry,
+    solver: &Arc<Solver>,
+    queries: &Cloud,
+    operator: Operator,
+    observer: &dyn Observer,
+) -> Result<Vec<f64>, NumericsError> {
+    let (cloud, kernel) = (solver.cloud(), solver.kernel());
+    cloud.check_same_dimension(queries)?;
+    check_smooth_at(cloud, kernel, queries)?;
+    observer.enter(Stage::Evaluate);
+    let (n, m) = (cloud.n_points(), queries.n_points());
+    let n_rows = operator.n_components(cloud.dimension()) * m;
+    let nodes = Nodes::of(cloud);
+    let mut matrix = vec![0.0; n_rows * n];
+    matrix.par_chunks_mut(n).enumerate().try_for_each(|(index, row)| {
+        observer.checkpoint()?;
+        let (component, query) = (index / m, index % m);
+        if !geometry.is_null()[query] {
+            let x = queries.point(query);
+            let tangential_trace = stretched_trace(kernel, geometry.normal(query));
+            let nodes = &nodes;
+            nodes.dispatch(Row {
+                nodes,
+                kernel,
+                geometry,
+                operator,
+                component,
+                query,
+                x,
+                tangential_trace,
+                row,
+            });
+        }
+        Ok(())
+    })?;
+    observer.enter(Stage::Solve);
+    for rows in matrix.chunks_mut(n * ROWS_PER_SOLVE) {
+        observer.checkpoint()?;
+        let count = rows.len() / n;
+        solver.solve_transposed_in_place(MatMut::from_column_major_slice_mut(rows, n, count));
+    }
+    // Without branches, so that it is vectorised.
+    let is_finite = |row: &[f64]| row.iter().fold(true, |all, x| all & x.is_finite());
+    match matrix.par_chunks(n).position_first(|row| !is_finite(row)) {
+        Some(index) => Err(NumericsError::Overflow { query: index % m }),
+        None => Ok(matrix),
+    }
+}
+
+/// The matrix `BW` for functions with a mean: with F the mean's functions at the nodes and `LF` the operator on them,
+/// `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`. On constants, and for a linear mean on coordinates, it is the operator itself.
+fn with_mean(
+    mut matrix: Vec<f64>,
+    geometry: &Geometry,
+    solver: &Solver,
+    mean: Mean,
+    operator: Operator,
+) -> Result<Vec<f64>, NumericsError> {
+    if mean == Mean::Zero {
+        return Ok(matrix);
+    }
+    let (basis, m) = (Basis::of(mean, solver.cloud()), geometry.n_queries());
+    let exact = |index: usize| {
+        let (component, query) = (index / m, index % m);
+        let mut exact = vec![0.0; basis.n_functions()];
+        basis.add_slopes(&on_coordinates(geometry, operator, component, query), &mut exact);
+        Some(exact).filter(|_| !geometry.is_null()[query])
+    };
+    basis.make_exact(solver, &mut matrix, exact).ok_or(NumericsError::MeanNotDetermined)?;
+    Ok(matrix)
+}
+
+/// An operator on a linear function is its gradient times this, `[d]`: a row of P, or `−tr(Dν)ν`.
+fn on_coordinates(geometry: &Geometry, operator: Operator, component: usize, query: usize) -> Vec<f64> {
+    let normal = geometry.normal(query);
+    let entry = |c: usize| match operator {
+        Operator::SurfaceGradient => f64::from(u8::from(c == component)) - normal[component] * normal[c],
+        Operator::LaplaceBeltrami => -geometry.trace_of_shape_operator(query) * normal[c],
+    };
+    (0..normal.len()).map(entry).collect()
+}
+
+/// Right-hand sides per solve: enough for the solve to run at the speed of matrix products, few enough to notice a
+/// cancellation within a fraction of a second.
+const ROWS_PER_SOLVE: usize = 1024;
+
+fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
+    (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query])
+}
+
+/// `tr S² − νᵀS²ν`, S the factors by which a kernel stretches coordinates: d − 1 where it does not.
+fn stretched_trace(kernel: &Kernel, normal: &[f64]) -> f64 {
+    if !kernel.is_stretched() {
+        return (normal.len() - 1) as f64;
+    }
+    let across = |(axis, nu): (usize, &f64)| kernel.stretch(axis).powi(2) * (1.0 - nu * nu);
+    normal.iter().enumerate().map(across).sum()
+}
+
+/// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:
+/// `P∇k = 2vφ′/ℓ² (D − aν)` and `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+///
+/// Where the kernel stretches coordinates by S = diag(s), D is `S²(x − x_j)`, and d − 1 is `tr S² − νᵀS²ν`.
+struct Row<'a> {
+    nodes: &'a Nodes,
+    kernel: &'a Kernel,
+    geometry: &'a Geometry,
+    operator: Operator,
+    component: usize,
+    query: usize,
+    x: &'a [f64],
+    /// `tr S² − νᵀS²ν`.
+    tangential_trace: f64,
+    row: &'a mut [f64],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut out = Block::ZERO;
+        for block in 0..self.row.len().div_ceil(BLOCK) {
+            let pairs = RowPairs { simd, row: &self, block, out: &mut out };
+            match self.operator {
+                Operator::SurfaceGradient => self.kernel.profiles(SurfaceGradientPairs(pairs)),
+                Operator::LaplaceBeltrami => self.kernel.profiles(LaplaceBeltramiPairs(pairs)),
+            }
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(self.row.len());
+            self.row[start..end].copy_from_slice(&out.0[..end - start]);
+        }
+    }
+}
+
+/// A block of a row.
+struct RowPairs<'a, S> {
+    simd: S,
+    row: &'a Row<'a>,
+    block: usize,
+    out: &'a mut Block,
+}
+
+impl<S: Simd> RowPairs<'_, S> {
+    /// q and a = ν·D of a pack; `each` sees the entries of D.
+    #[inline(always)]
+    fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
+        let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
+        let normal = geometry.normal(query);
+        let mut along = Pack::splat(self.simd, 0.0);
+        let q = nodes.scaled_distances(self.simd, (self.block, at), x, kernel, |c, stretched| {
+            let difference = stretched * kernel.stretch(c);
+            along = difference.mul_add(Pack::splat(self.simd, normal[c]), along);
+            each(c, difference);
+        });
+        (q, along)
+    }
+}
+
+struct SurfaceGradientPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for SurfaceGradientPairs<'_, S> {
+    type Others = Pack<S>;
+
+    /// Hands on component c of D − aν.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
+        let Self(pairs) = self;
+        let Row { component, geometry, query, .. } = *pairs.row;
+        let mut own = Pack::splat(pairs.simd, 0.0);
+        let (q, along) = pairs.along(at, |c, difference| {
+            if c == component {
+                own = difference;
+            }
+        });
+        (q, own - along * geometry.normal(query)[component])
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, tangential: Pack<S>, [_, slope, _]: [Pack<S>; 3]) {
+        let kernel = self.0.row.kernel;
+        let factor = 2.0 * kernel.variance() * kernel.inverse_square_length();
+        (factor * slope * tangential).store(self.0.out, at);
+    }
+}
+
+struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
+
+impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
+    type Others = (Pack<S>, Pack<S>);
+
+    /// Hands on |D|²/ℓ² and a.
+    #[inline(always)]
+    fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
+        let Row { kernel, .. } = *self.0.row;
+        if !kernel.is_stretched() {
+            let (q, along) = self.0.along(at, |_, _| ());
+            return (q, (q, along));
+        }
+        let mut square = Pack::splat(self.0.simd, 0.0);
+        let (q, along) = self.0.along(at, |_, difference| square = difference.mul_add(difference, square));
+        (q, (square * kernel.inverse_square_length(), along))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, at: usize, (square, along): Self::Others, [_, slope, bend]: [Pack<S>; 3]) {
+        let Row { kernel, geometry, query, tangential_trace, .. } = *self.0.row;
+        let inverse_square = kernel.inverse_square_length();
+        let first = 2.0 * kernel.variance() * inverse_square;
+        // (|D|² − a²)/ℓ².
+        let tangential = square - along * along * inverse_square;
+        let turned = tangential_trace - along * geometry.trace_of_shape_operator(query);
+        (2.0 * first * bend).mul_add(tangential, first * slope * turned).store(self.0.out, at);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,98 @@
+//! Operators as sparse matrices: weights of the nodes near each query.
+//!
+//! In the tangent plane at a query the metric of a surface is the identity up to second order. So the surface
+//! gradient is the gradient over tangential coordinates t, and the Laplace–Beltrami operator the Laplacian.
+//! Weights for both come from the nearest nodes by smoothed polyharmonic splines r⁵ with polynomials up to
+//! degree 4 (radial.rs). They are exact for these polynomials, have no length scale, and are of third order
+//! in the spacing for second derivatives.
+//!
+//! STABILITY
+//!
+//! A matrix of the Laplace–Beltrami operator over its own nodes is stepped in time, so none of its
+//! eigenvalues may have a positive real part. Such eigenvalues come from rows whose diagonal is positive, or
+//! small beside the other weights. Smoothing makes the diagonal dominate wherever nodes surround the query.
+//! Two kinds of rows are left:
+//!
+//! - All of the nearest nodes lie on one side, at a jump of the density. The row takes nodes from farther
+//!   away, sparser with the distance (disc.rs, `graded`).
+//! - No nodes lie on the other side, at a rim. The row has positive weights (positive.rs), which are not
+//!   consistent there, and is flagged.
+//!
+//! No theorem says that rows with a dominant diagonal have such a spectrum together: the bound is measured
+//! (docs/numerics.md, examples/stability_sweep.rs).
+
+mod assembly;
+mod disc;
+mod least_norm;
+mod positive;
+mod radial;
+mod row;
+mod sparse;
+
+use super::super::degeneracy::Resolution;
+use super::super::geometry::Geometry;
+use super::Operator;
+use crate::error::NumericsError;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::neighbours::Neighbours;
+use assembly::{Assembly, Rows};
+pub use row::RowKind;
+pub use sparse::SparseMatrix;
+
+/// The weights at all queries, how they came about, and which of them are to be trusted.
+#[derive(Debug)]
+pub struct Stencils {
+    pub matrix: SparseMatrix,
+    /// Whether the nodes resolve the surface around each query, `[m]`.
+    pub resolutions: Vec<Resolution>,
+    /// How the weights of each row came about, `[m]`.
+    pub kinds: Vec<RowKind>,
+}
+
+impl Stencils {
+    /// Number of rows of a kind.
+    pub fn n_rows(&self, kind: RowKind) -> usize {
+        self.kinds.iter().filter(|&&found| found == kind).count()
+    }
+}
+
+/// The Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit 1/L².
+///
+/// Over the nodes themselves no eigenvalue has a positive real part beyond rounding. Rows of nodes at a rim are
+/// those of a boundary that nothing flows through, and are flagged. Rows are empty for null queries that are not
+/// nodes, and in a cloud of one position.
+///
+/// # Errors
+/// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+pub fn laplace_beltrami_stencils(
+    geometry: &Geometry,
+    nodes: &Cloud,
+    neighbours: &Neighbours,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Stencils, NumericsError> {
+    let (operator, rows) = (Operator::LaplaceBeltrami, Rows::Stable);
+    Assembly { geometry, nodes, neighbours, queries, operator, rows }.stencils(observer)
+}
+
+/// The components of the surface gradient at the queries of the geometry, `[d, m, n]`, unit 1/L. Rows of null
+/// queries are empty.
+///
+/// # Errors
+/// Those of [`laplace_beltrami_stencils`].
+pub fn surface_gradient_stencils(
+    geometry: &Geometry,
+    nodes: &Cloud,
+    neighbours: &Neighbours,
+    queries: &Cloud,
+    observer: &dyn Observer,
+) -> Result<Stencils, NumericsError> {
+    let (operator, rows) = (Operator::SurfaceGradient, Rows::Pointwise);
+    Assembly { geometry, nodes, neighbours, queries, operator, rows }.stencils(observer)
+}
+
+#[cfg(test)]
+mod stability_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,128 @@
+//! Neighbouring points on one sheet of the surface, and what their normals say of one another.
+
+use rayon::prelude::*;
+
+use super::forest::SignedForest;
+use super::{Sampled, n_neighbours};
+use crate::machine::vector::dot;
+use crate::points::cloud::{Cloud, squared_distance};
+
+/// Weight up to which two points do not count as neighbours on one sheet.
+const LEAST_WEIGHT: f64 = 0.01;
+
+/// Two neighbours on one sheet of the surface.
+pub(super) struct Edge {
+    pub a: usize,
+    pub b: usize,
+    /// Of their normals.
+    pub cosine: f64,
+    /// 0 to 1: how surely the surface leads from one to the other.
+    pub weight: f64,
+}
+
+impl Edge {
+    /// What leads from one point to another, up to the sign of the normals; a weight of 0 or less says that
+    /// they are on different sheets.
+    ///
+    /// On one sheet `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b` for consistent normals; two sheets at a distance t have
+    /// `D·ν_a ≈ D·ν_b ≈ t`.
+    pub(super) fn between(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> Self {
+        let cosine = cosine(cloud, normals, a, b);
+        let weight = cosine * cosine * (1.0 - 2.0 * across(cloud, normals, a, b));
+        Self { a, b, cosine, weight }
+    }
+
+    /// The weight, negative where normals with these signs are opposite.
+    pub(super) fn agreement(&self, signs: &[f64]) -> f64 {
+        self.weight * (signs[self.a] * signs[self.b] * self.cosine).signum()
+    }
+}
+
+/// `|D·ν_a ± D·ν_b| / |D|` of two points, with the sign that their normals have in common: 0 on a sphere.
+pub(super) fn across(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
+    let d = cloud.dimension();
+    let (x, y) = (cloud.point(a), cloud.point(b));
+    let step = |at: usize| -> f64 {
+        normals[at * d..][..d].iter().zip(x).zip(y).map(|((n, x), y)| n * (y - x)).sum()
+    };
+    (step(a) + cosine(cloud, normals, a, b).signum() * step(b)).abs() / squared_distance(x, y).sqrt()
+}
+
+fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
+    let d = cloud.dimension();
+    dot(&normals[a * d..][..d], &normals[b * d..][..d])
+}
+
+/// Neighbouring points between which the surface bends like a sphere, up to the sign of the normals; by their
+/// first point.
+pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
+    let cloud = sampled.cloud;
+    let edges_of = |a: usize| {
+        let elsewhere = sampled.around.around(a).iter().filter(|found| found.squared_distance > 0.0);
+        let edges = elsewhere
+            .take(n_neighbours(cloud))
+            .map(move |found| Edge::between(cloud, normals, a, found.point));
+        edges.filter(|edge| edge.weight > LEAST_WEIGHT)
+    };
+    (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
+}
+
+/// The edges of a point, of edges that are by their first points.
+pub(super) fn edges_of(edges: &[Edge], point: usize) -> &[Edge] {
+    let start = edges.partition_point(|edge| edge.a < point);
+    let rest = &edges[start..];
+    &rest[..rest.partition_point(|edge| edge.a == point)]
+}
+
+/// Means of values `[n]` over each point and its neighbours on the sheet, `[n]`.
+pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
+    let mut means = values.to_vec();
+    let mut counts = vec![1.0; values.len()];
+    for edge in edges {
+        means[edge.a] += values[edge.b];
+        counts[edge.a] += 1.0;
+    }
+    means.iter_mut().zip(&counts).for_each(|(mean, count)| *mean /= count);
+    means
+}
+
+/// The share of the edges, by weight, across which normals with these signs are opposite.
+pub(super) fn contradiction(edges: &[Edge], signs: &[f64]) -> f64 {
+    let total: f64 = edges.iter().map(|edge| edge.weight).sum();
+    let opposite: f64 = edges.iter().map(|edge| edge.agreement(signs).min(0.0).abs()).sum();
+    if total == 0.0 { 0.0 } else { opposite / total }
+}
+
+/// Two sets with the sign that most of their common edges give them, relative to one another.
+struct Border {
+    a: usize,
+    b: usize,
+    vote: f64,
+}
+
+/// Joins sets of a forest by what most of their common edges say, surest first.
+pub(super) fn join_borders(forest: &mut SignedForest, edges: &[Edge]) {
+    for border in borders(forest, edges) {
+        forest.join(border.a, border.b, border.vote.signum());
+    }
+}
+
+fn borders(forest: &mut SignedForest, edges: &[Edge]) -> Vec<Border> {
+    let found = forest.find_all();
+    let mut votes: Vec<Border> = Vec::new();
+    for edge in edges {
+        let (a, b) = (found[edge.a], found[edge.b]);
+        if a.root != b.root {
+            let vote = a.sign * b.sign * edge.cosine.signum() * edge.weight;
+            votes.push(Border { a: a.root.min(b.root), b: a.root.max(b.root), vote });
+        }
+    }
+    // A stable sort: votes of a border are added in the order of the edges.
+    votes.sort_by_key(|border| (border.a, border.b));
+    let same = |p: &Border, q: &Border| (p.a, p.b) == (q.a, q.b);
+    let total = |chunk: &[Border]| Border { vote: chunk.iter().map(|border| border.vote).sum(), ..chunk[0] };
+    let mut borders: Vec<Border> = votes.chunk_by(same).map(total).collect();
+    // By index where votes tie.
+    borders.sort_by(|p, q| q.vote.abs().total_cmp(&p.vote.abs()).then((p.a, p.b).cmp(&(q.a, q.b))));
+    borders
+}

@@ -1,0 +1,90 @@
+//! Sides by winding numbers: pieces that are turned, and points whose sides stay ambiguous.
+
+use super::edges::{Edge, averaged};
+use super::field::Field;
+use super::gauss::Problem;
+use super::parts::Parts;
+use super::turns::{Turned, turn_patches};
+use crate::error::NumericsError;
+
+/// Distance of the winding number from ½, averaged over the neighbours on the sheet, beyond which a side is
+/// ambiguous.
+const DOUBT: f64 = 0.3;
+
+/// Blame for the misfits of others beyond which a side is ambiguous: a wrong sheet of which half of the space
+/// is seen has ½.
+const BLAME: f64 = 0.25;
+
+/// [`BLAME`] on a piece that was cut into patches: what is left of its wrong sides is small.
+const BLAME_OF_CUT: f64 = 0.1;
+
+/// Share of the edges of a point, by weight, that may contradict its side.
+const CONTRADICTED: f64 = 0.5;
+
+/// Distance from ½ within which a part of the points of a piece must be for it to bound something, with the
+/// others: no such point is on a flat sheet or half a sphere, half of them are on a plate one side of which
+/// is wrong.
+const BOUNDS: f64 = 0.15;
+const BOUNDING_SHARE: f64 = 0.2;
+
+/// Distance from ½, and the share of the points of a closed piece that may exceed it.
+const CLOSED: f64 = 0.2;
+const MAX_OFF: f64 = 0.03;
+
+/// Points of a piece below which its sign is not asked for: what it contributes to winding numbers is less than
+/// what they are off.
+const LEAST_PIECE: usize = 12;
+
+/// Median of |w − ½| on a piece that is turned, at most: on a cap of a sphere, which has no inside, it is
+/// 0.2.
+const ON_PIECE: f64 = 0.12;
+
+/// What winding numbers say of a cloud.
+pub(super) struct Sides {
+    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    pub is_ambiguous: Vec<bool>,
+    /// Whether each piece is closed, with the others.
+    pub is_closed: Vec<bool>,
+}
+
+/// Turns pieces and patches of them that point to the wrong side, and tells what is left.
+///
+/// # Errors
+/// [`NumericsError::Cancelled`].
+pub(super) fn settle(
+    field: &Field<'_>,
+    pieces: &Parts,
+    edges: &[Edge],
+    signs: &mut [f64],
+) -> Result<Sides, NumericsError> {
+    let mut large = pieces.by_size();
+    large.retain(|&piece| pieces.members[piece].len() >= LEAST_PIECE);
+    let turned = Problem::of(field, pieces, &large, signs)?.turned(ON_PIECE);
+    pieces.turn(&turned, signs);
+    let Turned { misfits, is_cut, unclear } = turn_patches(field, pieces, edges, signs)?;
+    let near = pieces.shares(&misfits, |misfit| misfit <= BOUNDS);
+    let doubt = |(point, misfit): (usize, f64)| {
+        let piece = pieces.of_point[point];
+        let bounds = near[piece] >= BOUNDING_SHARE || is_cut[piece];
+        if bounds && misfit.abs() > DOUBT { misfit } else { 0.0 }
+    };
+    let doubts: Vec<f64> = averaged(edges, &misfits).into_iter().enumerate().map(doubt).collect();
+    let mut is_ambiguous = contradicted(edges, signs);
+    for (point, blame) in field.blames(signs, &doubts)?.into_iter().enumerate() {
+        let most = if is_cut[pieces.of_point[point]] { BLAME_OF_CUT } else { BLAME };
+        is_ambiguous[point] |= doubts[point] != 0.0 || blame > most;
+    }
+    unclear.into_iter().for_each(|point| is_ambiguous[point] = true);
+    let off = pieces.shares(&misfits, |misfit| misfit > CLOSED);
+    Ok(Sides { is_ambiguous, is_closed: off.iter().map(|share| *share <= MAX_OFF).collect() })
+}
+
+/// Whether the neighbours of each point contradict its side, `[n]`.
+fn contradicted(edges: &[Edge], signs: &[f64]) -> Vec<bool> {
+    let (mut weights, mut against) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
+    for edge in edges {
+        weights[edge.a] += edge.weight;
+        against[edge.a] += edge.agreement(signs).min(0.0).abs();
+    }
+    weights.iter().zip(against).map(|(weight, against)| against > CONTRADICTED * weight).collect()
+}

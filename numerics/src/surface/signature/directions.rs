@@ -1,0 +1,90 @@
+//! Normals at the points before their signs are made consistent.
+
+use super::function::Signature;
+use crate::error::NumericsError;
+use crate::machine::vector::norm;
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::points::local_quadrics::LocalQuadrics;
+use crate::points::sampling::Sampling;
+use crate::sums::jets::{JetOrder, Jets};
+use crate::surface::degeneracy::is_no_normal;
+use crate::surface::orientation::Directions;
+
+/// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the points.
+const DIFFERENCE_STEP: f64 = 0.25;
+
+/// What is known of the normals from the signature function and the quadrics.
+///
+/// # Errors
+/// Those of [`crate::function::interpolant::Interpolant::at`].
+pub(crate) fn directions(
+    signature: &Signature,
+    sampling: &Sampling,
+    quadrics: &LocalQuadrics,
+    observer: &dyn Observer,
+) -> Result<Directions, NumericsError> {
+    let n = signature.function().solver.n_points();
+    let (normals, has_sign) = match signature.jets() {
+        Some(jets) => along_gradients(signature, jets, sampling, quadrics),
+        None => along_quadrics(signature, sampling, quadrics, observer)?,
+    };
+    // The tip of a hairpin looks like the end of a curve; no quadric fits there.
+    let is_at_rim =
+        |point| quadrics.at(point).is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable());
+    Ok(Directions { normals, has_sign, is_at_rim: (0..n).map(is_at_rim).collect() })
+}
+
+fn along_gradients(
+    signature: &Signature,
+    jets: &Jets,
+    sampling: &Sampling,
+    quadrics: &LocalQuadrics,
+) -> (Vec<f64>, Vec<bool>) {
+    let (n, d) = (jets.n_queries(), jets.dimension());
+    let (mut normals, mut has_sign) = (vec![0.0; n * d], vec![false; n]);
+    for (point, slot) in normals.chunks_exact_mut(d).enumerate() {
+        let quadric = quadrics.at(point);
+        if signature.is_rounding(point) || is_no_normal(jets, point, sampling.spacing(point), quadric) {
+            quadric.iter().for_each(|quadric| slot.copy_from_slice(quadric.normal));
+            continue;
+        }
+        let gradient = jets.gradient(point);
+        let length = norm(gradient);
+        slot.iter_mut().zip(gradient).for_each(|(n, g)| *n = -g / length);
+        has_sign[point] = true;
+    }
+    (normals, has_sign)
+}
+
+/// For kernels without a gradient at the points: `u(x + δn) − u(x − δn)` along the normal of the quadric gives the sign, and the
+/// kink of the kernel at x, which is even, drops out.
+fn along_quadrics(
+    signature: &Signature,
+    sampling: &Sampling,
+    quadrics: &LocalQuadrics,
+    observer: &dyn Observer,
+) -> Result<(Vec<f64>, Vec<bool>), NumericsError> {
+    let function = signature.function();
+    let cloud = function.solver.cloud();
+    let (n, d) = (cloud.n_points(), cloud.dimension());
+    let at = |side: f64| -> Result<Jets, NumericsError> {
+        let mut moved = cloud.coordinates().to_vec();
+        for (point, x) in moved.chunks_exact_mut(d).enumerate() {
+            let step = side * DIFFERENCE_STEP * sampling.spacing(point);
+            let normal = quadrics.at(point).map(|quadric| quadric.normal);
+            x.iter_mut().zip(normal.into_iter().flatten()).for_each(|(x, n)| *x += step * n);
+        }
+        function.at(&Cloud::new(moved, d)?, JetOrder::Value, observer)
+    };
+    let (outside, inside) = (at(1.0)?, at(-1.0)?);
+    let (mut normals, mut has_sign) = (vec![0.0; n * d], vec![false; n]);
+    for (point, slot) in normals.chunks_exact_mut(d).enumerate() {
+        let Some(quadric) = quadrics.at(point) else { continue };
+        let slope = outside.value(point) - inside.value(point);
+        let sign = if slope > 0.0 { -1.0 } else { 1.0 };
+        slot.iter_mut().zip(quadric.normal).for_each(|(n, f)| *n = sign * f);
+        has_sign[point] = slope != 0.0;
+    }
+    Ok((normals, has_sign))
+}

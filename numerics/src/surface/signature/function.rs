@@ -1,0 +1,92 @@
+//! The function whose level surface it is.
+
+use std::sync::Arc;
+
+use crate::error::NumericsError;
+use crate::function::interpolant::Interpolant;
+use crate::machine::heap::vec_bytes;
+use crate::observer::Observer;
+use crate::solver::{Solution, Solver};
+use crate::sums::jets::{JetOrder, Jets};
+use crate::surface::degeneracy::roundings;
+
+/// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the points.
+///
+/// Its level 1 is the surface (with α > 0, the level that is the mean of u over the cloud). On closed clouds u > 1 inside
+/// while ℓ is not small against the features (errata.md, 2 and 13).
+pub struct Signature {
+    function: Interpolant,
+    /// Absent for kernels with a kink at the points.
+    at_points: Option<AtPoints>,
+}
+
+/// u and its derivatives at the points.
+struct AtPoints {
+    jets: Jets,
+    /// Whether ∇u is rounding (T1), `[n]`.
+    is_rounding: Vec<bool>,
+}
+
+impl Signature {
+    /// Solves for the weights, and evaluates in the same pass that finds their residual.
+    ///
+    /// # Errors
+    /// Those of [`Solution::with_jets`].
+    pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let ones = vec![1.0; solver.n_points()];
+        let (solution, jets) = match solver.kernel().has_kink() {
+            true => (Solution::of(&solver, &ones, observer)?, None),
+            false => Solution::with_jets(&solver, &ones, JetOrder::Hessian, observer)?,
+        };
+        Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)
+    }
+
+    /// The same of weights that are known.
+    ///
+    /// # Errors
+    /// Those of [`Interpolant::at`].
+    pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self, NumericsError> {
+        let solver = &function.solver;
+        let jets = match solver.kernel().has_kink() {
+            true => None,
+            false => Some(function.at(solver.cloud(), JetOrder::Hessian, observer)?),
+        };
+        Self::with(function, jets, observer)
+    }
+
+    fn with(
+        function: Interpolant,
+        jets: Option<Jets>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let at_points = match jets {
+            None => None,
+            Some(jets) => {
+                let is_rounding = roundings(&function, function.solver.cloud(), &jets, observer)?;
+                Some(AtPoints { jets, is_rounding })
+            }
+        };
+        Ok(Self { function, at_points })
+    }
+
+    /// u.
+    pub fn function(&self) -> &Interpolant {
+        &self.function
+    }
+
+    /// u, ∇u and D²u at the points, where they exist.
+    pub(crate) fn jets(&self) -> Option<&Jets> {
+        self.at_points.as_ref().map(|at_points| &at_points.jets)
+    }
+
+    /// Whether ∇u at a point is rounding; false where there is none.
+    pub(crate) fn is_rounding(&self, point: usize) -> bool {
+        self.at_points.as_ref().is_some_and(|at_points| at_points.is_rounding[point])
+    }
+
+    /// Bytes held on the heap beside the factor.
+    pub(crate) fn n_bytes(&self) -> usize {
+        let of = |at_points: &AtPoints| at_points.jets.n_bytes() + vec_bytes(&at_points.is_rounding);
+        self.function.solution.n_bytes() + self.at_points.as_ref().map_or(0, of)
+    }
+}

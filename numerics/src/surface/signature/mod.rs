@@ -1,0 +1,240 @@
+//! The level surface of a signature function, with what its points say about it by themselves.
+
+mod confirmation;
+mod deviations;
+mod directions;
+mod doubt;
+mod function;
+mod offset;
+mod serving;
+
+use std::sync::{Arc, OnceLock};
+
+use super::degeneracy::is_too_rough;
+use super::orientation::{Oriented, Sampled, SurfaceOrientation};
+use crate::error::NumericsError;
+use crate::function::interpolant::Interpolant;
+use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
+use crate::machine::vector::dot;
+use crate::observer::Observer;
+use crate::patches::Patches;
+use crate::points::cloud::Cloud;
+use crate::points::duplicates::count_duplicates;
+use crate::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::points::neighbourhoods::Neighbourhoods;
+use crate::points::neighbours::Neighbour;
+use crate::points::patch::Patch;
+use crate::points::quadric::n_quadric_neighbours;
+use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::solver::MAX_INVERSE_DIAGONAL;
+use crate::sums::jets::Jets;
+use directions::directions;
+pub use function::Signature;
+pub(crate) use serving::serve;
+
+/// A surface with local quadrics and consistently oriented normals at the points, d ≥ 2.
+///
+/// Made once per factorization: it costs one evaluation at all points, and a quadric through the neighbours of each.
+pub struct SignatureSurface {
+    signature: Signature,
+    sampling: Arc<Sampling>,
+    quadrics: LocalQuadrics,
+    oriented: Oriented,
+    is_too_rough: bool,
+    radius: f64,
+    left_out_misses: OnceLock<Option<Vec<f64>>>,
+    patches: OnceLock<Arc<Patches>>,
+}
+
+impl SignatureSurface {
+    /// The surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn of(
+        signature: Interpolant,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let sampling = Arc::new(Sampling::of(signature.solver.cloud(), observer)?);
+        Self::over(sampling, Signature::of(signature, observer)?, given, observer)
+    }
+
+    /// [`SignatureSurface::of`] over a sampling of the same cloud that is there already.
+    ///
+    /// # Errors
+    /// Those of [`SignatureSurface::of`].
+    pub fn over(
+        sampling: Arc<Sampling>,
+        signature: Signature,
+        given: Option<&Cloud>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let solver = signature.function().solver.clone();
+        let cloud = solver.cloud();
+        if cloud.dimension() < 2 {
+            return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
+        }
+        let count = n_quadric_neighbours(cloud.dimension());
+        let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
+        let quadrics = LocalQuadrics::of(cloud, &around, cloud, observer)?;
+        let directions = directions(&signature, &sampling, &quadrics, observer)?;
+        let sampled = Sampled { cloud, sampling: &sampling, around: &around, observer };
+        let oriented = Oriented::of(&sampled, directions, &quadrics, given)?;
+        let is_too_rough = is_too_rough(solver.kernel(), sampling.scales());
+        let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
+        let left_out_misses = OnceLock::new();
+        Ok(Self {
+            signature,
+            sampling,
+            quadrics,
+            oriented,
+            is_too_rough,
+            radius,
+            left_out_misses,
+            patches: OnceLock::new(),
+        })
+    }
+
+    /// The function u whose level surface this is.
+    pub fn signature(&self) -> &Interpolant {
+        self.signature.function()
+    }
+
+    pub fn cloud(&self) -> &Cloud {
+        self.signature().solver.cloud()
+    }
+
+    pub fn orientation(&self) -> SurfaceOrientation {
+        self.oriented.how
+    }
+
+    pub(crate) fn sampling(&self) -> &Arc<Sampling> {
+        &self.sampling
+    }
+
+    /// Whether ∇u at each point is rounding; false where there is none.
+    pub(crate) fn is_rounding(&self, point: usize) -> bool {
+        self.signature.is_rounding(point)
+    }
+
+    /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.
+    pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
+        let count = n_quadric_neighbours(self.cloud().dimension());
+        let nearest = self.sampling.neighbours().nearest_positions(x, count);
+        let patch = Patch::of(self.cloud(), x, nearest.iter().map(|found| found.point));
+        patch.is_some_and(|patch| patch.n_points() == count && patch.is_thread())
+    }
+
+    /// Whether second derivatives at the points see the cusp of the kernel.
+    pub(crate) fn is_too_rough(&self) -> bool {
+        self.is_too_rough
+    }
+
+    /// Half the diagonal of the bounding box, unit L; 1 for a single position.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999); for small clouds with a Cholesky
+    /// factor only.
+    pub(crate) fn left_out_misses(&self) -> Option<&[f64]> {
+        if self.left_out_misses.get().is_none() {
+            // Outside the cell, which a thread that waits for the others would otherwise hold: the job that it takes up
+            // meanwhile may ask for the same. A few threads make it twice; the first one puts it in.
+            let made = self.compute_left_out_misses();
+            let _ = self.left_out_misses.set(made);
+        }
+        self.left_out_misses.get()?.as_deref()
+    }
+
+    /// Local regressions of the same points, made when deviations are asked for, or a normal is in doubt.
+    ///
+    /// # Errors
+    /// Those of [`Patches::of`].
+    fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>, NumericsError> {
+        if let Some(patches) = self.patches.get() {
+            return Ok(patches.clone());
+        }
+        // Outside the cell, as above.
+        let cloud = self.signature.function().solver.cloud().clone();
+        let made = Arc::new(Patches::of(cloud, self.sampling.clone(), observer)?);
+        let _ = self.patches.set(made.clone());
+        Ok(self.patches.get().unwrap_or(&made).clone())
+    }
+
+    fn compute_left_out_misses(&self) -> Option<Vec<f64>> {
+        let solver = &self.signature().solver;
+        // A repeated observation is predicted by its copy.
+        if solver.n_points() > MAX_INVERSE_DIAGONAL || count_duplicates(solver.cloud()) > 0 {
+            return None;
+        }
+        let diagonal = solver.inverse_diagonal().ok()?;
+        Some(self.signature().solution.weights.iter().zip(diagonal).map(|(w, d)| (w / d).abs()).collect())
+    }
+
+    /// The outward unit normal of a point, zero where unknown.
+    pub(crate) fn normal(&self, point: usize) -> &[f64] {
+        let d = self.cloud().dimension();
+        &self.oriented.normals[point * d..][..d]
+    }
+
+    /// Whether what is known of the side of a point contradicts itself.
+    pub(crate) fn has_ambiguous_side(&self, point: usize) -> bool {
+        self.oriented.is_ambiguous[point]
+    }
+
+    /// u, ∇u and D²u at the points, where they were kept.
+    pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
+        self.signature.jets()
+    }
+
+    /// The quadric through the neighbours of a point.
+    pub(crate) fn quadric(&self, point: usize) -> Option<LocalQuadric<'_>> {
+        self.quadrics.at(point)
+    }
+
+    /// The sign that turns ∇u at x into an outward direction: that of the points near x (a narrow kernel makes u a ridge, and −∇u
+    /// points inward just inside), −1 on clouds that do not resolve their surface.
+    /// `found` is room for them.
+    pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64], found: &mut Vec<Neighbour>) -> f64 {
+        if !self.oriented.is_consistent && !self.orientation().is_given {
+            return -1.0;
+        }
+        self.sampling.neighbours().nearest_into(x, SPACING_NEIGHBOURS, found);
+        let along: f64 = found
+            .iter()
+            .map(|found| {
+                // Near a thin sheet the point on this side of it decides.
+                let spacing = self.sampling.spacing(found.point);
+                let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
+                weight * dot(self.normal(found.point), gradient)
+            })
+            .sum();
+        if along > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Whether ∇u at the points near x goes the way of a direction, +1 or −1; −1, inward, where there is no ∇u. `found` is
+    /// room for them.
+    pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64], found: &mut Vec<Neighbour>) -> f64 {
+        let Some(jets) = self.jets_at_points() else { return -1.0 };
+        self.sampling.neighbours().nearest_positions_into(x, SPACING_NEIGHBOURS, found);
+        let along: f64 = found.iter().map(|found| dot(jets.gradient(found.point), outward)).sum();
+        if along > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Bytes held on the heap beside the factor.
+    pub fn n_bytes(&self) -> usize {
+        let n = self.cloud().n_points();
+        // Asked for later, if at all.
+        let left_out_misses = if n <= MAX_INVERSE_DIAGONAL { block_bytes(n * size_of::<f64>()) } else { 0 };
+        self.signature.n_bytes()
+            + self.sampling.n_bytes()
+            + self.quadrics.n_bytes()
+            + vec_bytes(&self.oriented.normals)
+            + vec_bytes(&self.oriented.is_ambiguous)
+            + left_out_misses
+            + block_bytes(arc_payload::<Sampling>())
+            + block_bytes(arc_payload::<Self>())
+    }
+}

@@ -1,0 +1,326 @@
+//! Which function serves each query of a surface, and what is wrong there.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+use super::SignatureSurface;
+use super::confirmation::Unconfirmed;
+use super::deviations::deviations;
+use super::doubt::{is_doubtful, uncertain};
+use super::offset::{OffsetJet, offset_jet_at};
+use crate::error::NumericsError;
+use crate::machine::small::Small;
+use crate::machine::vector::norm;
+use crate::observer::{Observer, Stage};
+use crate::points::cloud::Cloud;
+use crate::points::local_quadrics::{LocalQuadric, LocalQuadrics};
+use crate::points::neighbourhoods::Neighbourhoods;
+use crate::points::neighbours::Neighbour;
+use crate::points::quadric::n_quadric_neighbours;
+use crate::sums::jets::{JetOrder, Jets};
+use crate::surface::curvature::principal_curvatures;
+use crate::surface::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak, roundings};
+use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
+use crate::surface::served::{Served, ServedBy, Verdict};
+
+/// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
+/// normal to it.
+const ON_SURFACE_SPACINGS: f64 = 0.5;
+
+/// Finds everything that is known at each query.
+///
+/// # Errors
+/// Those of [`crate::function::interpolant::Interpolant::at`].
+pub(crate) fn serve(
+    surface: &SignatureSurface,
+    queries: &Cloud,
+    request: &GeometryRequest,
+    observer: &dyn Observer,
+) -> Result<Served, NumericsError> {
+    let order = match request.model {
+        SurfaceModel::Offset => JetOrder::Value,
+        SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => JetOrder::Hessian,
+    };
+    let are_points = queries == surface.cloud();
+    let jets = match surface.jets_at_points() {
+        Some(jets) if are_points => Cow::Borrowed(jets),
+        Some(_) | None => Cow::Owned(surface.signature().at(queries, order, observer)?),
+    };
+    let is_rounding = match &jets {
+        Cow::Borrowed(_) => (0..queries.n_points()).map(|point| surface.is_rounding(point)).collect(),
+        Cow::Owned(jets) if order == JetOrder::Hessian => {
+            roundings(surface.signature(), queries, jets, observer)?
+        }
+        Cow::Owned(_) => Vec::new(),
+    };
+    observer.enter(Stage::Evaluate);
+    let surroundings = Surroundings::of(surface, queries, are_points, request.checks_curvatures, observer)?;
+    let service = Service { surface, queries, request, jets, is_rounding, surroundings };
+    let mut served = service.serve(observer)?;
+    if request.has_deviations {
+        served.deviations = Some(deviations(surface, queries, &served, observer)?);
+    }
+    Ok(served)
+}
+
+/// What lies around the queries.
+enum Surroundings {
+    /// They are the points of the cloud, of which the surface knows.
+    OfPoints,
+    /// Their nearest points, and quadrics of their own where curvatures are held against them.
+    OfQueries { around: Neighbourhoods, quadrics: Option<LocalQuadrics> },
+}
+
+impl Surroundings {
+    fn of(
+        surface: &SignatureSurface,
+        queries: &Cloud,
+        are_points: bool,
+        checks_curvatures: bool,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let (cloud, neighbours) = (surface.cloud(), surface.sampling().neighbours());
+        if are_points {
+            return Ok(Self::OfPoints);
+        }
+        if checks_curvatures {
+            let count = n_quadric_neighbours(cloud.dimension());
+            let around = Neighbourhoods::of(neighbours, queries, count, observer)?;
+            let quadrics = Some(LocalQuadrics::of(cloud, &around, queries, observer)?);
+            return Ok(Self::OfQueries { around, quadrics });
+        }
+        let around = Neighbourhoods::of(neighbours, queries, 1, observer)?;
+        Ok(Self::OfQueries { around, quadrics: None })
+    }
+}
+
+/// A query with what surrounds it.
+#[derive(Clone, Copy)]
+struct Site<'a> {
+    x: &'a [f64],
+    nearest: Neighbour,
+    spacing: f64,
+    quadric: Option<LocalQuadric<'a>>,
+}
+
+/// A surface, queries, and the signature function there.
+struct Service<'a> {
+    surface: &'a SignatureSurface,
+    queries: &'a Cloud,
+    request: &'a GeometryRequest,
+    jets: Cow<'a, Jets>,
+    /// T1 at each query, where the jets have gradients.
+    is_rounding: Vec<bool>,
+    surroundings: Surroundings,
+}
+
+/// Where the numbers of a query go.
+struct Slot<'a> {
+    gradient: &'a mut [f64],
+    hessian: &'a mut [f64],
+}
+
+impl Slot<'_> {
+    fn take(&mut self, jet: &OffsetJet) {
+        self.gradient.copy_from_slice(&jet.gradient);
+        self.hessian.copy_from_slice(&jet.hessian);
+    }
+}
+
+impl Service<'_> {
+    fn serve(&self, observer: &dyn Observer) -> Result<Served, NumericsError> {
+        let (m, d) = (self.queries.n_points(), self.queries.dimension());
+        let look = |query| {
+            observer.checkpoint()?;
+            Ok(self.needs_offset(query, &self.site(query)))
+        };
+        let needs_offset: Vec<bool> =
+            (0..m).into_par_iter().map(look).collect::<Result<_, NumericsError>>()?;
+        let first_unaffordable =
+            (0..m).filter(|&query| needs_offset[query]).nth(self.request.max_offsets).unwrap_or(m);
+        let (mut gradients, mut hessians) = (vec![0.0; m * d], vec![0.0; m * d * d]);
+        let mut verdicts = vec![Verdict { sign: 1.0, by: ServedBy::Signature, reason: None }; m];
+        let slots = gradients.par_chunks_exact_mut(d).zip(hessians.par_chunks_exact_mut(d * d));
+        slots.zip(&mut verdicts).enumerate().try_for_each_init(
+            Vec::new,
+            |found, (query, ((gradient, hessian), verdict))| {
+                observer.checkpoint()?;
+                let (site, mut slot) = (self.site(query), Slot { gradient, hessian });
+                *verdict = match (needs_offset[query], query < first_unaffordable) {
+                    (true, true) => self.by_offset(query, &site, &mut slot, found),
+                    (true, false) => {
+                        let reason = DegeneracyReason::UnaffordableRescue;
+                        self.without_offset(query, &site, reason, &mut slot, found)
+                    }
+                    (false, _) => self.by_signature(query, &site, &mut slot, found),
+                };
+                verdict.reason = verdict.reason.or_else(|| self.flag(*verdict, &slot, &site));
+                Ok(())
+            },
+        )?;
+        let levels = self.jets.values();
+        let mut served = Served { dimension: d, gradients, hessians, verdicts, levels, deviations: None };
+        if !self.request.checks_curvatures {
+            self.flag_normals(&mut served, observer)?;
+        }
+        Ok(served)
+    }
+
+    /// Flags the normals of which too little is known.
+    fn flag_normals(&self, served: &mut Served, observer: &dyn Observer) -> Result<(), NumericsError> {
+        let quadric = |query: usize| self.site(query).quadric;
+        let is_doubtful = |&query: &usize| {
+            served.verdict(query).reason.is_none() && is_doubtful(served.gradient(query), quadric(query))
+        };
+        let doubtful: Vec<usize> = (0..self.queries.n_points()).filter(is_doubtful).collect();
+        for query in uncertain(self.surface, self.queries, &doubtful, served, quadric, observer)? {
+            served.verdicts[query].reason = Some(DegeneracyReason::UnderResolved);
+        }
+        Ok(())
+    }
+
+    fn site(&self, query: usize) -> Site<'_> {
+        let (surface, x) = (self.surface, self.queries.point(query));
+        let (nearest, quadric) = match &self.surroundings {
+            Surroundings::OfPoints => {
+                (Neighbour { point: query, squared_distance: 0.0 }, surface.quadric(query))
+            }
+            Surroundings::OfQueries { around, quadrics: Some(quadrics) } => {
+                (around.nearest(query), quadrics.at(query))
+            }
+            // Normals are held against a quadric to see whether they are oblique; that of the nearest point is good enough.
+            Surroundings::OfQueries { around, quadrics: None } => {
+                let nearest = around.nearest(query);
+                let quadric = surface.quadric(nearest.point);
+                (nearest, quadric.map(|quadric| quadric.seen_from(surface.cloud().point(nearest.point), x)))
+            }
+        };
+        Site { x, nearest, spacing: surface.sampling().spacing(nearest.point), quadric }
+    }
+
+    fn needs_offset(&self, query: usize, site: &Site<'_>) -> bool {
+        match self.request.model {
+            SurfaceModel::Signature | SurfaceModel::Local => false,
+            SurfaceModel::Offset => true,
+            SurfaceModel::Auto => self.vanishes(query, site) || self.is_weak(query, site),
+        }
+    }
+
+    fn vanishes(&self, query: usize, site: &Site<'_>) -> bool {
+        let reach = ON_SURFACE_SPACINGS * site.spacing;
+        let quadric = site.quadric.filter(|quadric| quadric.height.abs() <= reach);
+        let is_on_thread = site.quadric.is_none()
+            && site.nearest.squared_distance <= reach * reach
+            && self.surface.is_thread(site.x);
+        is_on_thread || self.is_rounding[query] || is_no_normal(&self.jets, query, site.spacing, quadric)
+    }
+
+    /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which
+    /// the offset model interpolates.
+    fn is_weak(&self, query: usize, site: &Site<'_>) -> bool {
+        self.request.checks_curvatures
+            && site.quadric.is_some_and(|quadric| quadric.is_smooth())
+            && is_weak(&self.jets, query, site.spacing)
+    }
+
+    fn by_signature(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
+        if self.request.model == SurfaceModel::Signature && self.vanishes(query, site) {
+            return self.null(query, DegeneracyReason::VanishingGradient, slot);
+        }
+        slot.gradient.copy_from_slice(self.jets.gradient(query));
+        slot.hessian.copy_from_slice(&self.jets.hessian(query));
+        let sign = match self.request.orientation {
+            Orientation::Gradient => 1.0,
+            Orientation::Outward => self.surface.outward_sign(site.x, slot.gradient, found),
+        };
+        Verdict { sign, by: ServedBy::Signature, reason: None }
+    }
+
+    /// The offset model, whose gradient points outward.
+    fn by_offset(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
+        let Some(jet) = offset_jet_at(self.surface, site.x) else {
+            return self.without_offset(query, site, DegeneracyReason::VanishingGradient, slot, found);
+        };
+        slot.take(&jet);
+        let sign = match self.request.orientation {
+            Orientation::Gradient => self.surface.gradient_side(site.x, slot.gradient, found),
+            Orientation::Outward => 1.0,
+        };
+        Verdict { sign, by: ServedBy::Offset, reason: None }
+    }
+
+    /// What there is without the offset model: a weak gradient is better than nothing.
+    fn without_offset(
+        &self,
+        query: usize,
+        site: &Site<'_>,
+        reason: DegeneracyReason,
+        slot: &mut Slot<'_>,
+        found: &mut Vec<Neighbour>,
+    ) -> Verdict {
+        match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
+            true => self.by_signature(query, site, slot, found),
+            false => self.null(query, reason, slot),
+        }
+    }
+
+    fn null(&self, query: usize, reason: DegeneracyReason, slot: &mut Slot<'_>) -> Verdict {
+        let by = match self.request.model {
+            SurfaceModel::Offset => ServedBy::Offset,
+            SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local => {
+                slot.gradient.copy_from_slice(self.jets.gradient(query));
+                slot.hessian.copy_from_slice(&self.jets.hessian(query));
+                ServedBy::Signature
+            }
+        };
+        Verdict { sign: 1.0, by, reason: Some(reason) }
+    }
+
+    /// What makes an answer doubtful.
+    fn flag(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> Option<DegeneracyReason> {
+        if is_far(site.nearest.squared_distance, site.spacing) {
+            return Some(DegeneracyReason::FarFromCloud);
+        }
+        let has_side = self.request.orientation == Orientation::Outward;
+        if has_side && self.surface.has_ambiguous_side(site.nearest.point) {
+            return Some(DegeneracyReason::AmbiguousSide);
+        }
+        if !self.request.checks_curvatures {
+            return None;
+        }
+        if verdict.by == ServedBy::Signature && self.surface.is_too_rough() {
+            return Some(DegeneracyReason::KernelTooRough);
+        }
+        (!self.is_resolved(verdict, slot, site)).then_some(DegeneracyReason::UnderResolved)
+    }
+
+    fn is_resolved(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> bool {
+        let gradient_norm = norm(slot.gradient);
+        let normal: Small = slot.gradient.iter().map(|g| verdict.sign * g / gradient_norm).collect();
+        let (curvatures, _) = principal_curvatures(slot.gradient, slot.hessian, verdict.sign);
+        let unconfirmed = Unconfirmed {
+            x: site.x,
+            spacing: site.spacing,
+            curvatures: &curvatures,
+            normal: &normal,
+            gradient_norm,
+            quadric: site.quadric,
+            is_offset: verdict.by == ServedBy::Offset,
+            may_use_patch: self.queries.n_points() <= self.request.max_offsets,
+        };
+        unconfirmed.is_confirmed_by(self.surface)
+    }
+}

@@ -1,0 +1,97 @@
+//! Every solver against the dense one: over every kernel that it accepts, every verb that it serves (after tinygp's "consistent
+//! with direct"), and the refusal of every verb that it does not.
+//!
+//! A solver is one line of [`solvers`]. The dense one is held against itself on the same points in another order, so that
+//! no two numbers come from the same operations. The local solver has no function that it could be asked for here: a cloud of its
+//! neighbours alone has the dense answers for every kernel (src/function/moving/tests.rs), and what larger clouds lose is in
+//! moving.rs.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod moving;
+mod verbs;
+
+use std::sync::Arc;
+
+use common::clouds::{fibonacci_sphere, wave};
+use common::kernels::all_families;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::{Solver, System};
+use gramian_numerics::sums::regularization::Regularization;
+use verbs::{Setting, VERBS};
+
+/// A solver, how far its answers may lie from the dense one's beyond rounding, and the verbs that it refuses.
+struct Candidate {
+    name: &'static str,
+    make: fn(System) -> Result<Solver, NumericsError>,
+    tolerance: f64,
+    refuses: &'static [&'static str],
+}
+
+fn solvers() -> Vec<Candidate> {
+    let dense = |system| Solver::dense(system, &Unobserved);
+    vec![Candidate { name: "dense", make: dense, tolerance: 0.0, refuses: &[] }]
+}
+
+const N_POINTS: usize = 150;
+
+/// Where point i of the first order stands in the second: a permutation, since 149 is coprime to 150.
+fn shuffled(i: usize) -> usize {
+    (i * 149 + 7) % N_POINTS
+}
+
+#[test]
+fn every_solver_answers_as_the_dense_one() {
+    let cloud = fibonacci_sphere(N_POINTS);
+    let mut other = vec![0.0; 3 * N_POINTS];
+    (0..N_POINTS).for_each(|i| other[3 * shuffled(i)..][..3].copy_from_slice(cloud.point(i)));
+    let other = Cloud::new(other, 3).unwrap();
+    for family in all_families() {
+        let dense = (solvers()[0].make)(system(&cloud, family)).unwrap();
+        // What is lost in a solve: digits of the weights, and those of an answer that is small against its terms.
+        let rounding = 100.0 * N_POINTS as f64 * f64::EPSILON / dense.reciprocal_condition();
+        let dense = Setting { solver: Arc::new(dense), values: cloud.points().map(wave).collect() };
+        for candidate in solvers() {
+            let solver = Arc::new((candidate.make)(system(&other, family)).unwrap());
+            let setting = Setting { solver, values: other.points().map(wave).collect() };
+            for verb in VERBS {
+                let context = format!("{} of {}, {family:?}", verb.name, candidate.name);
+                let (expected, found) = ((verb.ask)(&dense), (verb.ask)(&setting));
+                if candidate.refuses.contains(&verb.name) {
+                    assert!(matches!(found, Err(NumericsError::Unsupported { .. })), "{context}");
+                    continue;
+                }
+                let (Ok(expected), Ok(found)) = (&expected, &found) else {
+                    // Kernels with a kink have no derivatives at the points: both refuse, and alike.
+                    assert!(is_kink(&expected) && is_kink(&found), "{context}: {expected:?}, {found:?}");
+                    continue;
+                };
+                let found = if verb.has_column_per_point { in_first_order(found) } else { found.clone() };
+                let largest = expected.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+                let allowed = (rounding + candidate.tolerance) * largest;
+                assert_eq!(expected.len(), found.len(), "{context}");
+                for (a, b) in expected.iter().zip(&found) {
+                    assert!((a - b).abs() <= allowed, "{context}: {a} and {b}, allowed {allowed:e}");
+                }
+            }
+        }
+    }
+}
+
+/// α of 1e-6 leaves half of the digits of the smoothest kernels.
+fn system(cloud: &Cloud, family: Family) -> System {
+    let kernel = Kernel::new(family, 0.9, 1.7).unwrap();
+    System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-6)).unwrap()
+}
+
+/// Rows of one column per point, as the first order has the points.
+fn in_first_order(rows: &[f64]) -> Vec<f64> {
+    rows.chunks_exact(N_POINTS).flat_map(|row| (0..N_POINTS).map(|i| row[shuffled(i)])).collect()
+}
+
+fn is_kink(outcome: &Result<Vec<f64>, NumericsError>) -> bool {
+    matches!(outcome, Err(NumericsError::KernelNotSmooth { .. }))
+}

@@ -1,0 +1,93 @@
+//! What a solver is asked for, as numbers in an order that does not depend on that of the points.
+
+use std::sync::Arc;
+
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::Solver;
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::sums::jets::{JetOrder, Jets};
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::geometry::{Curvatures, Geometry, GeometryRequest, SurfaceModel};
+use gramian_numerics::surface::operators::{
+    laplace_beltrami, laplace_beltrami_matrix, surface_gradient, surface_gradient_matrices,
+};
+
+/// A solver, and values at its points.
+pub struct Setting {
+    pub solver: Arc<Solver>,
+    pub values: Vec<f64>,
+}
+
+type Outcome = Result<Vec<f64>, NumericsError>;
+
+pub struct Verb {
+    pub name: &'static str,
+    pub ask: fn(&Setting) -> Outcome,
+    /// Whether the answer has rows of one column per point.
+    pub has_column_per_point: bool,
+}
+
+const fn verb(name: &'static str, ask: fn(&Setting) -> Outcome) -> Verb {
+    Verb { name, ask, has_column_per_point: false }
+}
+
+const fn matrix(name: &'static str, ask: fn(&Setting) -> Outcome) -> Verb {
+    Verb { name, ask, has_column_per_point: true }
+}
+
+pub const VERBS: [Verb; 13] = [
+    verb("values", |setting| jets(setting, JetOrder::Value).map(|jets| jets.values())),
+    verb("gradients", |setting| jets(setting, JetOrder::Gradient).map(|jets| jets.gradients())),
+    verb("hessians", |setting| jets(setting, JetOrder::Hessian).map(|jets| jets.hessians())),
+    verb("native norm", |setting| Ok(vec![fit(setting)?.solution.native_norm_squared])),
+    verb("normals", |setting| Ok(geometry(setting)?.normals().to_vec())),
+    verb("principal curvatures", |setting| Ok(curvatures(setting)?.principal)),
+    verb("surface gradient", |setting| {
+        surface_gradient(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
+    }),
+    verb("Laplace–Beltrami operator", |setting| {
+        laplace_beltrami(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
+    }),
+    matrix("surface gradient as matrices", |setting| {
+        surface_gradient_matrices(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
+    }),
+    matrix("Laplace–Beltrami operator as matrix", |setting| {
+        laplace_beltrami_matrix(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
+    }),
+    verb("variances", |setting| Ok(variances(&setting.solver, &queries(), &Unobserved)?.latent)),
+    verb("covariance", |setting| Ok(covariance(&setting.solver, &queries(), &Unobserved)?.latent)),
+    verb("log marginal likelihood", |setting| {
+        let solution = fit(setting)?.solution;
+        Ok(vec![log_marginal_likelihood(&setting.solver, &solution, 1.0)?])
+    }),
+];
+
+/// On the sphere between the points, inside and outside.
+fn queries() -> Cloud {
+    let on_sphere = [[0.6, 0.8, 0.0], [0.0, -0.6, 0.8], [-0.48, 0.64, 0.6]];
+    let scaled = [1.0, 0.9, 1.2].into_iter().zip(on_sphere);
+    Cloud::new(scaled.flat_map(|(r, x)| x.map(|c| r * c)).collect(), 3).unwrap()
+}
+
+fn fit(setting: &Setting) -> Result<Interpolant, NumericsError> {
+    Interpolant::fit(setting.solver.clone(), &setting.values, &Unobserved)
+}
+
+fn jets(setting: &Setting, order: JetOrder) -> Result<Jets, NumericsError> {
+    fit(setting)?.at(&queries(), order, &Unobserved)
+}
+
+fn geometry(setting: &Setting) -> Result<Geometry, NumericsError> {
+    let signature = Interpolant::signature(setting.solver.clone(), &Unobserved)?;
+    let surface = Surface::of(signature, None, &Unobserved)?;
+    let request = GeometryRequest { model: SurfaceModel::Signature, ..GeometryRequest::CURVATURES };
+    Geometry::of(&surface, &queries(), &request, &Unobserved)
+}
+
+fn curvatures(setting: &Setting) -> Result<Curvatures, NumericsError> {
+    geometry(setting)?.curvatures(&Unobserved)
+}

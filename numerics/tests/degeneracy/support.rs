@@ -1,0 +1,38 @@
+//! The library's answers for a cloud.
+
+use gramian_numerics::kernel::Family;
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
+
+use super::clouds::Oriented;
+use super::common::fits;
+
+pub fn surface(points: &[f64], dimension: usize, family: Family, length_scale: f64, alpha: f64) -> Surface {
+    let cloud = Cloud::new(points.to_vec(), dimension).unwrap();
+    fits::surface(&fits::factorize(&cloud, fits::kernel(family, length_scale), alpha))
+}
+
+pub fn surface_of(cloud: &Oriented, family: Family, length_scale: f64) -> Surface {
+    surface(&cloud.points, cloud.dimension, family, length_scale, 1e-10)
+}
+
+/// The geometry at the points themselves.
+pub fn geometry(surface: &Surface, request: &GeometryRequest) -> Geometry {
+    Geometry::of(surface, surface.cloud(), request, &Unobserved).unwrap()
+}
+
+/// Cosines of the normals with the true ones, `None` where there is no answer.
+pub fn cosines(geometry: &Geometry, truth: &[Vec<f64>]) -> Vec<Option<f64>> {
+    let cosine = |(query, normal): (usize, &Vec<f64>)| {
+        let found = geometry.normal(query);
+        (!geometry.is_null()[query]).then(|| found.iter().zip(normal).map(|(a, b)| a * b).sum())
+    };
+    truth.iter().enumerate().map(cosine).collect()
+}
+
+/// How many answers point inward.
+pub fn n_wrong(cosines: &[Option<f64>]) -> usize {
+    cosines.iter().flatten().filter(|&&cosine| cosine <= 0.0).count()
+}

@@ -1,0 +1,112 @@
+//! What is chosen for a cloud, sites, means of points, groups of values, is chosen by distances: neither the
+//! order of the points nor the axes matter.
+
+use std::sync::Arc;
+
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::patches::{PatchGeometry, Patches};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::solver::trend::Mean;
+
+use crate::common::random::Random;
+use crate::support::rotation;
+
+/// Random points of a circle or a sphere that is pressed together, with noise of 1 %.
+fn noisy(n: usize, d: usize) -> Cloud {
+    let mut random = Random(11);
+    let mut point = || {
+        let x: Vec<f64> = (0..d).map(|_| random.normal()).collect();
+        let length = x.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let axes = [1.0, 0.8, 0.6];
+        (0..d).map(|c| axes[c] * x[c] / length + 0.01 * random.normal()).collect::<Vec<f64>>()
+    };
+    Cloud::new((0..n).flat_map(|_| point()).collect(), d).unwrap()
+}
+
+/// Where point i of n comes in another order: 1,009 is a prime, and none of the sizes here is a multiple of
+/// it.
+fn place(i: usize, n: usize) -> usize {
+    i * 1009 % n
+}
+
+/// The cloud turned and in another order.
+fn moved(cloud: &Cloud) -> Cloud {
+    let (n, d) = (cloud.n_points(), cloud.dimension());
+    let turned = rotation(d, &[0.3, 1.1, 2.0]);
+    let mut coordinates = vec![0.0; n * d];
+    for (i, x) in cloud.points().enumerate() {
+        let entry = |row: usize| (0..d).map(|c| turned[row * d + c] * x[c]).sum::<f64>();
+        (0..d).for_each(|row| coordinates[place(i, n) * d + row] = entry(row));
+    }
+    Cloud::new(coordinates, d).unwrap()
+}
+
+fn regressed(cloud: &Cloud) -> PatchGeometry {
+    let cloud = Arc::new(cloud.clone());
+    let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+    Patches::of(cloud.clone(), sampling, &Unobserved).unwrap().at(&cloud, true, true, &Unobserved).unwrap()
+}
+
+#[test]
+fn regressions_change_by_rounding_alone() {
+    for (n, d) in [(700, 2), (1500, 3), (5000, 3)] {
+        let cloud = noisy(n, d);
+        let (a, b) = (regressed(&cloud), regressed(&moved(&cloud)));
+        let (x, y) = (a.curvatures.as_ref().unwrap(), b.curvatures.as_ref().unwrap());
+        let greatest = x.mean.iter().fold(0.0, |greatest: f64, mean| greatest.max(mean.abs()));
+        for i in 0..n {
+            let j = place(i, n);
+            let curvatures = (x.mean[i] - y.mean[j]).abs() / greatest;
+            let deviations = (a.normal_deviations[i] - b.normal_deviations[j]).abs();
+            assert!(curvatures < 1e-9 && deviations < 1e-9, "{n}, {d}: {curvatures} {deviations}");
+        }
+    }
+}
+
+#[test]
+fn parts_with_the_same_sites_learn_the_same() {
+    let mut random = Random(7);
+    let on_sphere = (0..4000).flat_map(|_| random.on_sphere());
+    let whole = Cloud::new(on_sphere.collect(), 3).unwrap();
+    let above = |least: f64| {
+        let points = whole.points().filter(|x| x[2] > least);
+        Cloud::new(points.flatten().copied().collect(), 3).unwrap()
+    };
+    // Neighbourhoods reach 0.2 at most.
+    let (part, sites) = (above(-0.4), above(0.9));
+    let at_sites = |cloud: &Cloud| {
+        let cloud = Arc::new(cloud.clone());
+        let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
+        Patches::learned_at(&sites, cloud, sampling, &Unobserved).unwrap()
+    };
+    let (of_whole, of_part) = (at_sites(&whole), at_sites(&part));
+    assert!(of_whole.kernel().length_scale > 0.1);
+    assert!((of_whole.kernel().length_scale / of_part.kernel().length_scale - 1.0).abs() < 1e-12);
+    assert_eq!(of_whole.noise(), of_part.noise());
+}
+
+fn learned(cloud: &Cloud, values: &[f64]) -> Learned {
+    let sampling = Sampling::of(cloud, &Unobserved).unwrap();
+    let (noise, mean) = (Noise::Unknown, Mean::Constant);
+    learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap()
+}
+
+#[test]
+fn what_values_decide_changes_by_rounding_alone() {
+    for (n, d) in [(600, 2), (3000, 2), (3000, 3)] {
+        let cloud = noisy(n, d);
+        let mut random = Random(5);
+        let values: Vec<f64> =
+            cloud.points().map(|x| (3.0 * x[0]).sin() + x[1] + 0.02 * random.normal()).collect();
+        let mut others = vec![0.0; n];
+        values.iter().enumerate().for_each(|(i, value)| others[place(i, n)] = *value);
+        let (a, b) = (learned(&cloud, &values), learned(&moved(&cloud), &others));
+        assert_eq!(a.family, b.family);
+        // Searches end where the likelihood is flat to rounding, which leaves half of the digits.
+        for (x, y) in [(a.length_scale, b.length_scale), (a.ratio, b.ratio), (a.variance, b.variance)] {
+            assert!((x / y - 1.0).abs() < 1e-6, "{n}, {d}: {x} {y}");
+        }
+    }
+}

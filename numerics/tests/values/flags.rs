@@ -1,0 +1,202 @@
+//! How many answers of operators on values are off by half without a flag, as requests have them that ask for no deviations.
+
+#![allow(dead_code, reason = "the example prints what the test does not ask")]
+
+use std::sync::Arc;
+
+use gramian_numerics::defaults::{Purpose, default_fit};
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::noise::estimate_noise;
+use gramian_numerics::points::sampling::Sampling as Spacings;
+use gramian_numerics::selection::{Learned, Noise, Observed, learn};
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::solver::{Solver, System};
+use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
+use gramian_numerics::surface::operators::{Judged, laplace_beltrami, surface_gradient};
+
+use crate::common::random::Random;
+use crate::fields::Field;
+use crate::jet::Jet;
+use crate::sampling::{Sampling, sample};
+use crate::shapes::{Shape, Truth};
+use crate::sweep::{laplacian, tangential};
+
+/// What a request says of the kernel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Asked {
+    /// Nothing.
+    Nothing,
+    /// A family.
+    Family(Family),
+    /// A family with so many times the length scale that it would have had, for values and surface.
+    Width(Family, f64),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub struct Request {
+    pub asked: Asked,
+    pub shape: Shape,
+    pub field: Field,
+    pub n_points: usize,
+    /// Deviation of the noise over that of the field.
+    pub noise: f64,
+}
+
+/// Of the surface gradient and of Laplace–Beltrami.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Counts {
+    pub n: [usize; 2],
+    pub n_unflagged: [usize; 2],
+    /// Of these, errors by more than half of the root mean square of what is true.
+    pub n_off: [usize; 2],
+    /// Requests that were refused.
+    pub n_refused: usize,
+}
+
+impl Counts {
+    pub fn plus(mut self, other: &Self) -> Self {
+        for (sum, count) in [
+            (&mut self.n, other.n),
+            (&mut self.n_unflagged, other.n_unflagged),
+            (&mut self.n_off, other.n_off),
+        ] {
+            sum.iter_mut().zip(count).for_each(|(sum, count)| *sum += count);
+        }
+        self.n_refused += other.n_refused;
+        self
+    }
+}
+
+/// Queries of a cloud at most.
+const MAX_QUERIES: usize = 300;
+
+/// α with a kernel given.
+const ALPHA: f64 = 1e-10;
+
+impl Request {
+    /// The sums over `n_clouds` clouds.
+    pub fn run(&self, n_clouds: usize) -> Counts {
+        (0..n_clouds).fold(Counts::default(), |sum, cloud| {
+            let counts = self.run_once(cloud).unwrap_or(Counts { n_refused: 1, ..Counts::default() });
+            sum.plus(&counts)
+        })
+    }
+
+    fn run_once(&self, cloud: usize) -> Result<Counts, NumericsError> {
+        let mut random = Random((31 * self.n_points + 1001 * cloud) as u64 + 1);
+        let points = sample(self.shape, Sampling::Random, self.n_points, &mut random);
+        let n = points.len();
+        let exact: Vec<f64> = points.iter().map(|&x| self.field.at(x).value).collect();
+        let mean = exact.iter().sum::<f64>() / n as f64;
+        let spread = (exact.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+        let values: Vec<f64> = exact.iter().map(|f| f + self.noise * spread * random.normal()).collect();
+        let cloud = Arc::new(Cloud::new(points.concat(), 3).unwrap());
+        let queries: Vec<[f64; 3]> = points.iter().step_by(n.div_ceil(MAX_QUERIES)).copied().collect();
+        let at = Cloud::new(queries.concat(), 3).unwrap();
+        let spacings = Spacings::of(&cloud, &Unobserved)?;
+
+        let (noise, mean) = (Noise::Unknown, Mean::Constant);
+        let observed = Observed { cloud: &cloud, sampling: &spacings, values: &values, noise, mean };
+        let learned = learn(observed, &Unobserved)?;
+        let (interpolant, factor) = self.function(&cloud, &spacings, &values, &learned)?;
+        let learned = Some(&learned).filter(|_| self.asked != Asked::Nothing);
+        let surface = self.surface(&cloud, &spacings)?;
+        let geometry = Geometry::of(&surface, &at, &GeometryRequest::CURVATURES, &Unobserved)?;
+        let truth: Vec<(Jet, Truth)> =
+            queries.iter().map(|&x| (self.field.at(x), self.shape.truth(x))).collect();
+        let judged = |found| Judged {
+            geometry: &geometry,
+            interpolant: &interpolant,
+            factor,
+            queries: &at,
+            found,
+            learned,
+        };
+        let mut counts = Counts::default();
+
+        let found = surface_gradient(&geometry, &interpolant, &at, &Unobserved)?;
+        let doubts = judged(&found).surface_gradient(&Unobserved)?;
+        let exact: Vec<f64> = truth.iter().flat_map(|(jet, on)| tangential(jet, on)).collect();
+        counts.add(0, (&found, &exact), &geometry, &doubts);
+        let found = laplace_beltrami(&geometry, &interpolant, &at, &Unobserved)?;
+        let doubts = judged(&found).laplace_beltrami(&Unobserved)?;
+        let exact: Vec<f64> = truth.iter().map(|(jet, on)| laplacian(jet, on)).collect();
+        counts.add(1, (&found, &exact), &geometry, &doubts);
+        Ok(counts)
+    }
+
+    /// The function through the values, and by how much its kernel is scaled.
+    fn function(
+        &self,
+        cloud: &Arc<Cloud>,
+        spacings: &Spacings,
+        values: &[f64],
+        learned: &Learned,
+    ) -> Result<(Interpolant, f64), NumericsError> {
+        let (family, length_scale) = match self.asked {
+            Asked::Nothing => {
+                let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;
+                let solver = solver(cloud, kernel, learned.ratio)?;
+                let interpolant = Interpolant::fit_with_mean(solver, values, Mean::Constant, &Unobserved)?;
+                return Ok((interpolant, learned.variance));
+            }
+            Asked::Family(family) => (family, family.length_scale_of_values(spacings.scales())),
+            Asked::Width(family, factor) => {
+                (family, factor * family.length_scale_of_values(spacings.scales()))
+            }
+        };
+        let solver = solver(cloud, Kernel::new(family, length_scale, 1.0)?, ALPHA)?;
+        Ok((Interpolant::fit(solver, values, &Unobserved)?, 1.0))
+    }
+
+    fn surface(&self, cloud: &Arc<Cloud>, spacings: &Spacings) -> Result<Surface, NumericsError> {
+        let scales = spacings.scales();
+        let (kernel, alpha) = match self.asked {
+            Asked::Nothing => {
+                let noise = estimate_noise(cloud, spacings, &Unobserved)?;
+                default_fit(scales, Purpose::Curvatures, || noise)?
+            }
+            Asked::Family(family) => (Kernel::new(family, family.default_length_scale(scales), 1.0)?, ALPHA),
+            Asked::Width(family, factor) => {
+                (Kernel::new(family, factor * family.length_scale_of_values(scales), 1.0)?, ALPHA)
+            }
+        };
+        let signature = Interpolant::signature(solver(cloud, kernel, alpha)?, &Unobserved)?;
+        Surface::of(signature, None, &Unobserved)
+    }
+}
+
+fn solver(cloud: &Arc<Cloud>, kernel: Kernel, alpha: f64) -> Result<Arc<Solver>, NumericsError> {
+    let system = System::new(cloud.clone(), kernel, Regularization::uniform(alpha)?)?;
+    Solver::dense(system, &Unobserved).map(Arc::new)
+}
+
+impl Counts {
+    fn add(
+        &mut self,
+        operator: usize,
+        (found, exact): (&[f64], &[f64]),
+        geometry: &Geometry,
+        doubts: &[usize],
+    ) {
+        let m = geometry.n_queries();
+        let k = found.len() / m;
+        let mut is_flagged = geometry.is_null().to_vec();
+        geometry.degenerate().iter().for_each(|entry| is_flagged[entry.query] = true);
+        doubts.iter().for_each(|&query| is_flagged[query] = true);
+        let mean_square = exact.iter().map(|t| t * t).sum::<f64>() / m as f64;
+        for query in 0..m {
+            let both = found[query * k..][..k].iter().zip(&exact[query * k..][..k]);
+            let error: f64 = both.map(|(found, exact)| (found - exact).powi(2)).sum();
+            self.n[operator] += 1;
+            self.n_unflagged[operator] += usize::from(!is_flagged[query]);
+            self.n_off[operator] += usize::from(!is_flagged[query] && error > 0.25 * mean_square);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Whether values need no description: rows of docs/error-bars.md.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../error_bars/jet.rs"]
+mod jet;
+#[path = "../error_bars/sampling.rs"]
+mod sampling;
+#[path = "../error_bars/shapes.rs"]
+mod shapes;
+
+mod features;
+mod fields;
+mod flags;
+mod posterior;
+mod sweep;
+
+use features::{Bands, Feature, Measured};
+use fields::{FIELDS, Field};
+use flags::{Asked, Counts, Request};
+use gramian_numerics::kernel::Family;
+use posterior::{By, Sensors};
+use rayon::prelude::*;
+use sampling::Sampling;
+use shapes::Shape;
+use sweep::{Case, NOISES, ON_SURFACE, QUANTITIES, Row};
+
+/// Closed ones and one with a rim.
+const SHAPES: [Shape; 5] = [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Wave];
+
+fn rows(n_points: usize) -> Vec<(Case, Row)> {
+    let of_field =
+        |shape, field| NOISES.map(|noise| Case { shape, sampling: Sampling::Random, field, n_points, noise });
+    let cases: Vec<Case> = SHAPES
+        .iter()
+        .flat_map(|&shape| FIELDS.iter().flat_map(move |&field| of_field(shape, field)))
+        .collect();
+    cases.into_par_iter().map(|case| (case, case.run(2))).collect()
+}
+
+#[test]
+fn fields_and_operators_have_bars_that_hold_and_few_are_off_without_a_flag() {
+    for n_points in [300, 500] {
+        let rows = rows(n_points);
+        // Errors of one cloud stand and fall together, so single rows of two clouds scatter by some per cent.
+        let n_short = rows.iter().filter(|(_, row)| {
+            let coverages = row.coverages();
+            ON_SURFACE.iter().any(|&quantity| coverages[quantity] < 85.0)
+        });
+        // A front of three spacings with noise that hides in it.
+        let n_short = n_short.filter(|(case, _)| case.field != Field::Front).count();
+        assert!(n_short <= 2, "{n_points}: {n_short} of {} rows", rows.len());
+        for quantity in ON_SURFACE {
+            let n_off: usize = rows.iter().map(|(_, row)| row.n_off[quantity]).sum();
+            let n: usize = rows.iter().map(|(_, row)| row.n_unflagged[quantity]).sum();
+            let name = QUANTITIES[quantity];
+            assert!(n > 10_000 && n_off * 200 <= n, "{n_points}: {name}: {n_off} of {n} off by half");
+        }
+    }
+}
+
+#[test]
+fn sensors_have_posteriors_whose_bands_cover() {
+    let mut cases = Vec::new();
+    for dimension in [1, 2, 3] {
+        for n_points in [30, 120, 300] {
+            for field in FIELDS {
+                for (noise, factor, offset) in [(0.0, 1.0, 0.0), (0.05, 1e-6, 1.0), (0.2, 1e6, -1e6)] {
+                    cases.push(Sensors { dimension, n_points, field, noise, factor, offset });
+                }
+            }
+        }
+    }
+    let rows: Vec<(&Sensors, f64)> = cases.par_iter().map(|sensors| (sensors, sensors.coverage(6))).collect();
+    let short: Vec<_> = rows.iter().filter(|(_, coverage)| *coverage < 88.0).collect();
+    // Thirty values of a field that they do not resolve.
+    assert!(short.len() * 20 <= rows.len(), "{short:?}");
+    assert!(short.iter().all(|(_, coverage)| *coverage > 70.0), "{short:?}");
+    let all = rows.iter().map(|(_, coverage)| coverage).sum::<f64>() / rows.len() as f64;
+    assert!((94.0..99.5).contains(&all), "{all}");
+}
+
+#[test]
+fn what_is_local_or_drowned_in_noise_is_learned() {
+    // From 256 values the bump was noise, 6 % of it covered; with noise beyond the field no kernel of less variance than the values was looked at.
+    let cases = [
+        (Feature::Bump(0.03), 2000, 0.01),
+        (Feature::Bump(0.05), 1000, 0.01),
+        (Feature::Bump(0.1), 1000, 0.01),
+        (Feature::Spot(0.1), 3000, 0.01),
+        (Feature::Spot(0.2), 3000, 0.01),
+        (Feature::Sine(3), 1000, 0.1),
+        (Feature::Sine(3), 300, 2.0),
+        (Feature::Sine(6), 300, 2.0),
+        (Feature::Draw(0.3), 1000, 1.0),
+        (Feature::Draw(0.1), 1000, 0.1),
+        (Feature::Clusters, 1000, 0.01),
+    ];
+    let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
+    let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
+    for (case, bands) in cases.iter().zip(bands) {
+        // Of ten seeds 86 to 98 % inside and 89 % and more all over; four scatter by some per cent. By
+        // likelihood alone 42 to 55 % were covered within the narrow bump and spot.
+        assert!(
+            bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
+            "{case:?}: {bands:?}"
+        );
+    }
+}
+
+#[test]
+fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
+    let smooth = [Family::Gauss, Family::InverseMultiquadric, Family::Laplace { epsilon: 1.0 }];
+    let rough = [Family::Matern { order: 1 }, Family::Matern { order: 2 }, Family::Matern { order: 4 }];
+    let families = smooth.into_iter().chain(rough);
+    let mut asked = vec![Asked::Nothing];
+    asked
+        .extend(families.flat_map(|family| {
+            [Asked::Family(family), Asked::Width(family, 0.3), Asked::Width(family, 3.0)]
+        }));
+    for noise in NOISES {
+        let mut requests = Vec::new();
+        for &asked in &asked {
+            for shape in [Shape::Sphere, Shape::Torus, Shape::Wave] {
+                for field in [Field::Low, Field::Mid, Field::Front] {
+                    requests.push(Request { asked, shape, field, n_points: 250, noise });
+                }
+            }
+        }
+        let counts: Vec<Counts> = requests.par_iter().map(|request| request.run(1)).collect();
+        let all = counts.iter().fold(Counts::default(), Counts::plus);
+        // Without judging, a tenth to nine tenths of the unflagged were off with noise.
+        for operator in [0, 1] {
+            assert!(
+                all.n_off[operator] * 100 <= all.n_unflagged[operator].max(100),
+                "noise {noise}: {all:?}"
+            );
+        }
+        // Flags that are always up say nothing: without noise a quarter of all is served without one, though a torus of 250 points has none.
+        assert!(noise > 0.0 || all.n_unflagged[1] * 5 > all.n[1], "{all:?}");
+    }
+}

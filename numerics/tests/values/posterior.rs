@@ -1,0 +1,171 @@
+//! How many true values lie within 95 % bands of a posterior of which nothing was said.
+
+#![allow(dead_code, reason = "the example prints what the test does not ask")]
+
+use std::sync::Arc;
+
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::function::posterior::variances_with_mean;
+use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::observer::Unobserved;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling as Spacings;
+use gramian_numerics::selection::{
+    Criterion, Hyperparameters, MAX_EVALUATIONS, Noise, Observed, Parameter, Selection, Variation, learn,
+    select,
+};
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::solver::{Solver, System};
+use gramian_numerics::sums::jets::JetOrder;
+use gramian_numerics::sums::regularization::Regularization;
+
+use crate::common::random::Random;
+use crate::fields::Field;
+
+const N_QUERIES: usize = 200;
+
+/// Sensors in a cube, on a square or along a line.
+#[derive(Debug, Clone, Copy)]
+pub struct Sensors {
+    pub dimension: usize,
+    pub n_points: usize,
+    pub field: Field,
+    /// Deviation of the noise over that of the field.
+    pub noise: f64,
+    pub factor: f64,
+    pub offset: f64,
+}
+
+/// By what kernel, noise and variance are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum By {
+    /// As a request has it that says nothing.
+    Default,
+    /// By a search of the best by a criterion, among the same families.
+    Criterion(Criterion),
+}
+
+/// What came of some draws.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Found {
+    /// Per cent of the true values within ±1.96 deviations.
+    pub coverage: f64,
+    /// Root mean square error over the spread of the field.
+    pub error: f64,
+}
+
+const FAMILIES: [Family; 3] = [Family::Matern { order: 2 }, Family::Matern { order: 4 }, Family::Gauss];
+
+impl Sensors {
+    /// Per cent of the true values within ±1.96 deviations, at random queries among the sensors, over some draws.
+    pub fn coverage(&self, n_draws: usize) -> f64 {
+        self.found(By::Default, n_draws).coverage
+    }
+
+    /// The same with the error.
+    pub fn found(&self, by: By, n_draws: usize) -> Found {
+        let (mut n_within, mut squares) = (0, 0.0);
+        for draw in 0..n_draws {
+            let (within, square) = self.draw(by, draw);
+            n_within += within;
+            squares += square;
+        }
+        let n = (n_draws * N_QUERIES) as f64;
+        Found { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
+    }
+
+    /// How many true values lie within the bars, and the squares of the errors over that of the spread.
+    fn draw(&self, by: By, draw: usize) -> (usize, f64) {
+        let mut random = Random((1000 * draw + self.n_points) as u64 + 1);
+        let d = self.dimension;
+        let mut places =
+            |n: usize| -> Vec<f64> { (0..n * d).map(|_| 2.0 * random.uniform() - 1.0).collect() };
+        let (points, queries) = (places(self.n_points), places(N_QUERIES));
+        let field =
+            |x: &[f64]| self.field.at(std::array::from_fn(|c| x.get(c).copied().unwrap_or(0.0))).value;
+        let exact: Vec<f64> = points.chunks_exact(d).map(field).collect();
+        let mean = exact.iter().sum::<f64>() / exact.len() as f64;
+        let spread = (exact.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / exact.len() as f64).sqrt();
+        let noisy = |f: &f64| self.offset + self.factor * (f + self.noise * spread * random.normal());
+        let values: Vec<f64> = exact.iter().map(noisy).collect();
+        let truth = queries.chunks_exact(d).map(|x| self.offset + self.factor * field(x));
+        let truth: Vec<f64> = truth.collect();
+        let (cloud, at) = (Arc::new(Cloud::new(points, d).unwrap()), Cloud::new(queries, d).unwrap());
+
+        let Posterior { means: found, variances, .. } = posterior(by, cloud, &values, &at);
+        let within = |((f, t), v): ((&f64, &f64), &f64)| (f - t).abs() <= 1.96 * v.sqrt();
+        let n_within = found.iter().zip(&truth).zip(&variances).filter(|&entry| within(entry)).count();
+        let unit = self.factor * spread;
+        (n_within, found.iter().zip(&truth).map(|(f, t)| ((f - t) / unit).powi(2)).sum())
+    }
+}
+
+/// What is said at queries.
+pub struct Posterior {
+    pub means: Vec<f64>,
+    /// Of the function.
+    pub variances: Vec<f64>,
+    /// Whether the values contradict it.
+    pub has_misfit: bool,
+}
+
+pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Posterior {
+    let Chosen { kernel, ratio, variance, has_place } = chosen(by, &cloud, values);
+    let alpha = Regularization::uniform(ratio).unwrap();
+    let solver = System::new(cloud, kernel, alpha).and_then(|system| Solver::dense(system, &Unobserved));
+    let u = Interpolant::fit_with_mean(Arc::new(solver.unwrap()), values, Mean::Constant, &Unobserved);
+    let u = u.unwrap();
+    let means = u.at(at, JetOrder::Value, &Unobserved).unwrap().values();
+    let trend = u.solution.trend.as_ref();
+    let variances = variances_with_mean(&u.solver, trend, at, &Unobserved).unwrap();
+    let has_misfit = has_place || u.solution.disagreement(values.len(), variance).is_some();
+    Posterior { means, variances: variances.scaled(variance).latent, has_misfit }
+}
+
+struct Chosen {
+    /// Of variance 1.
+    kernel: Kernel,
+    /// Of noise to variance.
+    ratio: f64,
+    variance: f64,
+    /// Whether the values of some place contradict it.
+    has_place: bool,
+}
+
+fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
+    let sampling = Spacings::of(cloud, &Unobserved).unwrap();
+    let (noise, mean) = (Noise::Unknown, Mean::Constant);
+    let learned = learn(Observed { cloud, sampling: &sampling, values, noise, mean }, &Unobserved).unwrap();
+    let By::Criterion(criterion) = by else {
+        let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
+        let has_place = learned.disagreement.is_some_and(|found| found.place.is_some());
+        return Chosen { kernel, ratio: learned.ratio, variance: learned.variance, has_place };
+    };
+    let kernel = Kernel::new(learned.family, learned.length_scale, learned.variance).unwrap();
+    let start = Hyperparameters::of(&kernel, Regularization::Uniform(learned.ratio * learned.variance));
+    let spacing = sampling.scales().spacing;
+    let free = |parameter, min: f64, max: f64| Variation { parameter, min, max };
+    let vary = [
+        free(Parameter::LengthScale, 0.625 * spacing, 80.0 * spacing),
+        free(Parameter::Variance, 1e-3 * learned.variance, 1e3 * learned.variance),
+        free(Parameter::Alpha, 1e-10 * learned.variance, 10.0 * learned.variance),
+    ];
+    let selection = Selection {
+        cloud,
+        values,
+        mean,
+        criterion,
+        start: &start,
+        vary: &vary,
+        families: &FAMILIES,
+        restarts: 1,
+        seed: 0,
+        max_evaluations: MAX_EVALUATIONS,
+    };
+    let found = select(&selection, &Unobserved).unwrap().hyperparameters;
+    let Regularization::Uniform(noise) = found.noise else { unreachable!("it was uniform") };
+    let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
+    // What a factorization of many points bears.
+    let ratio = (noise / found.variance).max(1e-10);
+    Chosen { kernel, ratio, variance: found.variance, has_place: false }
+}
