@@ -19,7 +19,7 @@ use axum::routing::get;
 use clap::Parser;
 use gramian::config::Config;
 use gramian::http::problem::Problem;
-use gramian::http::serve::app::App;
+use gramian::http::state::app::App;
 use gramian::http::wire::negotiation::{Coding, Format, Wanted};
 use gramian::http::wire::read::limits::ParseContext;
 use gramian::http::wire::read::parse::parse_json;

@@ -8,9 +8,9 @@ pub mod jobs;
 pub mod metrics;
 pub mod openapi;
 pub mod problem;
-pub mod reading;
 mod routes;
 pub mod serve;
+pub mod state;
 pub mod wire;
 
 use std::sync::Arc;
@@ -30,11 +30,11 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::config::Origins;
 use around::{authentication, middleware};
 use jobs::Runner;
-use routes::{
-    clouds, curvatures, estimate, interpolation, jobs as job_routes, kernels, laplace_beltrami,
-    model_selection, normals, pages, posterior, process, surface_gradient,
-};
-use serve::app::App;
+pub use routes::reading;
+use routes::surface::{curvatures, laplace_beltrami, normals, surface_gradient};
+use routes::values::{interpolation, model_selection, posterior};
+use routes::{clouds, estimate, jobs as job_routes, kernels, pages, process};
+use state::app::App;
 
 /// The service as one router, and what works on its jobs.
 pub fn router(app: Arc<App>) -> (Router, Runner) {

@@ -22,7 +22,7 @@ use axum::Router;
 use tokio::net::TcpListener;
 
 use crate::http::router;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use accept::{Acceptor, Connections, Door};
 use activity::Activity;
 use connection::Patience;

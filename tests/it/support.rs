@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 
 use clap::Parser;
 use gramian::config::Config;
-use gramian::http::serve::app::App;
+use gramian::http::state::app::App;
 use gramian::server::serve;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

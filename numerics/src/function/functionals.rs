@@ -206,7 +206,8 @@ pub(crate) fn deviations(
         let variance = |(column, functional): (&[f64], &JetFunctional)| {
             let explained = ColRef::from_slice(column).squared_norm_l2();
             let unexplained = of_mean.as_ref().map(|mean| {
-                let h = mean.unexplained_of(functional, queries.point(functional.query), column);
+                let on_mean = functional.on_mean(mean.basis, queries.point(functional.query));
+                let h = mean.unexplained(on_mean, column);
                 mean.product(&h, &h)
             });
             let variance = functional.prior_variance(kernel) - explained;

@@ -5,7 +5,6 @@
 
 use faer::{Mat, MatMut};
 
-use super::functionals::JetFunctional;
 use crate::error::NumericsError;
 use crate::machine::vector::dot;
 use crate::observer::Unobserved;
@@ -14,7 +13,7 @@ use crate::solver::trend::{Basis, Trend, solve_gram};
 
 /// The mean's part in variances.
 pub(super) struct MeanVariance<'a> {
-    basis: &'a Basis,
+    pub(super) basis: &'a Basis,
     /// `L⁻¹F`, one column for each function.
     whitened: Vec<f64>,
     /// `(FᵀWF)⁻¹`.
@@ -37,13 +36,14 @@ impl<'a> MeanVariance<'a> {
     }
 
     /// h of the value at a position, from the whitened covariances there.
-    pub(super) fn unexplained(&self, x: &[f64], column: &[f64]) -> Vec<f64> {
-        self.unexplained_of(&JetFunctional::value(0, x.len()), x, column)
+    pub(super) fn unexplained_at(&self, x: &[f64], column: &[f64]) -> Vec<f64> {
+        let mut functions = vec![0.0; self.basis.n_functions()];
+        self.basis.at(x, &mut functions);
+        self.unexplained(functions, column)
     }
 
-    /// h of a functional at a position.
-    pub(super) fn unexplained_of(&self, functional: &JetFunctional, x: &[f64], column: &[f64]) -> Vec<f64> {
-        let mut functions = functional.on_mean(self.basis, x);
+    /// h of a functional, from what it is on each function of the mean.
+    pub(super) fn unexplained(&self, mut functions: Vec<f64>, column: &[f64]) -> Vec<f64> {
         let whitened = self.whitened.chunks_exact(self.n_points);
         functions.iter_mut().zip(whitened).for_each(|(h, o)| *h -= dot(o, column));
         functions

@@ -93,7 +93,7 @@ pub fn variances_with_mean(
         let parts = columns.par_chunks_exact(n).enumerate().map(|(query, column)| {
             let explained = ColRef::from_slice(column).squared_norm_l2();
             let of_mean = of_mean.as_ref().map(|mean| {
-                let h = mean.unexplained(block.point(query), column);
+                let h = mean.unexplained_at(block.point(query), column);
                 mean.product(&h, &h)
             });
             (explained, of_mean.unwrap_or(0.0))
@@ -180,7 +180,7 @@ pub fn covariance_with_mean(
 fn add_mean(covariance: &mut [f64], mean: &MeanVariance<'_>, queries: &Cloud, v: MatRef<'_, f64>) {
     let m = queries.n_points();
     let at = |query: usize| {
-        mean.unexplained(queries.point(query), &v.col(query).iter().copied().collect::<Vec<_>>())
+        mean.unexplained_at(queries.point(query), &v.col(query).iter().copied().collect::<Vec<_>>())
     };
     let unexplained: Vec<Vec<f64>> = (0..m).into_par_iter().map(at).collect();
     covariance.par_chunks_exact_mut(m).enumerate().for_each(|(j, column)| {

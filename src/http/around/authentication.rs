@@ -12,7 +12,7 @@ use http_body_util::BodyExt;
 use crate::http::access::Entered;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::store::Owner;
 
 /// The name of the key that a request was made with, as an extension of its answer, for the log.

@@ -16,7 +16,7 @@ use super::span::RequestSpan;
 use super::transport;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
 use crate::store::key::CloudId;
 

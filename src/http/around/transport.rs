@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 
 /// What makes the head of an HTTP/1 request ambiguous: two programs may take it for two different requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

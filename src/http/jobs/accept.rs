@@ -8,15 +8,16 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 
+use super::Runner;
 use super::idempotency::{Known, fingerprint, key_of, known};
-use super::kept::SECONDS_UNTIL_COUNTED;
 use super::look::{JobView, view_of_here};
-use super::{Here, Runner};
 use crate::http::around::middleware::CLOUD_HEADER;
 use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
+use crate::http::state::jobs::Here;
+use crate::http::state::kept::SECONDS_UNTIL_COUNTED;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest};

@@ -10,12 +10,13 @@ use axum::response::{IntoResponse, Response};
 use futures_util::TryStreamExt;
 use tower::ServiceExt;
 
+use super::Runner;
 use super::run::Attempt;
-use super::{Here, Runner};
 use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
+use crate::http::state::jobs::Here;
 use crate::store::objects::jobs::{Answer, FoundRequest, JobResult, Outcome};
 use crate::store::objects::pieces::BrokenOff;
 use crate::store::objects::room::Room;

@@ -5,8 +5,8 @@ use axum::http::{HeaderMap, HeaderName};
 use super::look::{JobView, look};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
 use crate::http::serve::durable::unavailable;
+use crate::http::state::app::App;
 use crate::store::Owner;
 use crate::store::objects::jobs::{ClaimName, JobRequest, KeyHash};
 

@@ -8,12 +8,13 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::kept::is_older;
-use super::{Here, unknown_job};
+use super::unknown_job;
 use crate::http::compute::Snapshot;
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
 use crate::http::serve::durable::unavailable;
+use crate::http::state::app::App;
+use crate::http::state::jobs::Here;
+use crate::http::state::kept::is_older;
 use crate::store::Owner;
 use crate::store::objects::OwnerName;
 use crate::store::objects::jobs::{FoundResult, JobId, JobObjects, JobResult, Lease, Outcome};

@@ -7,7 +7,7 @@
 //! and half of them at most of one owner of several.
 //! A job that nobody works on, or whose process has ended, is anybody's (rounds.rs).
 //!
-//! BOUNDS (kept.rs). The number of kept jobs is bounded, and so are the bytes of their requests and results.
+//! BOUNDS (state/kept.rs). The number of kept jobs is bounded, and so are the bytes of their requests and results.
 //! When there are several owners, one may have half of each. An owner at its bound is refused. No kept result
 //! is dropped to make room, so no owner can push out the results of another, and no result is lost before it
 //! is fetched.
@@ -21,243 +21,26 @@
 mod accept;
 mod answer;
 mod idempotency;
-mod kept;
 mod look;
 mod rounds;
 mod run;
 
-use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
+use std::sync::Arc;
 
 use axum::Router;
-use tokio_util::sync::CancellationToken;
 
-use crate::http::compute::{Progress, Turns};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
-use crate::store::Owner;
-use crate::store::budget::{Budget, Reservation};
-use crate::store::objects::jobs::JobId;
-use crate::store::objects::room::Room;
-use crate::store::objects::{Objects, OwnerName, Unavailable};
+use crate::http::state::app::App;
 pub use accept::respond_async;
 pub use idempotency::IDEMPOTENCY_KEY;
-use kept::Kept;
 pub use look::{JobView, Status, find_known, look, look_until_ended, problem_of};
-
-/// The jobs of this process, and where all of them are.
-pub struct Jobs {
-    pub objects: Arc<Objects>,
-    here: Mutex<HashMap<JobId, Arc<Here>>>,
-    /// Bytes of kept requests and results. Without a store these are bytes of memory.
-    bytes: Budget,
-    kept: Kept,
-    turns: Arc<Turns>,
-    /// Jobs that may wait or run here, of all owners and of one.
-    most: usize,
-    most_of_owner: usize,
-    /// Who is told about jobs while they go on, one unit each.
-    followers: Budget,
-}
-
-/// A job that this process works on, or will.
-pub struct Here {
-    pub id: JobId,
-    pub owner: Owner,
-    /// The last attempt at it when it came here. One that is newer when its turn comes is another process's.
-    last: Option<(u32, SystemTime)>,
-    pub progress: Arc<Progress>,
-    /// Whether it has a turn in this process.
-    is_running: AtomicBool,
-    /// Whether its lease is in the store, so that each process says that it is running.
-    has_lease: AtomicBool,
-    cancelled: CancellationToken,
-    /// Cancelled when it is not here any more.
-    over: CancellationToken,
-}
 
 /// What works on jobs: the routes without deadline and keys.
 #[derive(Clone)]
 pub struct Runner {
     pub app: Arc<App>,
     pub routes: Router,
-}
-
-/// How many jobs wait, and how many run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Load {
-    pub n_waiting: usize,
-    pub n_running: usize,
-}
-
-/// How many jobs there may be, and of how many owners.
-pub struct JobLimits {
-    /// Bytes of kept requests and results, in the store or, without one, in memory.
-    pub n_bytes: usize,
-    pub max_kept: usize,
-    pub n_owners: usize,
-    pub n_threads: usize,
-    pub max_queue: usize,
-    pub max_followers: usize,
-}
-
-impl Jobs {
-    /// Jobs in the store, or, where there is none, in memory.
-    pub fn new(store: Option<Arc<Objects>>, limits: &JobLimits) -> Self {
-        let &JobLimits { n_owners, n_threads, .. } = limits;
-        let most = n_threads.saturating_add(limits.max_queue);
-        Self {
-            objects: store.unwrap_or_else(|| Arc::new(Objects::in_memory())),
-            here: Mutex::default(),
-            bytes: Budget::new(limits.n_bytes, n_owners),
-            kept: Kept::new(limits.max_kept, n_owners),
-            turns: Turns::of_owners(n_threads, n_owners),
-            most,
-            most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
-            followers: Budget::new(limits.max_followers, n_owners),
-        }
-    }
-
-    /// Those of this process.
-    pub fn load(&self) -> Load {
-        let here = self.here();
-        let n_running = here.values().filter(|job| job.is_running()).count();
-        Load { n_waiting: here.len() - n_running, n_running }
-    }
-
-    /// Bytes of jobs in memory.
-    pub fn n_bytes_in_memory(&self) -> usize {
-        if self.objects.in_memory_alone() { self.bytes.n_held() } else { 0 }
-    }
-
-    /// Bytes of jobs in the store, as far as this process knows.
-    pub fn n_bytes_in_store(&self) -> usize {
-        if self.objects.in_memory_alone() { 0 } else { self.bytes.n_held() }
-    }
-
-    /// Counts one more who is told about a job while it goes on, until what is returned is dropped; nothing if there are too many, of all
-    /// owners or of this one.
-    pub fn follow(&self, owner: Owner) -> Option<Reservation> {
-        self.followers.try_reserve(owner, 1)
-    }
-
-    /// Resolves once no job is here any more.
-    pub async fn all_left(&self) {
-        loop {
-            let Some(job) = self.here().values().next().cloned() else { return };
-            job.over.cancelled().await;
-        }
-    }
-
-    fn find(&self, id: JobId) -> Option<Arc<Here>> {
-        self.here().get(&id).cloned()
-    }
-
-    /// Makes a job one of this process, unless it is, or there are too many, of all owners or of this one.
-    fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<Here>> {
-        let mut here = self.here();
-        let n_of_owner = here.values().filter(|job| job.owner == owner).count();
-        if here.len() >= self.most || n_of_owner >= self.most_of_owner || here.contains_key(&id) {
-            return None;
-        }
-        let job = Arc::new(Here {
-            id,
-            owner,
-            last,
-            progress: Arc::default(),
-            is_running: AtomicBool::new(false),
-            has_lease: AtomicBool::new(false),
-            cancelled: CancellationToken::new(),
-            over: CancellationToken::new(),
-        });
-        here.insert(id, job.clone());
-        Some(job)
-    }
-
-    /// Jobs of an owner that wait for a turn in this process.
-    fn waiting_of(&self, owner: Owner) -> Vec<JobId> {
-        let here = self.here();
-        let waiting = here.values().filter(|job| job.owner == owner && !job.is_running());
-        waiting.map(|job| job.id).collect()
-    }
-
-    /// A job is not here any more.
-    fn remove(&self, job: &Here) {
-        self.here().remove(&job.id);
-        job.over.cancel();
-    }
-
-    /// Whether another job of an owner could begin at once.
-    fn has_turn(&self, owner: Owner) -> bool {
-        self.turns.has_one_for(owner)
-    }
-
-    /// Room for `n_bytes` of a job, if its owner may have as many.
-    fn room(&self, owner: Owner, n_bytes: usize) -> Option<Room> {
-        Room::of(&self.bytes, owner, n_bytes)
-    }
-
-    /// 413 for a result that there is no room for.
-    fn too_large(&self) -> Problem {
-        let limit = self.bytes.largest();
-        let detail = format!(
-            "at most {limit} bytes of jobs and their results are kept for a key, and this result does not fit beside those that are kept"
-        );
-        Problem::beyond(Slug::ProblemTooLarge, limit, detail)
-            .with_remedy("fetch results and delete their jobs, or ask for less")
-    }
-
-    /// Ends a job without a result, unless it has one or is unknown. Returns whether it was ended. Another
-    /// process that works on the job finds out when it renews its lease.
-    ///
-    /// # Errors
-    /// If the store does not answer.
-    pub async fn cancel(&self, owner: Owner, name: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
-        let is_cancelled = self.objects.cancel_job(name, id).await?;
-        if is_cancelled {
-            self.kept.end(id, owner, None);
-        }
-        if let Some(here) = self.find(id).filter(|_| is_cancelled) {
-            here.cancelled.cancel();
-        }
-        Ok(is_cancelled)
-    }
-
-    /// Resolves when a job of this process is not here any more; never for others.
-    pub async fn until_over(&self, id: JobId) {
-        match self.find(id) {
-            Some(here) => here.over.cancelled().await,
-            None => std::future::pending().await,
-        }
-    }
-
-    /// Deletes a job wherever it is. Returns whether it was known.
-    ///
-    /// # Errors
-    /// If the store does not answer.
-    pub async fn forget(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
-        let was_known = self.objects.delete_job(owner, id).await?;
-        self.kept.remove(id);
-        Ok(was_known)
-    }
-
-    #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
-    fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<Here>>> {
-        self.here.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Here {
-    fn is_running(&self) -> bool {
-        self.is_running.load(Ordering::Relaxed)
-    }
-
-    fn has_lease(&self) -> bool {
-        self.has_lease.load(Ordering::Relaxed)
-    }
 }
 
 /// 404 for a job that nobody knows.

@@ -8,8 +8,8 @@ use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::Runner;
-use super::kept::{KeptJob, SECONDS_UNTIL_COUNTED, is_older};
 use super::run::EXPIRING;
+use crate::http::state::kept::{KeptJob, SECONDS_UNTIL_COUNTED, is_older};
 use crate::store::Owner;
 use crate::store::objects::jobs::{JobId, JobObjects};
 use crate::store::objects::{OwnerName, Unavailable};
@@ -162,7 +162,7 @@ mod tests {
 
     use super::*;
     use crate::config::Config;
-    use crate::http::serve::app::App;
+    use crate::http::state::app::App;
     use crate::store::objects::Verb;
     use crate::store::objects::jobs::{Answer, JobRequest, JobResult, Outcome};
     use crate::store::objects::room::Room;

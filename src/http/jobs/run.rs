@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use super::Runner;
 use super::look::name_of;
-use super::{Here, Jobs, Runner};
+use crate::http::state::jobs::{Here, Jobs};
 use crate::store::objects::jobs::{JobObjects, Lease};
 use crate::store::objects::{OwnerName, Unavailable};
 

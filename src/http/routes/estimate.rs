@@ -10,25 +10,25 @@ use utoipa::openapi::schema::{AdditionalProperties, RefBuilder, Schema, SchemaTy
 use utoipa::openapi::{ObjectBuilder, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::curvatures::CurvaturesRequest;
-use super::interpolation::{InterpolationBatchRequest, InterpolationRequest};
-use super::laplace_beltrami::{
+use super::surface::curvatures::CurvaturesRequest;
+use super::surface::laplace_beltrami::{
     LaplaceBeltramiMatrixRequest, LaplaceBeltramiRequest, LaplaceBeltramiSparseMatrixRequest,
 };
-use super::model_selection::ModelSelectionRequest;
-use super::normals::NormalsRequest;
-use super::posterior::{PosteriorBatchRequest, PosteriorRequest};
-use super::surface_gradient::{
+use super::surface::normals::NormalsRequest;
+use super::surface::surface_gradient::{
     SurfaceGradientMatrixRequest, SurfaceGradientRequest, SurfaceGradientSparseMatrixRequest,
 };
+use super::values::interpolation::{InterpolationBatchRequest, InterpolationRequest};
+use super::values::model_selection::ModelSelectionRequest;
+use super::values::posterior::{PosteriorBatchRequest, PosteriorRequest};
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::fields::SolverUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::routes::clouds::CloudRequest;
-use crate::http::serve::app::App;
 use crate::http::serve::intake::{Intake, read_body};
 use crate::http::serve::operation::{self, Operation, REQUEST_FORMATS};
+use crate::http::state::app::App;
 use crate::http::wire::read::body::UnpackedBody;
 use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::without::WithOperation;

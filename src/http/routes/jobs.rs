@@ -18,8 +18,8 @@ use crate::http::jobs::{JobView, find_known, look, look_until_ended, problem_of,
 use crate::http::openapi::responses::{AnyJobProblems, JobProblems, JobResultProblems};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
 use crate::http::serve::durable::{SECONDS_UNTIL_BACK, unavailable};
+use crate::http::state::app::App;
 use crate::http::wire::write::encode::holding;
 use crate::http::wire::write::json::{self, Json};
 use crate::store::Owner;

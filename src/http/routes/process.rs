@@ -8,10 +8,11 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::gauges;
 use crate::http::metrics;
 use crate::http::openapi::responses::{ProbeProblems, ReadyProblems};
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::http::wire::write::json::Json;
 
 /// The state of the process.
@@ -88,7 +89,7 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
     security(())
 )]
 pub async fn get_metrics(State(app): State<Arc<App>>) -> Result<Response, Problem> {
-    let text = app.metrics.text(&app).map_err(|error| {
+    let text = gauges::gather(&app).and_then(|now| app.metrics.text(now)).map_err(|error| {
         tracing::error!(%error, "metrics cannot be written");
         Problem::internal()
     })?;

@@ -5,9 +5,9 @@ use std::sync::atomic::Ordering;
 
 use bytes::Bytes;
 
-use super::app::App;
 use super::plan::FitPlan;
 use crate::http::compute::Admission;
+use crate::http::state::app::App;
 use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
 use crate::store::objects::pieces::HASH_BYTES;
 use crate::store::objects::{Damaged, Unavailable};

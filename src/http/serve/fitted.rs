@@ -10,7 +10,7 @@ use crate::http::fields::{
     SurfaceUsed, Warning, WarningCode,
 };
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::http::wire::write::array::Array;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::PreparedFit;

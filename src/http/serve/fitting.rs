@@ -4,12 +4,12 @@ use std::sync::{Arc, OnceLock};
 
 use super::factors;
 use super::fitted::{Fits, Fitted};
-use super::plan::{Cost, FitFailure, FitModel, FitPlan};
+use super::plan::{Cost, FitModel, FitPlan};
 use super::report::Report;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
+use crate::http::state::app::{App, FitFailure};
 use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
@@ -206,7 +206,7 @@ impl Fitting<'_> {
                 *extent = Extent::AtMost;
                 Ok(None)
             }
-            Err(failure) => Err(failure.of(plan)),
+            Err(failure) => Err(plan.failed(failure)),
         }
     }
 
@@ -226,7 +226,7 @@ impl Fitting<'_> {
         if let Some(&times) = times.get() {
             report.made_surface(times);
         }
-        found.map_err(|failure| failure.of(&fitted.plan))
+        found.map_err(|failure| fitted.plan.failed(failure))
     }
 }
 

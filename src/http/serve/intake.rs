@@ -10,10 +10,11 @@ use tokio::time::{Instant, timeout_at};
 
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
+use crate::http::wire::compression::SMALLER_BODY;
 use crate::http::wire::negotiation::{Format, announced};
 use crate::http::wire::read::body::{RequestBody, UnpackedBody};
-use crate::http::wire::read::limits::{ParseContext, SMALLER_BODY};
+use crate::http::wire::read::limits::ParseContext;
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 use gramian_numerics::observer::Observer;

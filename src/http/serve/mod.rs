@@ -1,6 +1,5 @@
-//! How requests are served: what they share, and the way of each from its body to its answer.
+//! How requests are served: the way of each from its body to its answer.
 
-pub mod app;
 pub mod durable;
 pub mod factors;
 

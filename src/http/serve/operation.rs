@@ -21,7 +21,7 @@ use crate::http::compute::{Admission, JobObserver, Work, is_light};
 use crate::http::fields::{CloudRef, HasCloud};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::answer::Answer;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::http::fields::DuplicatePolicy;
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::{Pointers, Problem};
+use crate::http::state::app::FitFailure;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
@@ -390,6 +391,16 @@ impl FitPlan {
         }
         Problem::from_numerics(error, self.pointers)
     }
+
+    /// Why there is no factorization, with pointers into this request.
+    pub fn failed(&self, failure: FitFailure) -> Problem {
+        match failure {
+            FitFailure::Refused(error) => self.refused(error),
+            FitFailure::Broken(problem) => problem,
+            // Whoever is told so tries again with all of the memory.
+            FitFailure::NeedsAll => Problem::internal(),
+        }
+    }
 }
 
 /// What answering takes beside what the fits take.
@@ -407,26 +418,5 @@ impl Cost {
     /// Bytes of the answer as numbers, once more while it is put together, and of what leads to it.
     pub fn n_bytes(&self) -> usize {
         self.n_numbers.saturating_mul(2 * size_of::<f64>()).saturating_add(self.work.n_bytes)
-    }
-}
-
-/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
-#[derive(Debug, Clone)]
-pub enum FitFailure {
-    Refused(NumericsError),
-    Broken(Problem),
-    /// Cholesky has failed, and there was no memory for the fallback at that moment.
-    NeedsAll,
-}
-
-impl FitFailure {
-    /// The refusal, with pointers into the request that has this fit.
-    pub fn of(self, plan: &FitPlan) -> Problem {
-        match self {
-            Self::Refused(error) => plan.refused(error),
-            Self::Broken(problem) => problem,
-            // Whoever is told so tries again with all of the memory.
-            Self::NeedsAll => Problem::internal(),
-        }
     }
 }

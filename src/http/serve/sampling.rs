@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::app::App;
 use super::plan::PlannedFit;
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::{Pointers, Problem};
+use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::estimate_noise;

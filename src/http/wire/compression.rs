@@ -6,10 +6,13 @@ use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
 use super::negotiation::Coding;
-use super::read::limits::SMALLER_BODY;
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use gramian_numerics::observer::Observer;
+
+/// What to do about a body that is too large.
+pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
+     or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
 
 /// Levels for random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, 2 leaves 46 % at 127 MB/s, 6 as much at half the
 /// speed; zstd 1 leaves 42 % at 470 MB/s, 3 more at a third of the speed.

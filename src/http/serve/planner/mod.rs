@@ -11,7 +11,7 @@ use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{DuplicatePolicy, Fit, Geometry, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
-use crate::http::serve::app::App;
+use crate::http::state::app::App;
 use crate::http::wire::read::limits::too_many_dense_points;
 use crate::store::Owner;
 use crate::store::clouds::RegisteredCloud;

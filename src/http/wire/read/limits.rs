@@ -7,10 +7,6 @@ use crate::http::problem::slug::Slug;
 use gramian_numerics::observer::{Observer, Unobserved};
 use gramian_numerics::patches::MAX_SITES;
 
-/// What to do about a body that is too large.
-pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
-     or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
-
 /// The name by which a type asks to be read as lists of values, whatever the member is called.
 pub(super) const VALUE_LISTS: &str = "ValueLists";
 

@@ -70,6 +70,13 @@ impl Member for Array {
     }
 }
 
+impl Member for Integers {
+    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
+        parts.0.push((name, Part::Integers(self)));
+        Ok(())
+    }
+}
+
 impl<T: Serialize> Member for Vec<T> {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
         parts.add_json(name, &self)
@@ -128,10 +135,6 @@ impl Parts {
         let text = json::to_vec(value).map_err(|_| beyond_float64())?;
         self.0.push((name, Part::Json(text)));
         Ok(())
-    }
-
-    pub(super) fn add_integers(&mut self, name: &'static str, numbers: Integers) {
-        self.0.push((name, Part::Integers(numbers)));
     }
 
     /// The body in pieces.

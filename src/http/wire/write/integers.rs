@@ -3,9 +3,6 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::answer::{Member, Parts};
-use crate::http::problem::Problem;
-
 /// A list of whole numbers: JSON numbers without a point, or an I64 tensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
@@ -30,13 +27,6 @@ impl Integers {
             self.0.iter_mut().for_each(|x| *x = x.to_le());
         }
         Bytes::from_owner(Raw(self.0))
-    }
-}
-
-impl Member for Integers {
-    fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
-        parts.add_integers(name, self);
-        Ok(())
     }
 }
 

@@ -14,10 +14,10 @@ use crate::store::budget::Reservation;
 use crate::store::objects::jobs::JobId;
 
 /// Seconds after which a refused client may try again. By then the jobs of its owner have been listed anew.
-pub(super) const SECONDS_UNTIL_COUNTED: u64 = 5;
+pub const SECONDS_UNTIL_COUNTED: u64 = 5;
 
 /// Kept jobs by their ids, with the most that all owners and one owner may have.
-pub(super) struct Kept {
+pub struct Kept {
     most: usize,
     most_of_owner: usize,
     table: Mutex<Table>,
@@ -31,11 +31,11 @@ struct Table {
 }
 
 /// A kept job.
-pub(super) struct KeptJob {
-    pub(super) owner: Owner,
-    pub(super) ended_at: Option<SystemTime>,
+pub struct KeptJob {
+    pub owner: Owner,
+    pub ended_at: Option<SystemTime>,
     /// Reserved bytes of the store. Objects in memory hold their reservation themselves.
-    pub(super) bytes: Option<Reservation>,
+    pub bytes: Option<Reservation>,
 }
 
 impl KeptJob {
@@ -48,7 +48,7 @@ impl KeptJob {
 }
 
 impl Kept {
-    pub(super) fn new(most: usize, n_owners: usize) -> Self {
+    pub fn new(most: usize, n_owners: usize) -> Self {
         let most_of_owner = if n_owners > 1 { most.div_ceil(2) } else { most };
         Self { most, most_of_owner, table: Mutex::default() }
     }
@@ -57,7 +57,7 @@ impl Kept {
     ///
     /// # Errors
     /// 503 if all owners, or this one, have as many jobs as they may.
-    pub(super) fn add(&self, id: JobId, owner: Owner) -> Result<(), Problem> {
+    pub fn add(&self, id: JobId, owner: Owner) -> Result<(), Problem> {
         let mut table = self.table();
         let n_of_owner = table.jobs.values().filter(|job| job.owner == owner).count();
         let (n, whose) = match (n_of_owner >= self.most_of_owner, table.jobs.len() >= self.most) {
@@ -74,26 +74,26 @@ impl Kept {
     }
 
     /// Refuses a job with 503 and the remedy, and notes that the owner's jobs are to be listed again.
-    pub(super) fn refused(&self, owner: Owner, reason: &str) -> Problem {
+    pub fn refused(&self, owner: Owner, reason: &str) -> Problem {
         self.table().refused.insert(owner);
         let remedy = format!("{reason}: fetch results and delete their jobs");
         Problem::unavailable(&remedy, SECONDS_UNTIL_COUNTED)
     }
 
     /// Takes the owners that were refused since the last call.
-    pub(super) fn take_refused(&self) -> HashSet<Owner> {
+    pub fn take_refused(&self) -> HashSet<Owner> {
         std::mem::take(&mut self.table().refused)
     }
 
     /// Adds a reservation to that of a job.
-    pub(super) fn pay(&self, id: JobId, bytes: Option<Reservation>) {
+    pub fn pay(&self, id: JobId, bytes: Option<Reservation>) {
         if let Some(job) = self.table().jobs.get_mut(&id) {
             job.pay(bytes);
         }
     }
 
     /// Notes that a job ended now, and adds the reservation of its result.
-    pub(super) fn end(&self, id: JobId, owner: Owner, bytes: Option<Reservation>) {
+    pub fn end(&self, id: JobId, owner: Owner, bytes: Option<Reservation>) {
         let mut table = self.table();
         let job = table.jobs.entry(id).or_insert(KeptJob { owner, ended_at: None, bytes: None });
         job.ended_at = Some(SystemTime::now());
@@ -101,22 +101,22 @@ impl Kept {
     }
 
     /// Replaces the entry of a job by what was found in the store.
-    pub(super) fn put(&self, id: JobId, job: KeptJob) {
+    pub fn put(&self, id: JobId, job: KeptJob) {
         self.table().jobs.insert(id, job);
     }
 
-    pub(super) fn remove(&self, id: JobId) {
+    pub fn remove(&self, id: JobId) {
         self.table().jobs.remove(&id);
     }
 
     /// Ids of the jobs of an owner.
-    pub(super) fn of(&self, owner: Owner) -> HashSet<JobId> {
+    pub fn of(&self, owner: Owner) -> HashSet<JobId> {
         let table = self.table();
         table.jobs.iter().filter(|(_, job)| job.owner == owner).map(|(&id, _)| id).collect()
     }
 
     /// Ids and owners of the jobs that ended longer than `kept` ago.
-    pub(super) fn older_than(&self, kept: Duration) -> Vec<(JobId, Owner)> {
+    pub fn older_than(&self, kept: Duration) -> Vec<(JobId, Owner)> {
         let now = SystemTime::now();
         let is_old = |job: &KeptJob| is_older(job.ended_at, kept, now);
         let table = self.table();
@@ -130,6 +130,6 @@ impl Kept {
 }
 
 /// Returns whether `ended_at` is longer than `kept` before `now`.
-pub(super) fn is_older(ended_at: Option<SystemTime>, kept: Duration, now: SystemTime) -> bool {
+pub fn is_older(ended_at: Option<SystemTime>, kept: Duration, now: SystemTime) -> bool {
     ended_at.is_some_and(|ended_at| now.duration_since(ended_at).is_ok_and(|age| age > kept))
 }

@@ -1,10 +1,10 @@
 //! Bodies as requests, without a service: for programs that try to break the reading of them (fuzz/).
 
-use super::problem::Problem;
-use super::routes::estimate;
-use super::wire::negotiation::{Coding, Format};
-use super::wire::read::body::RequestBody;
-use super::wire::read::limits::ParseContext;
+use super::estimate;
+use crate::http::problem::Problem;
+use crate::http::wire::negotiation::{Coding, Format};
+use crate::http::wire::read::body::RequestBody;
+use crate::http::wire::read::limits::ParseContext;
 use gramian_numerics::observer::Unobserved;
 
 /// Operations that compute, by name; every other name is the registration of a cloud.

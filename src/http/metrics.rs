@@ -1,22 +1,19 @@
-//! What the service does, in numbers for Prometheus: counted as it happens (here), or read when they are asked for (gauges.rs).
+//! What the service does, in numbers for Prometheus: counted as it happens (here), or read when they are asked for (routes/gauges.rs).
 //!
 //! Names and labels are an interface like any other: dashboards and alerts are built on them, `docs/operations.md` lists them. No label
 //! takes what clients send: routes are those of the router, methods those of HTTP.
 
-mod gauges;
-
 use std::time::Duration;
 
 use axum::http::{Method, StatusCode};
+use prometheus::proto::MetricFamily;
 use prometheus::{
     Encoder, Error, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry,
     TextEncoder,
 };
 
 use super::problem::slug::Slug;
-use crate::http::serve::app::App;
 use crate::store::objects::jobs::Outcome;
-use gauges::Gauges;
 
 /// The media type of [`Metrics::text`].
 pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
@@ -42,7 +39,6 @@ pub struct Metrics {
     cache_requests: IntCounterVec,
     solvers: IntCounterVec,
     jobs: IntCounterVec,
-    gauges: Gauges,
 }
 
 impl Metrics {
@@ -85,7 +81,6 @@ impl Metrics {
             )?,
             solvers: counters("gramian_solvers_prepared_total", "Solvers made ready, by kind", &["kind"])?,
             jobs: counters("gramian_jobs_ended_total", "Jobs that ended, by how", &["outcome"])?,
-            gauges: Gauges::new(&registry)?,
             registry,
         };
         metrics.begin_at_zero();
@@ -151,14 +146,14 @@ impl Metrics {
         self.jobs.with_label_values(&[outcome]).inc();
     }
 
-    /// All of it in the text format of Prometheus, version 0.0.4, with what holds now.
+    /// All of it in the text format of Prometheus, version 0.0.4, after what others read.
     ///
     /// # Errors
     /// None but for a family without a name.
-    pub fn text(&self, app: &App) -> Result<Vec<u8>, Error> {
-        self.gauges.read(app);
+    pub fn text(&self, mut families: Vec<MetricFamily>) -> Result<Vec<u8>, Error> {
+        families.extend(self.registry.gather());
         let mut text = Vec::new();
-        TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
+        TextEncoder::new().encode(&families, &mut text)?;
         Ok(text)
     }
 }

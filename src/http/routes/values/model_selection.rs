@@ -15,11 +15,11 @@ use crate::http::fields::{Diagnostics, DuplicatePolicy, Fit, KernelFamily, Kerne
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::state::app::App;
 use crate::http::wire::read::members::{present, present_word, present_words, word};
 use crate::http::wire::write::answer::{Member, Parts, answer};
 use crate::http::wire::write::array::Array;

@@ -6,20 +6,20 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::doubts::degenerate;
-use super::surfaces::{
+use super::common::{
     Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
 };
+use super::doubts::degenerate;
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
 };
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
+use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
 use crate::http::wire::read::members::{present, present_object, present_word, present_words};
 use crate::http::wire::read::points::Points;

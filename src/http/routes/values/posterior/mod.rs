@@ -15,10 +15,10 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, request};
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
+use crate::http::state::app::App;
 use crate::http::wire::read::members::{
     present, present_object, present_unless_empty, present_word, present_words,
 };

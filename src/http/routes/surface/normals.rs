@@ -6,17 +6,17 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::surfaces::{GeometryWork, geometry_request, plan_geometry};
+use super::common::{GeometryWork, geometry_request, plan_geometry};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     Degenerate, Diagnostics, Fit, GeometryInclude, OrientationChoice, SurfaceChoice, SurfaceUsed, request,
 };
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
-use crate::http::serve::app::App;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
+use crate::http::state::app::App;
 use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;

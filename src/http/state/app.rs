@@ -6,11 +6,10 @@ use std::sync::atomic::AtomicUsize;
 use tokio_util::sync::CancellationToken;
 
 use super::durable::Durable;
-use super::plan::FitFailure;
+use super::jobs::{JobLimits, Jobs};
 use crate::config::Config;
 use crate::http::access::Keys;
 use crate::http::compute::Compute;
-use crate::http::jobs::{JobLimits, Jobs};
 use crate::http::metrics::Metrics;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
@@ -20,6 +19,7 @@ use crate::store::budget::{BeyondBudget, Budget, Reservation};
 use crate::store::clouds::CloudStore;
 use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
+use gramian_numerics::error::NumericsError;
 
 /// Why the service does not start.
 #[derive(Debug, thiserror::Error)]
@@ -32,6 +32,15 @@ pub enum StartError {
     Metrics(#[from] prometheus::Error),
     #[error("the threads cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
+#[derive(Debug, Clone)]
+pub enum FitFailure {
+    Refused(NumericsError),
+    Broken(Problem),
+    /// Cholesky has failed, and there was no memory for the fallback at that moment.
+    NeedsAll,
 }
 
 /// Configuration, stores and compute pool.

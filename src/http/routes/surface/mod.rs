@@ -1,0 +1,8 @@
+//! Resources of a surface: normals, curvatures, and operators on values over it.
+
+mod common;
+pub mod curvatures;
+mod doubts;
+pub mod laplace_beltrami;
+pub mod normals;
+pub mod surface_gradient;

@@ -1,0 +1,75 @@
+//! The store that outlives the process, and how far it is behind what was acknowledged.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tokio::sync::Notify;
+
+use crate::store::objects::{Objects, Place, Retention};
+
+/// The store, and whether it takes what it is given.
+pub struct Durable {
+    pub objects: Arc<Objects>,
+    /// Clouds that it did not take, and how many of them it has been offered again since.
+    pub n_refused: AtomicU64,
+    pub n_made_up: AtomicU64,
+    /// What the last sweep found, and what was written since.
+    pub n_clouds: AtomicU64,
+    pub n_bytes: AtomicU64,
+    pub n_factor_bytes: AtomicU64,
+    pub is_full: Notify,
+    /// Held while a factor is written.
+    pub writing_factor: tokio::sync::Mutex<()>,
+}
+
+impl Durable {
+    /// # Errors
+    /// Says what is wrong with the place.
+    pub async fn open(place: &Place) -> Result<Self, String> {
+        let variables = std::env::vars_os();
+        let variables =
+            variables.filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+        let objects = Objects::open(place, variables).await?;
+        Ok(Self {
+            objects: Arc::new(objects),
+            n_refused: AtomicU64::new(0),
+            n_made_up: AtomicU64::new(0),
+            n_clouds: AtomicU64::new(0),
+            n_bytes: AtomicU64::new(0),
+            n_factor_bytes: AtomicU64::new(0),
+            is_full: Notify::new(),
+            writing_factor: tokio::sync::Mutex::default(),
+        })
+    }
+
+    /// Whether all that was acknowledged outlives the process.
+    pub fn is_up_to_date(&self) -> bool {
+        self.n_made_up.load(Ordering::Acquire) == self.n_refused.load(Ordering::Acquire)
+    }
+
+    /// Bytes of factors in the store, about.
+    pub fn factor_bytes(&self) -> u64 {
+        self.n_factor_bytes.load(Ordering::Relaxed)
+    }
+
+    /// How many clouds the store has, and bytes of them, about.
+    pub fn size(&self) -> (u64, u64) {
+        (self.n_clouds.load(Ordering::Relaxed), self.n_bytes.load(Ordering::Relaxed))
+    }
+
+    pub fn grew_by(&self, n_bytes: u64, limits: Retention) {
+        self.n_clouds.fetch_add(1, Ordering::Relaxed);
+        let n_bytes = n_bytes + self.n_bytes.fetch_add(n_bytes, Ordering::Relaxed);
+        if limits.n_bytes.is_some_and(|most| n_bytes > most) {
+            self.is_full.notify_one();
+        }
+    }
+
+    pub fn fell_behind(&self, reason: &dyn std::fmt::Display) {
+        let was_up_to_date = self.is_up_to_date();
+        self.n_refused.fetch_add(1, Ordering::AcqRel);
+        if was_up_to_date {
+            tracing::error!(%reason, "clouds are kept in memory alone until the store takes them");
+        }
+    }
+}

@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Holds the sources to the shape that ARCHITECTURE.md promises, and names every place that departs from it.
+
+- No circles: what stands side by side in a folder, files and whole folders, knows one another in one direction only. The front of
+  a folder (mod.rs, lib.rs, __init__.py) speaks for all that it holds, so what it holds may know it.
+- At most 12 doors a folder: what stands in it beside its own front (mod.rs, lib.rs, __init__.py) and tests.
+- No function of Rust longer than 80 lines, no line of comments wider than 110 columns.
+
+Reads imports as text, which suffices for code that rustfmt has laid out. Tests, generated code and the clients in other languages
+are left out. Needs nothing but the standard library.
+"""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CRATES = {"gramian": ROOT / "src", "gramian_numerics": ROOT / "numerics/src"}
+PACKAGE = ROOT / "sdk/python/src/gramian"
+MAX_DOORS = 12
+MAX_FUNCTION_LINES = 80
+MAX_COLUMNS = 110
+FRONTS = {"mod.rs", "lib.rs", "main.rs", "__init__.py", "py.typed"}
+TEST = re.compile(r"(^|/)(tests|interleavings|testing)(/|\.rs$)|_tests\.rs$")
+
+
+def main():
+    rust = {module: path for name, folder in CRATES.items() for module, path in modules(name, folder).items()}
+    python = {module: path for module, path in python_modules().items()}
+    arrows = {path: uses(module, path, rust) for module, path in rust.items()}
+    arrows |= {path: imports(module, path, python) for module, path in python.items()}
+    found = [f"circle: {' → '.join(map(name, way))}" for way in circles(arrows)]
+    found += [f"{name(folder)} has {n} doors, over {MAX_DOORS}" for folder, n in doors() if n > MAX_DOORS]
+    for path in tracked(".rs"):
+        found += long_functions(path)
+    for path in [*tracked(".rs"), *tracked(".py"), *tracked(".sh")]:
+        found += wide_comments(path)
+    print("\n".join(found) or f"{len(arrows)} files: no circles, no crowded folders, no long functions, no wide comments")
+    sys.exit(bool(found))
+
+
+def name(path):
+    """A path as people say it."""
+    return str(path.relative_to(ROOT))
+
+
+def tracked(suffix):
+    """Files under version control that people wrote."""
+    listed = subprocess.run(["git", "ls-files", f"*{suffix}"], cwd=ROOT, capture_output=True, text=True, check=True)
+    paths = [path for path in listed.stdout.split() if "/rest/" not in path and "generated" not in path]
+    return [ROOT / path for path in paths]
+
+
+# Modules of Rust, and what they use.
+
+
+def modules(crate, folder):
+    """Files of a crate by the paths of their modules, `("gramian", "http", "wire")`."""
+    found = {}
+    for path in sorted(folder.rglob("*.rs")):
+        parts = path.relative_to(folder).with_suffix("").parts
+        if TEST.search(name(path)) or parts == ("main",):
+            continue
+        found[(crate, *(parts[:-1] if parts[-1] in ("mod", "lib") else parts))] = path
+    return found
+
+
+def uses(module, path, rust):
+    """Files that a file of Rust names, in `use` or in a path."""
+    text = without_tests(path.read_text())
+    named = set()
+    for statement in re.findall(r"^\s*(?:pub(?:\([^)]*\))? )?use ([^;]+);", text, re.M):
+        named.update(unfolded(re.sub(r"\s+", "", statement)))
+    code = re.sub(r"^\s*(?:pub(?:\([^)]*\))? )?use [^;]+;", "", text, flags=re.M)
+    named.update(tuple(found.split("::")) for found in re.findall(r"\b[a-z_]\w*(?:::\w+)+", code))
+    targets = (resolved(module, steps, rust) for steps in named)
+    return {target for target in targets if target and target != path}
+
+
+def without_tests(text):
+    """A file without its comments and its module of tests."""
+    return re.sub(r"//.*", "", text.split("#[cfg(test)]\nmod tests {")[0])
+
+
+def unfolded(statement):
+    """The paths of a `use`: `a::{b,c::{d,e}}` has three."""
+    head, brace, rest = statement.partition("{")
+    if not brace:
+        return {tuple(head.removesuffix("::*").split("::"))}
+    prefix = tuple(part for part in head.split("::") if part)
+    return {prefix + steps for part in split_commas(rest[:-1]) for steps in unfolded(part)}
+
+
+def split_commas(text):
+    """Splits at the commas outside braces."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character == "{") - (character == "}")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part for part in parts if part]
+
+
+def resolved(module, steps, rust):
+    """The file of the longest beginning of a path that is a module."""
+    base = module
+    if steps[0] in ("crate", "self", "super"):
+        base = module[:1] if steps[0] == "crate" else module
+        steps = steps[1:] if steps[0] != "super" else steps
+        while steps and steps[0] == "super":
+            base, steps = base[:-1], steps[1:]
+    elif steps[0] in CRATES:
+        base, steps = steps[:1], steps[1:]
+    elif (*module, steps[0]) not in rust:
+        return None
+    full = (*base, *(step for step in steps if step != "self"))
+    while full and full not in rust:
+        full = full[:-1]
+    return rust.get(full)
+
+
+def long_functions(path):
+    """Functions over the limit, from `fn` to the brace that closes it."""
+    if TEST.search(name(path)) or "/tests/" in name(path):
+        return
+    lines = path.read_text().splitlines()
+    for start, line in enumerate(lines):
+        opening = re.match(r"( *)(?:pub(?:\([^)]*\))? )?(?:const )?(?:async )?fn (\w+)", line)
+        if not opening or line.rstrip().endswith(("}", ";")):
+            continue
+        end = next((i for i in range(start, len(lines)) if re.fullmatch(opening[1] + r"}|.*;$", lines[i]) and
+                    lines[i].startswith(opening[1] + "}")), start)
+        if end - start + 1 > MAX_FUNCTION_LINES:
+            yield f"{name(path)}:{start + 1} {opening[2]} has {end - start + 1} lines, over {MAX_FUNCTION_LINES}"
+
+
+def wide_comments(path):
+    """Lines of comments over the limit."""
+    marks = ("//",) if path.suffix == ".rs" else ("#",)
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if line.lstrip().startswith(marks) and len(line) > MAX_COLUMNS:
+            yield f"{name(path)}:{number} is a comment of {len(line)} columns, over {MAX_COLUMNS}"
+
+
+# Modules of Python, and what they import.
+
+
+def python_modules():
+    """Files of the package by the paths of their modules."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        if "rest" not in parts:
+            found[parts[:-1] if parts[-1] == "__init__" else parts] = path
+    return found
+
+
+def imports(module, path, python):
+    """Files that a file of Python imports."""
+    folder = module if path.name == "__init__.py" else module[:-1]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            base = folder[: len(folder) + 1 - node.level] if node.level else ()
+            base += tuple(node.module.split(".")) if node.module else ()
+            found.update(python.get((*base, alias.name)) or python.get(base) for alias in node.names)
+    return found - {None, path}
+
+
+# Graphs.
+
+
+def circles(arrows):
+    """The circles among what stands in one folder, one for each set of places that reach one another."""
+    for folder in folders():
+        beside = {}
+        for path, targets in arrows.items():
+            for target in targets:
+                ends = [entry(folder, end) for end in (path, target)]
+                if None not in ends and ends[0] != ends[1]:
+                    beside.setdefault(ends[0], set()).add(ends[1])
+        seen = set()
+        for start in beside:
+            way = None if start in seen else way_round(start, beside)
+            if way:
+                seen.update(way)
+                yield [*way, start]
+
+
+def way_round(start, arrows):
+    """The shortest way from a place back to itself."""
+    came, queue = {}, [start]
+    for place in queue:
+        for target in sorted(arrows.get(place, ())):
+            if target == start:
+                way = [place]
+                while way[0] != start:
+                    way.insert(0, came[way[0]])
+                return way
+            if target not in came:
+                came[target] = place
+                queue.append(target)
+    return None
+
+
+def entry(folder, path):
+    """What stands in a folder and is or holds a file; none for the front of the folder."""
+    if folder not in path.parents or (path.parent == folder and path.name in FRONTS):
+        return None
+    first = folder / path.relative_to(folder).parts[0]
+    return first.with_suffix("") if first.suffix == ".rs" else first
+
+
+def folders():
+    """All folders of sources."""
+    roots = [*CRATES.values(), PACKAGE]
+    below = [path for root in roots for path in root.rglob("*") if path.is_dir()]
+    return [path for path in [*roots, *below] if not {"rest", "__pycache__"} & set(path.parts)]
+
+
+def doors():
+    """How much stands in each folder; a file and the folder of its name are one door."""
+    for folder in folders():
+        inside = [path for path in folder.iterdir() if path.name not in {*FRONTS, "__pycache__", "rest"}]
+        yield folder, len({path.with_suffix("") for path in inside if not TEST.search(name(path))})
+
+
+if __name__ == "__main__":
+    main()
