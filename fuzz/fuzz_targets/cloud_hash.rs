@@ -35,6 +35,6 @@ fuzz_target!(|input: (u8, Vec<f64>, Option<Vec<f64>>, u8)| {
     let store = CloudStore::<()>::new(1 << 24);
     let (registered, _) = store.register(Owner(0), cloud, normals);
     assert_eq!(registered.id, id);
-    let restored = decode(id, &encode(&registered).concat()).expect("it is what was written");
-    assert_eq!(restored.cloud.coordinates(), registered.cloud.coordinates());
+    let restored = decode(id, &encode(registered.stored()).concat()).expect("it is what was written");
+    assert_eq!(restored.points.coordinates(), registered.cloud.coordinates());
 });

@@ -1,6 +1,4 @@
-//! The one error type of the numerical layer.
-
-use super::solver::kind::{Quantity, SolverKind};
+//! The one error type of the numerical layer, and the words in which it refuses.
 
 /// What the numerics refuses, named by its cause, with the index of the offending point where there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -77,4 +75,26 @@ pub enum NotDefinite {
     Singular { reciprocal_condition: f64 },
     #[error("the variance at query {query} is {variance:.1e}, beyond rounding")]
     NegativeVariance { query: usize, variance: f64 },
+}
+
+/// The solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SolverKind {
+    /// A factorization of the whole matrix.
+    Dense,
+    /// The nearest points of each query.
+    Local,
+}
+
+/// What a solver is asked for, where not every solver has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// The diagonal of `(K + αI)⁻¹`.
+    InverseDiagonal,
+    /// A matrix with a column for each point.
+    DenseMatrix,
+    /// Values at queries, which it has no weights for.
+    Values,
+    /// Normals and curvatures in this dimension.
+    Geometry,
 }

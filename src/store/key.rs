@@ -3,9 +3,9 @@
 use std::fmt;
 
 use super::Owner;
+use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::kind::SolverKind;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 

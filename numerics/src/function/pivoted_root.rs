@@ -6,8 +6,8 @@ use faer::prelude::ReborrowMut;
 use faer::{Accum, MatMut};
 
 use crate::error::NumericsError;
+use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
-use crate::solver::parallelism;
 
 /// Columns between two updates of the rest, and two looks at the observer.
 const COLUMNS_PER_BLOCK: usize = 64;

@@ -8,10 +8,11 @@ use rayon::prelude::*;
 
 use super::mean_variance::MeanVariance;
 use crate::error::{NotDefinite, NumericsError};
+use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
-use crate::solver::{Solution, Solver, parallelism};
+use crate::solver::{Solution, Solver};
 use crate::sums::gram::{fill_cross_gram, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;

@@ -6,9 +6,9 @@ use faer::{Accum, MatMut, MatRef};
 use super::pivoted_root::PivotedRoot;
 use super::posterior::Covariance;
 use crate::error::NumericsError;
+use crate::machine::parallelism::parallelism;
 use crate::machine::random::Random;
 use crate::observer::{Observer, Stage};
-use crate::solver::parallelism;
 
 /// Variances below this multiple of ε, the queries and the prior variance are rounding of the covariance.
 const ROUNDING: f64 = 64.0;

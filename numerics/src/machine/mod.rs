@@ -7,6 +7,7 @@ pub mod pages;
 
 pub(crate) mod eigen;
 pub(crate) mod exp;
+pub(crate) mod parallelism;
 pub(crate) mod random;
 pub(crate) mod registers;
 pub(crate) mod small;

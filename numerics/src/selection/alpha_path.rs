@@ -19,10 +19,10 @@ use super::spectrum::Spectrum;
 use super::subject::Subject;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
+use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
-use crate::solver::parallelism;
 use crate::solver::trend::{Mean, solve_gram};
 use crate::sums::regularization::Regularization;
 

@@ -11,10 +11,11 @@ use rayon::prelude::*;
 
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
+use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::{estimate_norm1, factorize_in_place, parallelism};
+use crate::solver::{estimate_norm1, factorize_in_place};
 use crate::sums::gram::{fill_kernel_column, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;

@@ -10,10 +10,10 @@ use super::learning::remove_mean;
 use super::subject::Subject;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
+use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
-use crate::solver::parallelism;
 use crate::sums::gram::fill_lower_gram;
 use crate::sums::regularization::Regularization;
 

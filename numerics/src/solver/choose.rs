@@ -11,7 +11,7 @@ use geometry::{
 };
 
 use super::dense::Dense;
-use super::kind::SolverKind;
+use crate::error::SolverKind;
 use crate::points::monomials::n_stencil_nodes;
 use crate::points::noise::{DEGREES_OF_FREEDOM, MAX_SITES};
 use crate::points::quadric::{n_coefficients, n_quadric_neighbours};

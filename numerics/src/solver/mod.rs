@@ -1,7 +1,6 @@
 //! `(K + αI) Λ = Y`: a system made ready, so that weights for values are cheap, and what else it can.
 
 pub mod choose;
-pub mod kind;
 pub mod system;
 pub mod trend;
 
@@ -15,7 +14,7 @@ use std::sync::Arc;
 
 use faer::MatMut;
 
-use super::error::{NotDefinite, NumericsError};
+use super::error::{NotDefinite, NumericsError, Quantity, SolverKind};
 use super::kernel::Kernel;
 use super::machine::pages::SpareBuffer;
 use super::observer::Observer;
@@ -25,9 +24,7 @@ use super::sums::regularization::Regularization;
 pub(crate) use condition::estimate_norm1;
 use dense::Dense;
 pub(crate) use dense::factorize_in_place;
-pub(crate) use dense::parallelism;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
-use kind::{Quantity, SolverKind};
 pub use residuals::{Disagreement, Outlier, Place};
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;

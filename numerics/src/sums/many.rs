@@ -7,9 +7,9 @@ use super::gram::fill_cross_gram;
 use super::nodes::Nodes;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
+use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::parallelism;
 
 /// Queries whose kernel values are held at once.
 pub(crate) const QUERIES_PER_BLOCK: usize = 256;

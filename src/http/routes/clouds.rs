@@ -97,17 +97,9 @@ pub struct Cloud {
 
 impl From<&RegisteredCloud> for Cloud {
     fn from(stored: &RegisteredCloud) -> Self {
-        let (min, max) = stored.bounding_box.clone();
         let nearest = stored.scales().and_then(Scales::nearest_range);
-        Self {
-            cloud_id: stored.id.to_string(),
-            n_points: stored.cloud.n_points(),
-            dimension: stored.cloud.dimension(),
-            bounding_box: BoundingBox { min, max },
-            spacing: nearest.map(|NearestRange { min, median, max }| Spacing { min, median, max }),
-            n_duplicates: stored.n_duplicates,
-            created_at: written(stored.created_at()),
-        }
+        let spacing = nearest.map(|NearestRange { min, median, max }| Spacing { min, median, max });
+        Self { spacing, ..Self::of_head(stored.id, stored.head()) }
     }
 }
 

@@ -34,7 +34,7 @@ use crate::http::wire::read::limits::ParseContext;
 use crate::http::wire::read::without::WithOperation;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
-use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::error::SolverKind;
 
 /// A request of another operation, with the name of that operation.
 pub struct EstimateRequest;

@@ -17,7 +17,7 @@ use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::clouds::{CloudPage, Holder, Kept, Recalled, RegisteredCloud};
 use crate::store::key::CloudId;
-use crate::store::objects::cloud_object::{CloudHead, decode, encode, object_bytes};
+use crate::store::objects::cloud_object::{decode, encode, object_bytes};
 use crate::store::objects::{ListWindow, OwnerName, Swept, Unavailable};
 
 /// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
@@ -172,13 +172,13 @@ pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) ->
 
 async fn encoded(app: &App, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<Vec<Bytes>, String> {
     let cloud = cloud.clone();
-    let encoded = app.compute.run_small(owner, move || encode(&cloud)).await;
+    let encoded = app.compute.run_small(owner, move || encode(cloud.stored())).await;
     encoded.map_err(|_| "a cloud is not encoded".to_owned())
 }
 
 /// Whether what is written of a cloud could be read again.
 fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
-    let (n_bytes, most) = (object_bytes(&CloudHead::of(cloud)), app.intake.largest() / READING);
+    let (n_bytes, most) = (object_bytes(&cloud.head()), app.intake.largest() / READING);
     if n_bytes.is_some_and(|n_bytes| n_bytes <= most) {
         return Ok(());
     }

@@ -30,7 +30,7 @@ use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
-use gramian_numerics::solver::kind::SolverKind;
+use gramian_numerics::error::SolverKind;
 
 /// A request that needs a factorization.
 pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {

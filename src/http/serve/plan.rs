@@ -13,6 +13,7 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
 use crate::store::learned::LearnedKey;
 use gramian_numerics::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
+use gramian_numerics::error::SolverKind;
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::kernel::Kernel as NumericalKernel;
 use gramian_numerics::observer::Observer;
@@ -22,7 +23,6 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
 use gramian_numerics::solver::Disagreement;
 use gramian_numerics::solver::choose::{AutoLocal, Choice, Price, choose, choose_local, choose_moving};
-use gramian_numerics::solver::kind::SolverKind;
 use gramian_numerics::solver::trend::{Mean, Trend};
 use gramian_numerics::sums::regularization::Regularization;
 

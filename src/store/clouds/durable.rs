@@ -26,6 +26,7 @@ use super::registered::Standing;
 use super::{CloudStore, RegisteredCloud};
 use crate::store::Owner;
 use crate::store::key::CloudId;
+use crate::store::objects::cloud_object::StoredCloud;
 use crate::store::objects::{Damaged, Objects, OwnerName, Unavailable, Written};
 
 /// An owner of clouds, by its number in this process and by its name in the store.
@@ -143,7 +144,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         objects: &Objects,
         holder: &Holder,
         id: CloudId,
-        read: Result<RegisteredCloud, Damaged>,
+        read: Result<StoredCloud, Damaged>,
     ) -> Result<Option<Arc<RegisteredCloud>>, Unavailable> {
         let _turn = self.turns.take((holder.owner, id)).await;
         if let Some(cloud) = self.get(holder.owner, id) {
@@ -155,8 +156,8 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
                 Ok(None)
             }
             Ok(_) if objects.cloud_bytes(&holder.name, id).await?.is_none() => Ok(None),
-            Ok(cloud) => {
-                let cloud = Arc::new(cloud);
+            Ok(stored) => {
+                let cloud = Arc::new(RegisteredCloud::restored(id, stored));
                 Ok(Some(self.clouds.get_or_insert(holder.owner, id, cloud, |cloud| cloud.n_bytes()).0))
             }
         }

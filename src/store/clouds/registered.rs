@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use crate::store::key::CloudId;
-use crate::store::objects::cloud_object::CloudHead;
+use crate::store::objects::cloud_object::{CloudHead, StoredCloud};
 use gramian_numerics::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::count_duplicates;
@@ -18,7 +18,7 @@ pub struct RegisteredCloud {
     pub id: CloudId,
     pub cloud: Arc<Cloud>,
     /// The client's normals, `[n, d]`, not normalised.
-    pub normals: Option<Cloud>,
+    pub normals: Option<Arc<Cloud>>,
     /// Points that coincide with an earlier one.
     pub n_duplicates: usize,
     /// The least and the greatest value of each coordinate.
@@ -53,7 +53,8 @@ impl RegisteredCloud {
         let record = Record { created_at: SystemTime::now(), standing: Standing::Unwritten };
         // The points come first, what is needed for a moment behind them: less stays on the heap between
         // blocks.
-        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
+        let (cloud, normals) =
+            (Arc::new(cloud.compact()), normals.map(|normals| Arc::new(normals.compact())));
         Self {
             id,
             n_duplicates: count_duplicates(&cloud),
@@ -67,9 +68,9 @@ impl RegisteredCloud {
     }
 
     /// A cloud that was read from the store.
-    pub fn restored(id: CloudId, cloud: Cloud, normals: Option<Cloud>, head: CloudHead) -> Self {
+    pub fn restored(id: CloudId, stored: StoredCloud) -> Self {
         let standing = Standing::Stored { seen_at: Some(Instant::now()) };
-        let (cloud, normals) = (Arc::new(cloud.compact()), normals.map(Cloud::compact));
+        let StoredCloud { head, points: cloud, normals } = stored;
         Self {
             id,
             n_duplicates: head.n_duplicates,
@@ -80,6 +81,23 @@ impl RegisteredCloud {
             sampling: OnceLock::new(),
             noise: OnceLock::new(),
         }
+    }
+
+    /// What a list of clouds says of it.
+    pub fn head(&self) -> CloudHead {
+        CloudHead {
+            created_at: self.created_at(),
+            n_points: self.cloud.n_points(),
+            dimension: self.cloud.dimension(),
+            has_normals: self.normals.is_some(),
+            n_duplicates: self.n_duplicates,
+            bounding_box: self.bounding_box.clone(),
+        }
+    }
+
+    /// What the store keeps of it.
+    pub fn stored(&self) -> StoredCloud {
+        StoredCloud { head: self.head(), points: self.cloud.clone(), normals: self.normals.clone() }
     }
 
     /// When it was registered.
@@ -174,6 +192,7 @@ impl RegisteredCloud {
         let (min, max) = &self.bounding_box;
         let bounding_box = vec_bytes(min) + vec_bytes(max);
         let sampling = self.sampling().map_or(0, |s| block_bytes(arc_payload::<Sampling>()) + s.n_bytes());
-        own + bounding_box + sampling + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, Cloud::n_bytes)
+        let of_normals = |normals: &Arc<Cloud>| block_bytes(arc_payload::<Cloud>()) + normals.n_bytes();
+        own + bounding_box + sampling + self.cloud.n_bytes() + self.normals.as_ref().map_or(0, of_normals)
     }
 }

@@ -20,7 +20,6 @@ use std::time::{Duration, SystemTime};
 use bytes::Bytes;
 
 use super::Damaged;
-use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use gramian_numerics::points::cloud::Cloud;
 
@@ -61,18 +60,14 @@ pub fn object_bytes(head: &CloudHead) -> Option<usize> {
     numbers.checked_add(head_bytes(head.dimension))?.checked_add(HASH_BYTES)
 }
 
-impl CloudHead {
-    pub fn of(cloud: &RegisteredCloud) -> Self {
-        Self {
-            created_at: cloud.created_at(),
-            n_points: cloud.cloud.n_points(),
-            dimension: cloud.cloud.dimension(),
-            has_normals: cloud.normals.is_some(),
-            n_duplicates: cloud.n_duplicates,
-            bounding_box: cloud.bounding_box.clone(),
-        }
-    }
+/// A cloud with all that its object says of it.
+pub struct StoredCloud {
+    pub head: CloudHead,
+    pub points: Arc<Cloud>,
+    pub normals: Option<Arc<Cloud>>,
+}
 
+impl CloudHead {
     fn encode(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         let since_epoch = self.created_at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
@@ -132,14 +127,11 @@ const NO_CLOUD: Damaged = Damaged("its numbers are no cloud");
 const ANOTHER: Damaged = Damaged("it is another cloud than its name says");
 
 /// The object of a cloud, in pieces. Its numbers are those of the cloud, not copies.
-pub fn encode(cloud: &Arc<RegisteredCloud>) -> Vec<Bytes> {
-    let head = CloudHead::of(cloud).encode();
-    let points = Numbers { cloud: cloud.clone(), of_normals: false };
-    let normals = cloud.normals.is_some().then(|| Numbers { cloud: cloud.clone(), of_normals: true });
+pub fn encode(cloud: StoredCloud) -> Vec<Bytes> {
     let mut hasher = blake3::Hasher::new();
-    let mut pieces = vec![Bytes::from(head)];
-    for numbers in [Some(points), normals].into_iter().flatten() {
-        let piece = numbers.into_bytes();
+    let mut pieces = vec![Bytes::from(cloud.head.encode())];
+    for numbers in [Some(cloud.points), cloud.normals].into_iter().flatten() {
+        let piece = Numbers(numbers).into_bytes();
         hasher.update(&piece);
         pieces.push(piece);
     }
@@ -148,31 +140,20 @@ pub fn encode(cloud: &Arc<RegisteredCloud>) -> Vec<Bytes> {
 }
 
 /// The numbers of a cloud, for as long as they are written.
-struct Numbers {
-    cloud: Arc<RegisteredCloud>,
-    of_normals: bool,
-}
+struct Numbers(Arc<Cloud>);
 
 impl Numbers {
-    fn floats(&self) -> &[f64] {
-        match (&self.cloud.normals, self.of_normals) {
-            (Some(normals), true) => normals.coordinates(),
-            (None, true) => &[],
-            (_, false) => self.cloud.cloud.coordinates(),
-        }
-    }
-
     fn into_bytes(self) -> Bytes {
-        match cfg!(target_endian = "little") {
-            true => Bytes::from_owner(self),
-            false => self.floats().iter().flat_map(|x| x.to_le_bytes()).collect(),
+        if cfg!(target_endian = "little") {
+            return Bytes::from_owner(self);
         }
+        self.0.coordinates().iter().flat_map(|x| x.to_le_bytes()).collect()
     }
 }
 
 impl AsRef<[u8]> for Numbers {
     fn as_ref(&self) -> &[u8] {
-        bytemuck::cast_slice(self.floats())
+        bytemuck::cast_slice(self.0.coordinates())
     }
 }
 
@@ -226,7 +207,7 @@ pub(super) fn is_of_bytes(damaged: Damaged) -> bool {
 ///
 /// # Errors
 /// [`Damaged`] unless it is whole and as it was written.
-pub fn decode(id: CloudId, bytes: &[u8]) -> Result<RegisteredCloud, Damaged> {
+pub fn decode(id: CloudId, bytes: &[u8]) -> Result<StoredCloud, Damaged> {
     let head = CloudHead::decode(bytes)?;
     if object_bytes(&head) != Some(bytes.len()) {
         return Err(CUT);
@@ -237,13 +218,14 @@ pub fn decode(id: CloudId, bytes: &[u8]) -> Result<RegisteredCloud, Damaged> {
         return Err(OTHER);
     }
     let (points, normals) = numbers.split_at(8 * head.n_points * head.dimension);
-    let cloud_of = |bytes: &[u8]| Cloud::new(floats(bytes), head.dimension).map_err(|_| NO_CLOUD);
-    let cloud = cloud_of(points)?;
+    let cloud_of =
+        |bytes: &[u8]| Cloud::new(floats(bytes), head.dimension).map(Arc::new).map_err(|_| NO_CLOUD);
+    let points = cloud_of(points)?;
     let normals = head.has_normals.then(|| cloud_of(normals)).transpose()?;
-    if CloudId::of(&cloud, normals.as_ref()) != id {
+    if CloudId::of(&points, normals.as_deref()) != id {
         return Err(ANOTHER);
     }
-    Ok(RegisteredCloud::restored(id, cloud, normals, head))
+    Ok(StoredCloud { head, points, normals })
 }
 
 fn floats(bytes: &[u8]) -> Vec<f64> {
@@ -253,46 +235,53 @@ fn floats(bytes: &[u8]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::Owner;
-    use crate::store::clouds::CloudStore;
 
-    fn registered(with_normals: bool) -> Arc<RegisteredCloud> {
-        let cloud = Cloud::new(vec![-0.0, 1.5, 2.0, -3.0, 2.0, -3.0], 2).unwrap();
-        let normals = with_normals.then(|| Cloud::new(vec![1.0, 0.0, 0.0, 2.0, 1.0, 1.0], 2).unwrap());
-        CloudStore::<()>::new(1 << 20).register(Owner(0), cloud, normals).0
+    /// The name of a cloud and what is written of it, the same each time.
+    fn stored(has_normals: bool) -> (CloudId, StoredCloud) {
+        let points = Arc::new(Cloud::new(vec![-0.0, 1.5, 2.0, -3.0, 2.0, -3.0], 2).unwrap());
+        let normals = Cloud::new(vec![1.0, 0.0, 0.0, 2.0, 1.0, 1.0], 2).unwrap();
+        let normals = has_normals.then(|| Arc::new(normals));
+        let head = CloudHead {
+            created_at: SystemTime::UNIX_EPOCH + Duration::from_nanos(1_234_567_890),
+            n_points: 3,
+            dimension: 2,
+            has_normals,
+            n_duplicates: 1,
+            bounding_box: points.bounding_box(),
+        };
+        (CloudId::of(&points, normals.as_deref()), StoredCloud { head, points, normals })
     }
 
     #[test]
     fn a_cloud_is_read_as_it_was_written() {
         for with_normals in [false, true] {
-            let cloud = registered(with_normals);
-            let bytes = encode(&cloud).concat();
-            let found = decode(cloud.id, &bytes).unwrap();
-            assert_eq!(found.cloud.coordinates(), cloud.cloud.coordinates());
-            assert_eq!(
-                found.normals.as_ref().map(Cloud::coordinates),
-                cloud.normals.as_ref().map(Cloud::coordinates)
-            );
-            assert_eq!((found.n_duplicates, found.created_at()), (1, cloud.created_at()));
-            assert_eq!(found.bounding_box, cloud.bounding_box);
-            assert_eq!(CloudHead::decode(&bytes[..head_bytes(2)]), Ok(CloudHead::of(&cloud)));
+            let (id, cloud) = stored(with_normals);
+            let bytes = encode(stored(with_normals).1).concat();
+            let found = decode(id, &bytes).unwrap();
+            let coordinates = |cloud: &StoredCloud| {
+                [Some(&cloud.points), cloud.normals.as_ref()]
+                    .map(|list| list.map(|list| list.coordinates().to_vec()))
+            };
+            assert_eq!(coordinates(&found), coordinates(&cloud));
+            assert_eq!(found.head, cloud.head);
+            assert_eq!(CloudHead::decode(&bytes[..head_bytes(2)]), Ok(cloud.head));
         }
     }
 
     #[test]
     fn every_other_byte_and_every_other_length_is_refused() {
-        let cloud = registered(true);
-        let bytes = encode(&cloud).concat();
+        let (id, cloud) = stored(true);
+        let bytes = encode(cloud).concat();
         for at in 0..bytes.len() {
             for bit in [0, 7] {
                 let mut other = bytes.clone();
                 other[at] ^= 1 << bit;
-                assert!(decode(cloud.id, &other).is_err(), "byte {at}");
+                assert!(decode(id, &other).is_err(), "byte {at}");
             }
-            assert!(decode(cloud.id, &bytes[..at]).is_err(), "the first {at}");
+            assert!(decode(id, &bytes[..at]).is_err(), "the first {at}");
         }
-        assert!(decode(cloud.id, &[&bytes[..], &[0]].concat()).is_err());
-        let name = registered(false).id;
+        assert!(decode(id, &[&bytes[..], &[0]].concat()).is_err());
+        let name = stored(false).0;
         assert_eq!(decode(name, &bytes).err(), Some(Damaged("it is another cloud than its name says")));
     }
 }

@@ -25,7 +25,7 @@ fn registered(first: f64, dimension: usize) -> Arc<RegisteredCloud> {
 }
 
 async fn put(objects: &Objects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>) -> Written {
-    let pieces = cloud_object::encode(cloud);
+    let pieces = cloud_object::encode(cloud.stored());
     objects.put_cloud(owner, cloud.id, pieces).await.unwrap()
 }
 
@@ -93,7 +93,7 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     let bytes = objects.get_cloud(&owner, clouds[3].id).await.unwrap().unwrap();
     assert_eq!(objects.cloud_bytes(&owner, clouds[3].id).await.unwrap(), Some(bytes.len() as u64));
     let read = cloud_object::decode(clouds[3].id, &bytes).unwrap();
-    assert_eq!(read.cloud.coordinates(), clouds[3].cloud.coordinates());
+    assert_eq!(read.points.coordinates(), clouds[3].cloud.coordinates());
     assert!(objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
     assert!(!objects.delete_cloud(&owner, clouds[3].id).await.unwrap());
     assert_eq!(objects.get_cloud(&owner, clouds[3].id).await.unwrap(), None);
@@ -220,7 +220,7 @@ async fn the_oldest_clouds_go_by_age_and_by_bytes() {
     for (k, cloud) in clouds.iter().enumerate() {
         // A day between two of them, of two owners in turn; the last one is of today.
         let since = now - Duration::from_secs(86400 * (5 - k as u64));
-        n_bytes = cloud_object::encode(cloud).iter().map(|piece| piece.len() as u64).sum();
+        n_bytes = cloud_object::encode(cloud.stored()).iter().map(|piece| piece.len() as u64).sum();
         dated.put_at([&one, &two][k % 2], cloud, since).await;
     }
     let none = Retention::default();

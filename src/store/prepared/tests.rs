@@ -2,12 +2,12 @@ use futures_util::future::BoxFuture;
 use tokio::sync::oneshot;
 
 use super::*;
+use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::System;
 use gramian_numerics::solver::choose::choose;
-use gramian_numerics::solver::kind::SolverKind;
 use gramian_numerics::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;

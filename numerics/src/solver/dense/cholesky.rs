@@ -11,11 +11,11 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use super::packed::Packed;
-use super::parallelism;
 use super::substitution::{solve_backward, solve_forward};
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
 use crate::machine::pages::SpareBuffer;
+use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;

@@ -11,11 +11,11 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::{Accum, Mat, MatMut, MatRef};
 
 use super::cholesky::factorize_in_place;
-use super::parallelism;
 use super::pivoting::{Pivoting, Pivots};
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
 use crate::machine::heap::vec_bytes;
+use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;

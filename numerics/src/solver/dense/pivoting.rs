@@ -5,9 +5,9 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 
-use super::parallelism;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
+use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::gram::fill_cross_gram;

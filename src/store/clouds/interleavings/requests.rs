@@ -48,7 +48,7 @@ fn holder() -> Holder {
 }
 
 async fn encoded(cloud: Arc<RegisteredCloud>) -> Result<Vec<Bytes>, String> {
-    Ok(encode(&cloud))
+    Ok(encode(cloud.stored()))
 }
 
 impl Request {
