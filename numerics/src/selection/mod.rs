@@ -5,27 +5,19 @@
 //! kernel, and [`leave_one_out()`] predicts each value from all others.
 
 mod alpha_path;
-mod contraction;
 mod criterion;
-mod descent;
 mod evaluation;
 mod learning;
 mod leave_one_out;
-mod matrices;
 mod parameters;
 mod price;
-mod select;
-mod served;
-mod space;
-mod spectrum;
+mod search;
 mod subject;
-mod walk;
 
 pub use alpha_path::{alpha_path, default_alphas};
 pub use criterion::Criterion;
-pub use descent::Side;
 pub use learning::{Learned, Noise, Observed, learn, learn_mean, learning_price};
 pub use leave_one_out::{LeaveOneOut, leave_one_out, leave_one_out_with};
 pub use parameters::{Hyperparameters, Parameter, Variation};
 pub use price::{alpha_path_price, expected_evaluations, leave_one_out_price, selection_price};
-pub use select::{MAX_EVALUATIONS, Selected, Selection, select};
+pub use search::{MAX_EVALUATIONS, Selected, Selection, Side, select};

@@ -2,7 +2,7 @@
 
 use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
-use super::select::SIDE_BY_SIDE;
+use super::search::SIDE_BY_SIDE;
 use crate::solver::choose::Price;
 
 /// Evaluations that a descent over so many free numbers takes, mostly: some 50 for 6 of them and 70 to 110 for 12 were counted

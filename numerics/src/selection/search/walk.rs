@@ -1,10 +1,10 @@
 //! What an optimizer sees of a criterion.
 
-use super::evaluation::{Evaluator, State};
-use super::parameters::Hyperparameters;
-use super::space::Space;
 use crate::error::NumericsError;
 use crate::observer::Observer;
+use crate::selection::evaluation::space::Space;
+use crate::selection::evaluation::{Evaluator, State};
+use crate::selection::parameters::Hyperparameters;
 
 /// Minus the merit, scaled, of logarithms in units of their own.
 pub(super) struct Walk<'a, 'b> {

@@ -1,18 +1,23 @@
 //! The best of several families and starts.
 
+mod descent;
+mod served;
+mod walk;
+
 use rayon::prelude::*;
 
-use super::criterion::Criterion;
-use super::descent::{Found, Side, descend, finish, side};
-use super::evaluation::{Evaluator, never_definite};
-use super::parameters::{Hyperparameters, Parameter, Variation};
-use super::space::Space;
-use super::subject::Subject;
 use crate::error::NumericsError;
 use crate::kernel::Family;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
+use crate::selection::criterion::Criterion;
+use crate::selection::evaluation::space::Space;
+use crate::selection::evaluation::{Evaluator, never_definite};
+use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
+use crate::selection::subject::Subject;
 use crate::solver::trend::{Mean, Trend};
+pub use descent::Side;
+use descent::{Found, descend, finish, side};
 
 /// Evaluations of one descent, at most.
 pub const MAX_EVALUATIONS: usize = 200;

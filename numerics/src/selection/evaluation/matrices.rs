@@ -117,12 +117,12 @@ impl Matrices {
     }
 
     /// `‖K + N‖₁`.
-    pub(super) fn norm1(&self) -> f64 {
+    pub(in crate::selection) fn norm1(&self) -> f64 {
         self.norm1
     }
 
     /// `1/(‖K + N‖₁ ‖(K + N)⁻¹‖₁)`, estimated.
-    pub(super) fn reciprocal_condition(&self) -> f64 {
+    pub(in crate::selection) fn reciprocal_condition(&self) -> f64 {
         let solve = |mut columns: MatMut<'_, f64>| {
             solve_lower_triangular_in_place(self.factor(), columns.rb_mut(), self.par);
             solve_upper_triangular_in_place(self.factor().transpose(), columns, self.par);

@@ -8,12 +8,12 @@ use std::cell::RefCell;
 
 use slsqp::{Func, StopTols, minimize};
 
-use super::evaluation::Evaluator;
-use super::parameters::Hyperparameters;
-use super::space::Space;
 use super::walk::{Best, Walk};
 use crate::error::NumericsError;
 use crate::observer::Observer;
+use crate::selection::evaluation::Evaluator;
+use crate::selection::evaluation::space::Space;
+use crate::selection::parameters::Hyperparameters;
 
 /// A first descent ends where a step gains less than this in a log likelihood, the last one where it gains less than that.
 const LEAST_GAIN: f64 = 1e-6;

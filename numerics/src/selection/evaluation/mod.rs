@@ -4,20 +4,24 @@
 //! diagonal of the inverse take half of that at once, and their slopes another product of matrices, n³. All parameters of the kernel share one
 //! pass over the pairs (contraction.rs).
 
+mod contraction;
+mod matrices;
+pub(super) mod space;
+
 use faer::Mat;
 
-use super::contraction::{PairWeights, contract};
-use super::criterion::{Criterion, Parts};
-use super::learning::remove_mean;
-use super::matrices::Matrices;
-use super::parameters::Hyperparameters;
-use super::space::Space;
-use super::subject::{Subject, relative_noise};
 use crate::error::{NotDefinite, NumericsError};
 use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
+use crate::selection::criterion::{Criterion, Parts};
+use crate::selection::learning::remove_mean;
+use crate::selection::parameters::Hyperparameters;
+use crate::selection::subject::{Subject, relative_noise};
 use crate::solver::trend::{Trend, solve_gram};
+use contraction::{PairWeights, contract};
+use matrices::Matrices;
+use space::Space;
 
 /// What the mean leaves of `W_ii` at least, as a share: less is rounding.
 pub(super) const UNDETERMINED: f64 = 1e-12;

@@ -1,7 +1,7 @@
 //! Whether a solver serves what a search finds.
 
-use super::evaluation::{Evaluator, State};
-use super::parameters::Hyperparameters;
+use crate::selection::evaluation::{Evaluator, State};
+use crate::selection::parameters::Hyperparameters;
 use crate::solver::MAX_RELATIVE_RESIDUAL;
 
 /// A solver refuses variances and determinants below ε. Near there the factors of two orders of summation have

@@ -6,25 +6,27 @@
 //! Nothing looks at the observer within an eigendecomposition. So a large matrix is factorized for each of a few α instead: two to four times as
 //! many flops for 61 of them, but all in products of matrices.
 
+mod spectrum;
+
 use std::f64::consts::TAU;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
-use super::criterion::{Criterion, Parts};
-use super::evaluation::Evaluator;
-use super::parameters::Hyperparameters;
-use super::spectrum::Spectrum;
-use super::subject::Subject;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
+use crate::selection::criterion::{Criterion, Parts};
+use crate::selection::evaluation::Evaluator;
+use crate::selection::parameters::Hyperparameters;
+use crate::selection::subject::Subject;
 use crate::solver::trend::{Mean, solve_gram};
 use crate::sums::regularization::Regularization;
+use spectrum::Spectrum;
 
 /// α that are looked at together, as columns of a matrix.
 pub(super) const ALPHAS_AT_ONCE: usize = 256;

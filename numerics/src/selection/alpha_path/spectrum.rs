@@ -6,14 +6,14 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 
-use super::learning::remove_mean;
-use super::subject::Subject;
 use crate::error::NumericsError;
 use crate::kernel::Kernel;
 use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
+use crate::selection::learning::remove_mean;
+use crate::selection::subject::Subject;
 use crate::sums::gram::fill_lower_gram;
 use crate::sums::regularization::Regularization;
 

@@ -1,9 +1,9 @@
 //! The box of logarithms that is searched.
 
 use super::contraction::Sums;
-use super::parameters::{Hyperparameters, Parameter, Variation};
 use crate::error::NumericsError;
 use crate::kernel::Family;
+use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
 use crate::sums::regularization::Regularization;
 
 /// The hyperparameters in a box of the logarithms of those that are free.
