@@ -8,7 +8,7 @@ use crate::sums::regularization::Regularization;
 
 /// The hyperparameters in a box of the logarithms of those that are free.
 #[derive(Debug, Clone)]
-pub(super) struct Space {
+pub(in crate::selection) struct Space {
     base: Hyperparameters,
     /// One entry for each free number.
     free: Vec<Variation>,
@@ -19,7 +19,7 @@ impl Space {
     ///
     /// # Errors
     /// [`NumericsError::InvalidVariation`].
-    pub(super) fn of(
+    pub(in crate::selection) fn of(
         base: &Hyperparameters,
         vary: &[Variation],
         dimension: usize,
@@ -74,32 +74,32 @@ impl Space {
         Ok(())
     }
 
-    pub(super) fn n_free(&self) -> usize {
+    pub(in crate::selection) fn n_free(&self) -> usize {
         self.free.len()
     }
 
     /// What each free number belongs to.
-    pub(super) fn parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
+    pub(in crate::selection) fn parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
         self.free.iter().map(|free| free.parameter)
     }
 
     /// Whether slopes along single axes are wanted.
-    pub(super) fn per_axis(&self) -> bool {
+    pub(in crate::selection) fn per_axis(&self) -> bool {
         self.free.iter().any(|free| matches!(free.parameter, Parameter::LengthScaleOfAxis(_)))
     }
 
     /// The bounds of the logarithms.
-    pub(super) fn bounds(&self) -> Vec<(f64, f64)> {
+    pub(in crate::selection) fn bounds(&self) -> Vec<(f64, f64)> {
         self.free.iter().map(|free| (free.min.ln(), free.max.ln())).collect()
     }
 
     /// Where the search begins.
-    pub(super) fn start(&self) -> Vec<f64> {
+    pub(in crate::selection) fn start(&self) -> Vec<f64> {
         self.numbers_of(&self.base)
     }
 
     /// The hyperparameters with these logarithms.
-    pub(super) fn at(&self, logarithms: &[f64]) -> Hyperparameters {
+    pub(in crate::selection) fn at(&self, logarithms: &[f64]) -> Hyperparameters {
         let mut found = self.base.clone();
         for (free, logarithm) in self.free.iter().zip(logarithms) {
             let number = free.number(*logarithm);
@@ -120,7 +120,7 @@ impl Space {
     }
 
     /// Derivatives in the logarithms, from sums over pairs and the trace of their weights.
-    pub(super) fn gradient(&self, at: &Hyperparameters, sums: &Sums, trace: f64) -> Vec<f64> {
+    pub(in crate::selection) fn gradient(&self, at: &Hyperparameters, sums: &Sums, trace: f64) -> Vec<f64> {
         let v = at.variance;
         let slope = |free: &Variation| match free.parameter {
             Parameter::LengthScale | Parameter::LengthScales => -2.0 * v * sums.of_scaled_slopes,
