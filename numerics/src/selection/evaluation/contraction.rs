@@ -18,17 +18,17 @@ use crate::sums::nodes::Nodes;
 const COLUMNS_PER_TASK: usize = 16;
 
 /// `G = sM + uwᵀ + wuᵀ`, symmetric.
-pub(super) struct PairWeights<'a> {
+pub(in crate::selection) struct PairWeights<'a> {
     /// M, `[n, n]`, of which the lower triangle counts.
-    pub(super) matrix: &'a [f64],
-    pub(super) scale: f64,
-    pub(super) left: &'a [f64],
-    pub(super) right: &'a [f64],
+    pub(in crate::selection) matrix: &'a [f64],
+    pub(in crate::selection) scale: f64,
+    pub(in crate::selection) left: &'a [f64],
+    pub(in crate::selection) right: &'a [f64],
 }
 
 impl PairWeights<'_> {
     /// `G_ii`, summed.
-    pub(super) fn trace(&self) -> f64 {
+    pub(in crate::selection) fn trace(&self) -> f64 {
         let n = self.left.len();
         (0..n).map(|i| self.scale * self.matrix[i * n + i] + 2.0 * self.left[i] * self.right[i]).sum()
     }
@@ -55,22 +55,22 @@ impl PairWeights<'_> {
 
 /// The sums over all pairs.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sums {
+pub(in crate::selection) struct Sums {
     /// `Σ G_ij φ`.
-    pub(super) of_values: f64,
+    pub(in crate::selection) of_values: f64,
     /// `Σ G_ij φ′`.
-    pub(super) of_slopes: f64,
+    pub(in crate::selection) of_slopes: f64,
     /// `Σ G_ij φ′ q`.
-    pub(super) of_scaled_slopes: f64,
+    pub(in crate::selection) of_scaled_slopes: f64,
     /// `Σ G_ij φ′ D_c²/ℓ²`, `[d]`; empty if not asked for.
-    pub(super) of_axes: Vec<f64>,
+    pub(in crate::selection) of_axes: Vec<f64>,
 }
 
 /// The sums for a kernel on a cloud; those of single axes only if they are asked for. On one thread for one of many tasks.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
-pub(super) fn contract(
+pub(in crate::selection) fn contract(
     (cloud, kernel): (&Cloud, &Kernel),
     weights: &PairWeights<'_>,
     per_axis: bool,

@@ -44,10 +44,10 @@ fn norm1_of_lower(matrix: &[f64], n: usize) -> f64 {
 }
 
 /// L with `K + N = LLᵀ`, and two matrices that are made from it; column by column, lower triangles.
-pub(super) struct Matrices {
+pub(in crate::selection) struct Matrices {
     n: usize,
     /// One of many tasks: threads that wait for parts of it would begin others, with memory of their own.
-    pub(super) is_alone: bool,
+    pub(in crate::selection) is_alone: bool,
     par: Par,
     factor: Vec<f64>,
     /// `‖K + N‖₁`.
@@ -62,7 +62,7 @@ pub(super) struct Matrices {
 
 impl Matrices {
     /// For n points: alone on this thread, or on all of them. Memory is taken when it is needed.
-    pub(super) fn new(n: usize, is_alone: bool) -> Self {
+    pub(in crate::selection) fn new(n: usize, is_alone: bool) -> Self {
         let par = if is_alone { Par::Seq } else { parallelism((n as f64).powi(3) / 3.0) };
         let scratch = || llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
         Self {
@@ -82,7 +82,7 @@ impl Matrices {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn factorize(
+    pub(in crate::selection) fn factorize(
         &mut self,
         (cloud, kernel): (&Cloud, &Kernel),
         noise: &Regularization,
@@ -133,20 +133,20 @@ impl Matrices {
     }
 
     /// `ln det LLᵀ`.
-    pub(super) fn log_determinant(&self) -> f64 {
+    pub(in crate::selection) fn log_determinant(&self) -> f64 {
         let factor = self.factor();
         (0..self.n).map(|i| factor[(i, i)].ln()).sum::<f64>() * 2.0
     }
 
     /// `columns ← L⁻¹ columns`.
-    pub(super) fn whiten(&self, columns: &mut [f64]) {
+    pub(in crate::selection) fn whiten(&self, columns: &mut [f64]) {
         let m = columns.len() / self.n;
         let right = MatMut::from_column_major_slice_mut(columns, self.n, m);
         solve_lower_triangular_in_place(self.factor(), right, self.par);
     }
 
     /// `columns ← L⁻ᵀ columns`.
-    pub(super) fn solve_whitened(&self, columns: &mut [f64]) {
+    pub(in crate::selection) fn solve_whitened(&self, columns: &mut [f64]) {
         let m = columns.len() / self.n;
         let right = MatMut::from_column_major_slice_mut(columns, self.n, m);
         solve_upper_triangular_in_place(self.factor().transpose(), right, self.par);
@@ -156,7 +156,10 @@ impl Matrices {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn invert_factor(&mut self, observer: &dyn Observer) -> Result<(), NumericsError> {
+    pub(in crate::selection) fn invert_factor(
+        &mut self,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
         if self.has_inverse_factor {
             return Ok(());
         }
@@ -177,7 +180,7 @@ impl Matrices {
     }
 
     /// `W_ii = |L⁻¹e_i|²`, from L⁻¹.
-    pub(super) fn inverse_diagonal(&self) -> Vec<f64> {
+    pub(in crate::selection) fn inverse_diagonal(&self) -> Vec<f64> {
         let entry = |(i, column): (usize, &[f64])| dot(&column[i..], &column[i..]);
         match self.is_alone {
             true => self.inverse_factor.chunks_exact(self.n).enumerate().map(entry).collect(),
@@ -189,7 +192,10 @@ impl Matrices {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn multiply_inverse(&mut self, observer: &dyn Observer) -> Result<(), NumericsError> {
+    pub(in crate::selection) fn multiply_inverse(
+        &mut self,
+        observer: &dyn Observer,
+    ) -> Result<(), NumericsError> {
         let n = self.n;
         self.product.resize(n * n, 0.0);
         let inverse = MatRef::from_column_major_slice(&self.inverse_factor, n, n);
@@ -216,7 +222,7 @@ impl Matrices {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn multiply_columns(
+    pub(in crate::selection) fn multiply_columns(
         &mut self,
         of_mean: &[f64],
         c: &[f64],
@@ -249,7 +255,7 @@ impl Matrices {
     }
 
     /// The last product, `[n, n]`, of which the lower triangle counts.
-    pub(super) fn product(&self) -> &[f64] {
+    pub(in crate::selection) fn product(&self) -> &[f64] {
         &self.product
     }
 }
