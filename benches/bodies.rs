@@ -1,5 +1,5 @@
-//! Bodies: MB/s of one core that reads points from JSON and writes numbers to it, and what it takes to send a matrix as npy
-//! beside a copy of its memory and the write to the socket.
+//! Throughput of bodies. JSON: MB/s of one core for reading points and for writing numbers. npy: time to send
+//! a matrix, against a copy of its memory and the write to the socket.
 //!
 //! `cargo bench --bench bodies`
 
@@ -69,7 +69,8 @@ struct Request {
     points: Points,
 }
 
-/// Over loopback: the matrix as npy by the service's encoder, against a copy of its memory and a plain write.
+/// Measures sending the matrix as npy over loopback by the service's encoder, against a memory copy and a
+/// plain write.
 fn send_matrix() {
     let matrix = random(MATRIX_ROWS * MATRIX_ROWS, 1);
     let (reference, service) = (plain_server(matrix.clone()), service(matrix));
@@ -88,7 +89,7 @@ fn send_matrix() {
     println!("{:44} {ours:8.1}, {:.2} of it", "npy encoded and sent", ours / theirs);
 }
 
-/// Copies the matrix and writes the copy, once per connection.
+/// Starts a server that copies the matrix and writes the copy, once per connection.
 fn plain_server(matrix: Vec<f64>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -96,7 +97,8 @@ fn plain_server(matrix: Vec<f64>) -> SocketAddr {
         let mut copy = vec![0u8; 8 * matrix.len()];
         for stream in listener.incoming() {
             let mut stream = stream.unwrap();
-            // All of it: what is left unread would turn the end of the connection into a reset.
+            // Reads the whole request, because unread bytes would turn the end of the connection into a
+            // reset.
             stream.read_exact(&mut [0; REQUEST.len()]).unwrap();
             copy.copy_from_slice(bytemuck::cast_slice(&matrix));
             stream.write_all(&copy).unwrap();
@@ -121,7 +123,7 @@ struct Flags {
     config: Config,
 }
 
-/// Answers with the matrix by way of the encoder, each time with another copy that was made before.
+/// Starts a server that sends the matrix through the encoder. Each answer uses another copy, made beforehand.
 fn service(matrix: Vec<f64>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -149,8 +151,8 @@ fn service(matrix: Vec<f64>) -> SocketAddr {
     address
 }
 
-/// Seconds from the request until so many bytes have come; to the end of the connection if there are fewer. What the server
-/// does behind its answer, such as giving the memory back, is not in it.
+/// Returns the seconds from the request until `n_bytes` have come or the connection ends, and the bytes
+/// received. Work of the server after its answer, such as freeing memory, is not included.
 fn download(address: SocketAddr, n_bytes: usize, buffer: &mut [u8]) -> (f64, usize) {
     let mut stream = TcpStream::connect(address).unwrap();
     let began = Instant::now();
@@ -171,7 +173,7 @@ fn write(array: &Array) -> Vec<u8> {
     out
 }
 
-/// Least seconds of one core of some rounds.
+/// Returns the least processor time of [`ROUNDS`] rounds, s.
 fn best<T>(mut work: impl FnMut() -> T) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
@@ -182,7 +184,8 @@ fn best<T>(mut work: impl FnMut() -> T) -> f64 {
     best
 }
 
-/// Seconds that this thread has had a core, as Linux counts them: other programs do not disturb it much.
+/// Returns the time for which this thread has had a core, s, as Linux counts it. Other programs hardly
+/// disturb it.
 fn cpu_seconds() -> f64 {
     let counters = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
     counters.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9

@@ -4,10 +4,10 @@
     benches/instructions.py            fails if a part takes over 5 % more or fewer than benches/instructions.tsv says
     benches/instructions.py --renew    writes the baseline
 
-Times are noisy on shared machines, counts are not. valgrind's processor has AVX2 and no AVX-512 whatever the machine has, so
-the counts are those of the AVX2 paths, on one thread. They belong to the compiler and to the parts in
-benches/instructions.rs; fewer instructions than the baseline are welcome and ask for `--renew`, so that they stay.
-Needs cargo and valgrind, and nothing but the standard library.
+Times are noisy on shared machines, counts are not. valgrind's processor has AVX2 and no AVX-512, whatever the
+machine has. So the counts are those of the AVX2 paths, on one thread. They depend on the compiler and on the
+parts in benches/instructions.rs. Fewer instructions than the baseline are welcome: `--renew` then keeps the gain.
+Needs cargo, valgrind and only the standard library.
 """
 
 import json
@@ -41,7 +41,7 @@ def main():
 
 
 def output(*command):
-    """What a command prints."""
+    """Returns the output of a command."""
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
@@ -54,7 +54,7 @@ def build():
 
 
 def count(binary, name):
-    """Instruction set and instructions of one part."""
+    """Returns the instruction set and the instruction count of one part."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "callgrind.out"
         command = ["valgrind", "--tool=callgrind", f"--toggle-collect={COUNTED}", f"--callgrind-out-file={out}"]
@@ -69,7 +69,7 @@ def count(binary, name):
 
 
 def compare(counts, instruction_set):
-    """Prints the table; returns the exit status."""
+    """Prints the table, and returns the exit status."""
     header, *lines = BASELINE.read_text().splitlines()
     baseline = {name: int(found) for name, found in (line.split("\t") for line in lines)}
     if f", {instruction_set}, " not in header:

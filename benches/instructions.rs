@@ -1,7 +1,9 @@
-//! The hot parts, one at a time, for counting their instructions: `benches/instructions.py` runs this under callgrind.
+//! Hot parts, one at a time, for counting their instructions: `benches/instructions.py` runs this under
+//! callgrind.
 //!
-//! `cargo bench --bench instructions -- PART` runs one part once; without a name all of them, and lists their names. Only
-//! what happens inside [`measured`] is counted. Everything runs on one thread, the calling one, so that callgrind sees it.
+//! `cargo bench --bench instructions -- PART` runs one part once. Without a name it runs all parts and prints
+//! their names. Only what happens inside [`measured`] is counted. Everything runs on the calling thread, so
+//! that callgrind sees it.
 
 #[path = "../numerics/benches/support/mod.rs"]
 mod support;
@@ -33,7 +35,7 @@ const GAUSS: Family = Family::Gauss;
 const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
 const MATERN: Family = Family::Matern { order: 2 };
 
-/// A name and what it runs.
+/// A part: its name and its function.
 type Part = (&'static str, fn());
 
 const PARTS: [Part; 18] = [
@@ -68,13 +70,13 @@ fn main() {
     }
 }
 
-/// What callgrind counts. It must stay a function of its own.
+/// Runs what callgrind counts. It must stay a separate function, because callgrind selects it by name.
 #[inline(never)]
 fn measured<T>(part: impl FnOnce() -> T) -> T {
     black_box(part())
 }
 
-/// Stops a factorization behind the Gram matrix.
+/// An observer that cancels a factorization after the Gram matrix.
 #[derive(Default)]
 struct UpToGram(AtomicBool);
 
@@ -105,7 +107,7 @@ fn jets(family: Family, order: JetOrder) {
     measured(|| Jets::evaluate(&cloud, &kernel, &weights, &queries, order, &Unobserved)).unwrap();
 }
 
-/// On the instruction set of every machine of this architecture.
+/// Evaluates jets with the portable instruction set, which every machine of this architecture has.
 fn portable_jets(order: JetOrder) {
     let (cloud, queries, kernel) = (scattered(1024, 3, 1), scattered(256, 3, 2), kernel(GAUSS));
     let portable = InstructionSet::available().into_iter().find(|set| set.name() == "portable");
@@ -135,13 +137,13 @@ fn variances() {
     measured(|| posterior::variances(&factor, &queries, &Unobserved)).unwrap();
 }
 
-/// The k-d tree and a search for every point.
+/// Builds the k-d tree and searches the neighbours of every point.
 fn neighbours() {
     let cloud = scattered(2000, 3, 1);
     measured(|| Sampling::of(&cloud, &Unobserved)).unwrap();
 }
 
-/// Tree, local fits, jets at the points and orientation.
+/// Builds a surface: tree, local fits, jets at the points and orientation.
 fn surface() {
     let signature = fits::signature(&fits::factorize(&fibonacci_sphere(600), kernel(MATERN), 1e-6));
     measured(|| Surface::of(signature, None, &Unobserved)).unwrap();

@@ -1,4 +1,4 @@
-//! A server that parses a JSON body and sends it back: what any axum handler costs, for comparison.
+//! A server that parses a JSON body and sends it back. It shows what any axum handler costs, for comparison.
 //!
 //! `cargo run --release --example echo -- 127.0.0.1:8081`
 

@@ -1,4 +1,5 @@
-//! The table of hostile clouds in docs/reliability.md: what they take beside random points, as whole requests.
+//! Measures the table of hostile clouds in docs/reliability.md: times of whole requests, against random
+//! points.
 //!
 //! `cargo run --release --example hostile_clouds -- 60000`
 
@@ -19,7 +20,7 @@ use common::hostile::{HOSTILE, Hostile};
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// What is asked of each cloud once it is registered.
+/// Requests about each cloud, sent once it is registered.
 const REQUESTS: [(&str, &str); 2] = [
     ("/v1/normals", "{}"),
     (
@@ -28,14 +29,14 @@ const REQUESTS: [(&str, &str); 2] = [
     ),
 ];
 
-/// Largest dimension in which all requests are timed: beyond it random points take minutes.
+/// Largest dimension in which all requests are timed. Beyond it random points take minutes.
 const MAX_DIMENSION: usize = 3;
 
 #[derive(Parser)]
 struct Flags {
     /// Points of each cloud.
     n_points: usize,
-    /// Only the clouds whose names hold this.
+    /// Only clouds whose names contain this.
     #[arg(long, default_value = "")]
     named: String,
     #[command(flatten)]
@@ -47,7 +48,7 @@ struct Server {
     client: reqwest::Client,
 }
 
-/// Milliseconds of an answer, and its status.
+/// Time and status of an answer.
 #[derive(Clone, Copy)]
 struct Timed {
     milliseconds: f64,
@@ -73,7 +74,8 @@ impl Server {
         (Timed { milliseconds, status }, serde_json::from_slice(&bytes).expect("JSON"))
     }
 
-    /// The least times of three for registering a cloud and for each request.
+    /// Returns the least times of three for registering a cloud and for each request. Above
+    /// [`MAX_DIMENSION`], the cloud is registered once and no requests follow.
     async fn time(&self, hostile: &Hostile, n_points: usize) -> Vec<Timed> {
         let cloud = hostile.cloud(n_points);
         let points: Vec<&[f64]> = cloud.points().collect();

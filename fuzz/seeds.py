@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Writes the first inputs of the fuzz targets into fuzz/corpus/, unless they are there: requests from the examples of the document, and
-small files of every format. Needs the standard library alone."""
+"""Writes the first inputs of the fuzz targets into fuzz/corpus/: requests from openapi/examples/, and small files
+of every format. Replaces seeds of earlier runs. Needs only the standard library."""
 
 import gzip
 import json
@@ -42,7 +42,7 @@ def keep(target, index, data):
 
 
 def safetensors(tensors, request):
-    """Tensors of float64, with the other fields as text."""
+    """Encodes tensors of float64 as safetensors, with the other fields as JSON text in the metadata."""
     header, data = {"__metadata__": {"request": json.dumps(request)}}, b""
     for name, numbers in tensors.items():
         header[name] = {"dtype": "F64", "shape": [len(numbers)], "data_offsets": [len(data), len(data) + 8 * len(numbers)]}

@@ -1,7 +1,7 @@
-//! Every setting of the process: one flag and one environment variable of the same name each.
+//! Settings of the process, each with a flag and an environment variable of the same name.
 //!
-//! A setting that is blank, no number or out of its range ends the process at the start, with its name: a service that
-//! starts with another meaning of a setting than its operator's is worse than one that does not.
+//! A setting that is blank, not a number or out of range ends the process at the start, with its name. A
+//! service that interprets a setting differently from its operator is worse than one that does not start.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -21,25 +21,25 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_BIND", default_value = "127.0.0.1:8080")]
     pub bind: SocketAddr,
 
-    /// Compute threads; 0 means one per core.
+    /// Compute threads, 0 for one per core.
     #[arg(long, env = "GRAMIAN_THREADS", default_value_t = 0, value_parser = whole::<0, 4096>)]
     pub threads: usize,
 
-    /// Bytes of memory for everything: bodies, clouds, factorizations, work and answers. Absent: three quarters of what the
-    /// machine or the container has.
+    /// Bytes of memory for everything: bodies, clouds, factorizations, work and answers. Absent: three
+    /// quarters of the memory of the machine or the container.
     #[arg(long, env = "GRAMIAN_MEMORY_BYTES", value_parser = enough_bytes)]
     pub memory_bytes: Option<usize>,
 
-    /// Of these, bytes of factorizations and weights that are kept, an eighth of it for the next factorization; less where
-    /// work needs them.
+    /// Bytes of this memory for cached factorizations and weights, an eighth of them for the next
+    /// factorization. Less where work needs them.
     #[arg(long, env = "GRAMIAN_CACHE_BYTES", default_value_t = 4 << 30)]
     pub cache_bytes: usize,
 
-    /// Of these, bytes of registered clouds that are kept, an eighth of all at most.
+    /// Bytes of this memory for registered clouds, at most an eighth of all.
     #[arg(long, env = "GRAMIAN_CLOUD_BYTES", default_value_t = 512 << 20)]
     pub cloud_bytes: usize,
 
-    /// Points a cloud may have, whatever solves for it.
+    /// Points a cloud may have, with any solver.
     #[arg(long, env = "GRAMIAN_MAX_POINTS", default_value_t = 2_000_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_points: usize,
 
@@ -59,52 +59,55 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_MAX_BODY_BYTES", default_value_t = 256 << 20, value_parser = whole::<1, MAX_BYTES>)]
     pub max_body_bytes: usize,
 
-    /// Bytes an answer may have, estimated at 25 bytes a number before anything is computed.
+    /// Bytes an answer may have, estimated at 25 bytes per number before anything is computed.
     #[arg(long, env = "GRAMIAN_MAX_RESPONSE_BYTES", default_value_t = 1 << 30, value_parser = whole::<1, MAX_BYTES>)]
     pub max_response_bytes: usize,
 
-    /// Compute requests that may wait for a thread; the next one is answered 503.
+    /// Compute requests that may wait for a thread. The next one is answered 503.
     #[arg(long, env = "GRAMIAN_MAX_QUEUE", default_value_t = 256, value_parser = whole::<0, MAX_COUNT>)]
     pub max_queue: usize,
 
-    /// Connections at once; beyond it the one without a request for longest is closed, or the next one is answered 503.
+    /// Connections at once. A newcomer beyond it replaces the one without a request for longest, or is
+    /// answered 503.
     #[arg(long, env = "GRAMIAN_MAX_CONNECTIONS", default_value_t = 1000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_connections: usize,
 
-    /// Seconds from the arrival of a request to its answer; later it is answered 504.
+    /// Seconds from the arrival of a request to its answer. Later it is answered 504.
     #[arg(long, env = "GRAMIAN_DEADLINE_SECONDS", default_value_t = 120.0, value_parser = positive_seconds)]
     pub deadline_seconds: f64,
 
-    /// Seconds that a body may be late by: it must come at 16 KiB a second otherwise, or is answered 408.
+    /// Seconds by which a body may lag behind 16 KiB per second. A slower one is answered 408.
     #[arg(long, env = "GRAMIAN_BODY_SECONDS", default_value_t = 10.0, value_parser = positive_seconds)]
     pub body_seconds: f64,
 
-    /// Seconds a connection may be without a request: between two of them, or with a head that is not complete.
+    /// Seconds a connection may be without a request: between two of them, or with an incomplete head.
     #[arg(long, env = "GRAMIAN_IDLE_SECONDS", default_value_t = 60.0, value_parser = positive_seconds)]
     pub idle_seconds: f64,
 
-    /// Seconds that a client may leave an answer unread, or fall behind a reader of 64 KiB per second; then it is cut.
+    /// Seconds that a client may leave an answer unread, or lag behind a reader of 64 KiB per second. Then it
+    /// is cut.
     #[arg(long, env = "GRAMIAN_SEND_SECONDS", default_value_t = 30.0, value_parser = positive_seconds)]
     pub send_seconds: f64,
 
-    /// Seconds for clients to read their answers once the server has been told to end and computes nothing any more.
+    /// Seconds for clients to read their answers after the server was told to end and all computations ended.
     #[arg(long, env = "GRAMIAN_DRAIN_SECONDS", default_value_t = 30.0, value_parser = positive_seconds)]
     pub drain_seconds: f64,
 
-    /// Seconds that a job may take; later it fails.
+    /// Seconds that a job may take. Then it fails.
     #[arg(long, env = "GRAMIAN_JOB_SECONDS", default_value_t = 86400.0, value_parser = positive_seconds)]
     pub job_seconds: f64,
 
-    /// Seconds that the result of a job is kept.
+    /// Seconds for which the result of a job is kept.
     #[arg(long, env = "GRAMIAN_JOB_RESULT_SECONDS", default_value_t = 3600.0, value_parser = positive_seconds)]
     pub job_result_seconds: f64,
 
-    /// Jobs that are kept with their results, of one key of several half of them; the next one is answered
-    /// 503.
+    /// Jobs that are kept with their results. One of several keys may have half of them. The next job is
+    /// answered 503.
     #[arg(long, env = "GRAMIAN_MAX_JOBS", default_value_t = 10_000, value_parser = whole::<1, MAX_COUNT>)]
     pub max_jobs: usize,
 
-    /// A certificate with the authorities up to a root, in PEM: with it TLS is spoken and nothing else. Read again when it changes.
+    /// A certificate with the authorities up to a root, in PEM. With it, only TLS is served. Read again when
+    /// it changes.
     #[arg(long, env = "GRAMIAN_TLS_CERTIFICATE", requires = "tls_key")]
     pub tls_certificate: Option<PathBuf>,
 
@@ -112,19 +115,21 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_TLS_KEY", requires = "tls_certificate")]
     pub tls_key: Option<PathBuf>,
 
-    /// Bearer keys, separated by commas; without keys the service is open.
+    /// Bearer keys, separated by commas. Without keys the service is open.
     #[arg(long, env = "GRAMIAN_API_KEYS", value_delimiter = ',', hide_env_values = true, value_parser = api_key)]
     pub api_keys: Vec<String>,
 
-    /// A file of hashes of bearer keys with their names and limits (`gramian key` makes lines for it), read again when it changes.
+    /// A file of hashes of bearer keys with their names and limits, read again when it changes. `gramian key`
+    /// makes its lines.
     #[arg(long, env = "GRAMIAN_KEYS_FILE")]
     pub keys_file: Option<PathBuf>,
 
-    /// Whether to serve anyone who reaches an address beyond this machine without keys, which is refused otherwise.
+    /// Whether to serve everyone on an address beyond this machine without keys, which is refused otherwise.
     #[arg(long, env = "GRAMIAN_ALLOW_ANONYMOUS", default_value_t = false, action = clap::ArgAction::Set, value_parser = flag)]
     pub allow_anonymous: bool,
 
-    /// Where clouds outlive the process: a directory, or `s3://bucket/prefix`, `gs://…`, `az://…`. Absent: memory alone.
+    /// Store of clouds that outlive the process: a directory, or `s3://bucket/prefix`, `gs://…`, `az://…`.
+    /// Absent: memory alone.
     #[arg(long, env = "GRAMIAN_STORE")]
     pub store: Option<Place>,
 
@@ -132,19 +137,19 @@ pub struct Config {
     #[arg(long, env = "GRAMIAN_STORE_REQUIRED", default_value_t = false, action = clap::ArgAction::Set, value_parser = flag)]
     pub store_required: bool,
 
-    /// Days that a cloud stays in the store after it was written. Absent: for ever.
+    /// Days that a cloud stays in the store after it was written. Absent: forever.
     #[arg(long, env = "GRAMIAN_STORE_DAYS", value_parser = positive_days)]
     pub store_days: Option<f64>,
 
-    /// Bytes that the store may have of clouds; beyond them the oldest go. Absent: any number.
+    /// Bytes of clouds in the store. Beyond them the oldest are deleted. Absent: unlimited.
     #[arg(long, env = "GRAMIAN_STORE_BYTES", value_parser = clap::value_parser!(u64).range(1..))]
     pub store_bytes: Option<u64>,
 
-    /// Bytes that the store may have of factorizations; beyond them the oldest go. 0 keeps none.
+    /// Bytes of factorizations in the store. Beyond them the oldest are deleted. 0 keeps none.
     #[arg(long, env = "GRAMIAN_STORE_FACTOR_BYTES", default_value_t = 16 << 30)]
     pub store_factor_bytes: u64,
 
-    /// Bytes that the store may have of jobs and their results, of one key of several half of them; results
+    /// Bytes of jobs and their results in the store. One of several keys may have half of them. Results
     /// beyond them are refused.
     #[arg(long, env = "GRAMIAN_STORE_JOB_BYTES", default_value_t = 16 << 30, value_parser = whole::<1, MAX_BYTES>)]
     pub store_job_bytes: usize,
@@ -168,7 +173,7 @@ impl Config {
         self.memory_bytes.unwrap_or_else(machine::default_bytes)
     }
 
-    /// How late a body may be.
+    /// Time by which a body may be late.
     pub fn body_timeout(&self) -> Duration {
         Duration::from_secs_f64(self.body_seconds)
     }
@@ -193,38 +198,39 @@ impl Config {
         Duration::from_secs_f64(self.drain_seconds)
     }
 
-    /// How long the result of a job is kept.
+    /// Time for which the result of a job is kept.
     pub fn job_result(&self) -> Duration {
         Duration::from_secs_f64(self.job_result_seconds)
     }
 
-    /// How long a result is kept, and how long nobody may have been at a job until nobody will be.
+    /// Times after which jobs of removed keys are deleted: since their end, or since the last work on an
+    /// unfinished one.
     pub fn job_retention(&self) -> (Duration, Duration) {
         (self.job_result(), self.job_result() + Duration::from_secs_f64(self.job_seconds))
     }
 
-    /// What of the store goes by itself.
+    /// Limits on the age and the bytes of the store.
     pub fn retention(&self) -> Retention {
         let age = self.store_days.map(|days| Duration::from_secs_f64(days * 86400.0));
         Retention { age, n_bytes: self.store_bytes, n_factor_bytes: self.store_factor_bytes }
     }
 
-    /// Whether it serves without keys.
+    /// Returns whether the service runs without keys.
     pub fn is_open(&self) -> bool {
         self.api_keys.is_empty() && self.keys_file.is_none()
     }
 
-    /// How many share memory and queue: one, or several.
+    /// Number of owners that share memory and queue. A file of keys counts as at least two.
     pub fn n_owners(&self) -> usize {
         if self.keys_file.is_some() { self.api_keys.len().max(2) } else { self.api_keys.len().max(1) }
     }
 
-    /// Whether other machines reach it and need no key.
+    /// Returns whether other machines reach the service and need no key.
     pub fn is_exposed(&self) -> bool {
         self.is_open() && !self.bind.ip().to_canonical().is_loopback()
     }
 
-    /// Those of the names that look like settings and are none: mistyped ones, most of the time.
+    /// Returns the names that look like settings but are none, usually because of a typing error.
     pub fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
         let command = Self::augment_args(clap::Command::new("gramian"));
         let is_known =
@@ -233,7 +239,7 @@ impl Config {
     }
 }
 
-/// As many as the process needs to answer at all.
+/// Parses a number of bytes, at least as many as the process needs to answer at all.
 fn enough_bytes(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(bytes) if bytes >= machine::LEAST_BYTES => Ok(bytes),
@@ -241,7 +247,7 @@ fn enough_bytes(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Bounds beyond which no machine goes, and sums of products of settings stay within 64 bits.
+/// Bounds beyond any real machine. Sums of products of settings within them fit 64 bits.
 const MAX_COUNT: u64 = 1 << 30;
 const MAX_BYTES: u64 = 1 << 50;
 
@@ -251,7 +257,7 @@ fn whole<const MIN: u64, const MAX: u64>(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| format!("must be a whole number from {MIN} to {MAX}"))
 }
 
-/// `1` and `0` as well as `true` and `false`.
+/// Parses `1` and `0` as well as `true` and `false`.
 fn flag(text: &str) -> Result<bool, String> {
     match text {
         "1" | "true" => Ok(true),
@@ -260,7 +266,7 @@ fn flag(text: &str) -> Result<bool, String> {
     }
 }
 
-/// Up to ten years, so that instants that far ahead are representable.
+/// Parses seconds up to ten years, so that instants that far ahead are representable.
 fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3e8 => Ok(seconds),
@@ -268,7 +274,7 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Up to ten years as well.
+/// Parses days up to ten years, so that instants that far ahead are representable.
 fn positive_days(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(days) if days > 0.0 && days <= 3650.0 => Ok(days),
@@ -276,7 +282,8 @@ fn positive_days(text: &str) -> Result<f64, String> {
     }
 }
 
-/// One entry. A blank one is refused: a variable that was meant to hold keys and holds none would leave the service open.
+/// Parses one key. A blank one is refused: a variable meant to hold keys that holds none would leave the
+/// service open.
 fn api_key(text: &str) -> Result<String, String> {
     match text.trim() {
         "" => Err("a key is blank; unset GRAMIAN_API_KEYS to run without keys".to_owned()),
@@ -284,12 +291,12 @@ fn api_key(text: &str) -> Result<String, String> {
     }
 }
 
-/// Where browsers may call from.
+/// Origins that browsers may call from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origins {
-    /// From everywhere.
+    /// Every origin.
     Any,
-    /// From these, as browsers write them: `scheme://host[:port]`.
+    /// Listed origins, as browsers write them: `scheme://host[:port]`.
     Listed(Vec<String>),
 }
 
@@ -306,8 +313,8 @@ impl FromStr for Origins {
     }
 }
 
-/// Browsers send origins in lower case, without a path and without the port that the scheme implies; one that is written
-/// otherwise would never match.
+/// Checks the form of an origin. Browsers send origins in lower case, without a path and without the port
+/// that the scheme implies. An origin written otherwise would never match.
 fn origin(text: &str) -> Result<String, String> {
     let refused = || format!("{text:?} is no origin such as https://app.example or http://localhost:3000");
     let uri: Uri = text.parse().map_err(|_| refused())?;

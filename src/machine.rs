@@ -1,21 +1,22 @@
-//! The memory that the machine and the control groups around the process allow.
+//! Memory limits of the machine and of the control groups around the process.
 
 use std::path::Path;
 
-/// The least that the process can work in: itself, and clouds of some hundred points.
+/// Least memory in which the process can work: itself, and clouds of some hundred points.
 pub const LEAST_BYTES: usize = 128 << 20;
 
-/// Three quarters of what the process may use: of the least of the machine's memory and the limits of its control groups.
+/// Three quarters of the memory that the process may use: the least of the machine's and its control groups'
+/// limits.
 pub fn default_bytes() -> usize {
     let limit = usize::try_from(limit(Path::new("/"))).unwrap_or(usize::MAX);
     (limit / 4 * 3).max(LEAST_BYTES)
 }
 
-/// The least of the machine's memory and the limits of all control groups around the process, of either version: every
-/// ancestor binds. In a container the path of the group may not exist, but its ancestors' do.
+/// The least of the machine's memory and the limits of all control groups around the process, of either
+/// version. Every ancestor binds. In a container the path of the group may not exist, but its ancestors do.
 fn limit(root: &Path) -> u64 {
     let read = |path: &str| std::fs::read_to_string(root.join(path.trim_start_matches('/'))).ok();
-    // Where there is no limit, the file says "max".
+    // Without a limit, the file says "max".
     let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
     let machine = read("/proc/meminfo").and_then(|text| {
         let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
@@ -40,7 +41,7 @@ fn limit(root: &Path) -> u64 {
     least
 }
 
-/// Where the operating system does not say how much there is.
+/// Memory assumed where the operating system does not report it.
 const FALLBACK_BYTES: u64 = 4 << 30;
 
 #[cfg(test)]

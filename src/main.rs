@@ -1,4 +1,5 @@
-//! Arguments and environment to configuration; serve, or ask a running server how it is.
+//! Entry point: reads the configuration, then serves, or asks a running server whether it is ready, or makes
+//! a key.
 
 use std::process::ExitCode;
 
@@ -11,7 +12,7 @@ use gramian::{server, telemetry};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-/// The status of a process that was told to end and told again before it had: 128 and the number of SIGINT, as shells have it.
+/// Exit status after a second signal during shutdown: 128 plus the number of SIGINT, as shells report it.
 const INTERRUPTED: i32 = 130;
 
 #[global_allocator]
@@ -33,7 +34,7 @@ enum Command {
     Health,
     /// Make a key, and the lines for the file of keys (GRAMIAN_KEYS_FILE) that let it in.
     Key {
-        /// Who has it: letters, digits, '-' and '_'.
+        /// Name of its holder: letters, digits, '-' and '_'.
         name: String,
     },
 }
@@ -63,7 +64,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// The key goes to standard error, which is seen, and the lines, which do not tell it, to standard output, to be added to a file.
+/// Prints a new key to standard error, where it is seen, and its lines for the key file to standard output.
+/// The lines do not reveal the key.
 fn make_key(name: &str) -> Result<(), String> {
     let (key, lines) = access::generate(name)?;
     eprintln!("The key, which nothing keeps: {key}");
@@ -107,7 +109,7 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// What tells the process to end.
+/// Signals that tell the process to end.
 struct Signals {
     terminate: Signal,
     interrupt: Signal,

@@ -1,54 +1,60 @@
-//! One budget of memory for the process, and what its parts are for.
+//! The memory budget of the process, divided into parts by purpose.
 //!
-//! Everything that a request can make the process hold is taken from a part before it is allocated: bodies that are read,
-//! unpacked and parsed; clouds that are kept; factors and weights, kept or in use; the work with them, and answers until
-//! their last byte is sent. What is paid once, by threads, allocator and the program itself, has a part as well.
+//! Everything that a request can make the process hold is reserved from a part before it is allocated. The
+//! parts hold bodies that are read, unpacked and parsed, clouds in memory, and factors and weights, cached or
+//! in use. They also hold work with these, and answers until their last byte is sent. Fixed costs of threads,
+//! allocator and the program itself have a part as well.
 
 use crate::config::Config;
 
-/// What the process takes without any request: the program, and the stacks and scratch space of two threads.
+/// Bytes that the process takes without any request: the program, and stacks and scratch space of two
+/// threads.
 const OWN_BYTES: usize = 48 << 20;
 
 /// Stacks and packing buffers of a further thread of each lane.
 const BYTES_PER_THREAD: usize = 20 << 20;
 
-/// Of the budget without what the process itself takes: the part for requests that are read, unpacked, parsed or wait.
+/// Divisor of the budget left by the process, clouds and spare: the part for requests that are read,
+/// unpacked, parsed or wait.
 const INTAKE_SHARE: usize = 4;
 
-/// The part for jobs and their results, where they are in memory.
+/// Divisor of the budget left by the process, clouds and spare: the part for jobs and their results, if they
+/// are in memory.
 const JOBS_SHARE: usize = 32;
 
-/// Bytes of numbers for each byte that a body may have: JSON has a number in two bytes, its comma included.
+/// Bytes of numbers for each byte of a body: JSON has a number in two bytes, its comma included.
 pub const NUMBERS_PER_BODY: usize = 4;
 
-/// A body takes six times its limit at most: itself, what it is unpacked to, and four times that as numbers. That fits in seven
-/// parts of eight of as many times its limit, which is the most that one may have.
+/// Divisor of the intake that gives the limit of one body. A body takes at most six times its limit: itself,
+/// its unpacked form, and four times that as numbers. One body may reserve seven eighths of the intake, which
+/// is seven times its limit.
 const BODIES_PER_REQUEST: usize = 8;
 
-/// The same where there are several owners, of whom one may have half.
+/// Divisor of the intake for several owners. One owner may reserve half of it, which is seven times the
+/// limit.
 const BODIES_PER_REQUEST_OF_MANY: usize = 14;
 
-/// What each part may take, in bytes.
+/// Bytes of each part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
     /// Bodies that are read and unpacked, and requests that wait.
     pub intake: usize,
-    /// Jobs and their results, where no store has them.
+    /// Jobs and their results, if there is no store.
     pub jobs: usize,
     /// Registered clouds.
     pub clouds: usize,
-    /// Factors and weights, kept or in use, all work with them, and answers.
+    /// Factors and weights, cached or in use, all work with them, and answers.
     pub work: usize,
-    /// Of the work: what factors and weights that are kept may take.
+    /// Cached factors and weights, a part of `work`.
     pub cache: usize,
-    /// What is kept for the next factorization.
+    /// Reserve for the next factorization.
     pub spare: usize,
-    /// A body, and what it is unpacked to.
+    /// Limit of one body, and of its unpacked form.
     pub body: usize,
 }
 
 impl Memory {
-    /// Divides the budget; the settings for single parts are upper bounds.
+    /// Divides the budget. The settings for single parts are upper bounds.
     pub fn of(config: &Config) -> Self {
         let total = config.memory_bytes();
         let own = (OWN_BYTES + BYTES_PER_THREAD * config.n_threads()).min(total / 3);
@@ -104,7 +110,7 @@ mod tests {
                 }
             }
         }
-        // With memory enough the settings are what they say.
+        // With enough memory, each part is as large as its setting.
         let memory = Memory::of(&config(&["--memory-bytes", "68719476736", "--threads", "2"]));
         assert_eq!(
             (memory.clouds, memory.body, memory.cache + memory.spare),
@@ -126,9 +132,10 @@ mod tests {
                 config.max_points >= N && config.max_queries >= N && memory.body >= JSON_BYTES,
                 "{memory:?}"
             );
-            // Points, normals and what is known of their neighbours.
+            // Points, normals and data on their neighbours.
             assert!(memory.clouds >= N * (24 + 24 + 60), "{memory:?}");
-            // Curvatures with deviations: 20 numbers a point as text, and twice as numbers while they are put together.
+            // Curvatures with deviations: 20 numbers per point as text, and twice as numbers while they are
+            // assembled.
             assert!(config.max_response_bytes >= 2 * N * 20 * 25);
             assert!(Budget::new(memory.work, n_owners).largest() >= 2 * N * 20 * 8);
         }

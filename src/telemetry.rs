@@ -1,4 +1,5 @@
-//! Logs: one JSON line each, to standard error; and spans of requests, to a collector of OpenTelemetry if there is one.
+//! Logs and traces. Logs are one JSON line per event on standard error. Spans of requests go to an
+//! OpenTelemetry collector, if there is one.
 
 use opentelemetry::{KeyValue, global};
 use opentelemetry_otlp::SpanExporter;
@@ -11,23 +12,26 @@ use tracing_subscriber::fmt;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
-/// Lines that wait for a reader that is slow, or has stopped: some megabytes.
+/// Lines that wait for a slow or stopped reader: some megabytes.
 const MAX_WAITING_LINES: usize = 4096;
 
-/// The log, written by a thread of its own until this is dropped, when what still waits is written. No request waits for
-/// whoever reads the log: a line that finds too many before it is lost, and counted.
+/// The log, written by a thread of its own. Dropping it writes the waiting lines. No request waits for a
+/// reader of the log: a line that finds the queue full is lost and counted.
 pub struct Log {
     _writer: WorkerGuard,
     lost: ErrorCounter,
     spans: Option<SdkTracerProvider>,
 }
 
-/// The variables of OpenTelemetry that name a collector; further ones say how to send (OTEL_EXPORTER_OTLP_HEADERS), how many
-/// (OTEL_TRACES_SAMPLER) and under which name (OTEL_SERVICE_NAME).
+/// OpenTelemetry variables that name a collector. Others set headers (OTEL_EXPORTER_OTLP_HEADERS), sampling
+/// (OTEL_TRACES_SAMPLER) and the service name (OTEL_SERVICE_NAME).
 const COLLECTORS: [&str; 2] = ["OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT"];
 
-/// Starts logging at the level of `RUST_LOG`, which may name levels of single modules as well; `info` if absent. To be called outside of the
-/// async runtime: spans are sent by a thread of their own, which waits for answers.
+/// Starts logging at the level of `RUST_LOG`, which may also name levels of single modules. The default is
+/// `info`.
+///
+/// Must be called outside the async runtime: spans are sent by a thread of their own, which blocks on
+/// answers.
 pub fn start() -> Log {
     let wanted = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(Level::INFO));
@@ -38,7 +42,8 @@ pub fn start() -> Log {
     Log { _writer: writer, lost, spans: send_spans() }
 }
 
-/// Has spans sent to the collector that the environment names, if it does: OTLP over HTTP, in batches. No request waits for it.
+/// Starts sending spans to the collector that the environment names, if any: OTLP over HTTP, in batches. No
+/// request waits for it.
 fn send_spans() -> Option<SdkTracerProvider> {
     COLLECTORS.iter().find(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))?;
     let exporter = match SpanExporter::builder().with_http().build() {
@@ -61,7 +66,7 @@ fn send_spans() -> Option<SdkTracerProvider> {
 }
 
 impl Drop for Log {
-    /// Sends what has not been sent.
+    /// Sends the remaining spans.
     fn drop(&mut self) {
         if let Some(Err(error)) = self.spans.take().map(|spans| spans.shutdown()) {
             tracing::warn!(%error, "the last spans were not sent");
@@ -70,7 +75,7 @@ impl Drop for Log {
 }
 
 impl Log {
-    /// Says how many lines were lost, if any.
+    /// Logs how many lines were lost, if any.
     pub fn mention_losses(&self) {
         let n_lines = self.lost.dropped_lines();
         if n_lines > 0 {

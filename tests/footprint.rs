@@ -15,6 +15,7 @@ use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::model::{Model, Recipe};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
@@ -131,13 +132,13 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
         let factor = System::new(Arc::new(cloud), kernel, alpha)
             .and_then(|system| Solver::dense(system, &Unobserved))
             .unwrap();
-        Ok(PreparedFit::new(factor, Duration::ZERO, Duration::ZERO, memory))
+        Ok(PreparedFit::new(Model::System(Arc::new(factor)), Duration::ZERO, Duration::ZERO, memory))
     };
     let memory =
         store.reserve(OWNER, choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
     let (stored, _) = store.get_or_prepare(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
-        let factor = stored.solver().unwrap().clone();
+        let factor = stored.model().solver().unwrap().clone();
         let make = |memory| async move { Ok((fits::surface(&factor), memory)) };
         let memory =
             store.reserve(OWNER, choose(n, 3, usize::MAX).surface.n_bytes, || true).await.unwrap().unwrap();
@@ -152,7 +153,8 @@ fn kernel(k: usize) -> Kernel {
 }
 
 fn key(cloud: &Cloud, kernel: &Kernel, alpha: &Regularization) -> FitKey {
-    FitKey::of(SolverKind::Dense, OWNER, CloudId::of(cloud, None), kernel, alpha, false)
+    let recipe = Recipe::of_values(SolverKind::Dense, kernel.clone(), alpha.clone());
+    FitKey::of(OWNER, CloudId::of(cloud, None), &recipe, false)
 }
 
 fn resident_bytes() -> f64 {

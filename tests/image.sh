@@ -1,16 +1,22 @@
 #!/usr/bin/env bash
-# Builds the Dockerfile, unchanged, and runs the image, on a Debian machine that has no container engine, registry or
-# daemon: `sudo tests/image.sh`. About five minutes on two cores, most of it the release build.
+# Builds the Dockerfile, unchanged, and runs the image: `sudo tests/image.sh`. Works on a Debian machine
+# without container engine, registry or daemon. Takes about five minutes on two cores, most of it for the
+# release build.
 #
-# - podman builds and runs. All its state lies in one temporary folder, which goes when the script ends.
-# - The two base images are stand-ins under the names that the Dockerfile uses: Debian from the mirror that apt is
-#   configured with, and for the build stage the same plus a C compiler, with the toolchain of this machine mounted.
-# - Nothing here names a host. What this machine needs to reach crates.io (proxy, CA bundle, cargo settings) is handed
-#   to the build where it is present.
+# - podman builds and runs. All its state is in one temporary folder, which is removed when the script ends.
+# - The two base images are stand-ins under the names that the Dockerfile uses. The last stage gets Debian
+#   from the mirror that apt is configured with. The build stage gets the same plus a C compiler, with the
+#   toolchain of this machine mounted.
+# - No host name is written here. Whatever this machine needs to reach crates.io (proxy, CA bundle, cargo
+#   settings) is passed to the build if it is present.
 #
-# What it checks: the service becomes ready, the image's own health check passes, a request is answered, the process is
-# not root and needs neither capabilities nor a writable file system, SIGTERM ends it at once with status 0 but for the request that it
-# still answers, a cloud is there again when another container has the same volume, and without keys or permission it does not start.
+# What it checks:
+#
+# - The service becomes ready, the image's own health check passes, and a request is answered.
+# - The process is not root and needs neither capabilities nor a writable file system.
+# - SIGTERM ends the service at once with status 0, except that a request under way is still answered.
+# - A cloud survives in the volume: another container with the same volume has it.
+# - Without keys or explicit permission the service does not start.
 set -euo pipefail
 
 readonly image=localhost/gramian:test
@@ -27,20 +33,21 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 [[ $EUID -eq 0 ]] || fail "this needs root: it makes root file systems and containers"
 
 work=$(mktemp -d "${TMPDIR:-/var/tmp}/gramian-image.XXXXXX")
-# Build caches and layers under way go here too, so that nothing is left in /var/tmp.
+# Build caches and unfinished layers go here too, so that nothing is left in /var/tmp.
 export TMPDIR=$work/tmp
 mkdir "$TMPDIR"
 
-# vfs works on every file system, at the price of a full copy per layer. cgroupfs and no event log: there may be no
-# systemd. runc: crun refuses machines whose cgroups are half v1, half v2. Below `fatal`, podman would report at each
-# step that it has no systemd to set health check timers with; an error that ends a command is printed all the same.
+# vfs works on every file system, at the price of a full copy per layer. cgroupfs and no event log, because
+# there may be no systemd. runc, because crun refuses machines whose cgroups are half v1, half v2. At any log
+# level below `fatal`, podman would report at each step that it has no systemd for health check timers. An
+# error that ends a command is printed anyway.
 engine() {
   podman --log-level fatal --root "$work/storage" --runroot "$work/run" --tmpdir "$work/libpod" --storage-driver vfs \
     --cgroup-manager cgroupfs --events-backend none --runtime "$(command -v runc)" "$@"
 }
 
-# The container has a network of its own, with nothing but its loopback: no port of this machine can be in the way,
-# and none is opened.
+# The container has its own network with only a loopback interface. So it cannot collide with a port of this
+# machine, and opens none.
 inside() { nsenter --net="/proc/$pid/ns/net" -- "$@"; }
 
 clean_up() {
@@ -53,7 +60,7 @@ clean_up() {
   fi
   engine rm --force --all >/dev/null 2>&1
   rm -rf "$work"
-  # Left empty by podman; rmdir refuses one that somebody else's container is in.
+  # Left empty by podman. rmdir refuses a folder that another container still uses.
   find /sys/fs/cgroup -depth -type d -path '*/libpod_parent*' -exec rmdir {} + 2>/dev/null
   exit "$status"
 }
@@ -70,16 +77,17 @@ apt-get -qq update
 apt-get -qq install --no-install-recommends podman runc mmdebstrap curl jq >"$work/apt.log" 2>&1 ||
   { cat "$work/apt.log" >&2; fail "apt-get could not install what this needs"; }
 
-# Asked of apt rather than read from its files: it knows both formats of them.
+# apt is asked, rather than its files read, because it knows both of their formats.
 # shellcheck disable=SC2016  # $(REPO_URI) is a field of apt's, not a command.
 mirror=$(apt-get indextargets --format '$(REPO_URI)' \
   'Created-By: Packages' 'Codename: bookworm' 'Label: Debian' 'Component: main' | sort -u | head -n 1)
 [[ -n $mirror ]] || fail "apt is configured with no mirror of Debian bookworm"
-# Proxies and the like.
+# Settings for fetching, such as proxies.
 apt-config dump --format '%f "%v";%n' Acquire >"$work/apt.conf"
 
-# debian TAG [mmdebstrap options]: imports a minimal Debian as TAG. Like the published slim image it comes without
-# documentation, so that the size at the end means something. `--change` arguments for podman are in $changes.
+# debian TAG [mmdebstrap options]: imports a minimal Debian as TAG. The published slim image has no
+# documentation, so this one has none either. Otherwise the size at the end would mean nothing. `--change`
+# arguments for podman are in $changes.
 changes=()
 debian() {
   local tag=$1
@@ -99,14 +107,14 @@ rust_version=$(sed -n 's/^FROM rust:\([0-9.]*\)-bookworm AS build$/\1/p' Dockerf
 
 say "base image of the build stage: the same and a C compiler"
 changes=(--change 'ENV CARGO_HOME=/usr/local/cargo' --change 'ENV PATH=/usr/local/rust/bin:/usr/sbin:/usr/bin:/sbin:/bin')
-# Cargo's settings from the environment go into this image, not into the build's arguments: those would need a line in
-# the Dockerfile each.
+# Cargo's settings from the environment go into this image. As build arguments, each would need a line in the
+# Dockerfile.
 while IFS= read -r setting; do
   changes+=(--change "ENV ${setting%%=*}=\"${setting#*=}\"")
 done < <(env | grep -E '^CARGO_(HTTP|NET|REGISTRIES|REGISTRY|SOURCE)_' | grep -v '^CARGO_HTTP_CAINFO=')
 debian "docker.io/library/rust:$rust_version-bookworm" --include=gcc,libc6-dev,ca-certificates
 
-# Mounted, not copied: each layer would hold the toolchain once more.
+# Mounted, not copied: otherwise each layer would hold the toolchain again.
 mounts=(--volume "$(rustc --print sysroot):/usr/local/rust:ro")
 ca_bundle=${CARGO_HTTP_CAINFO:-${SSL_CERT_FILE:-/etc/ssl/certs/ca-certificates.crt}}
 [[ -f $ca_bundle ]] && mounts+=(--volume "$ca_bundle:/etc/ssl/certs/ca-certificates.crt:ro")
@@ -114,20 +122,20 @@ cargo_config=${CARGO_HOME:-$HOME/.cargo}/config.toml
 [[ -f $cargo_config ]] && mounts+=(--volume "$cargo_config:/usr/local/cargo/config.toml:ro")
 
 say "the image, with $(rustc --version)"
-# Only the Docker format keeps a HEALTHCHECK. Proxy variables are passed on by podman itself. Layers of single
-# instructions would serve a second build, and there is none.
+# Only the Docker format keeps a HEALTHCHECK. podman itself passes proxy variables on. Layers of single
+# instructions would only speed up a second build, and there is none.
 engine build --layers=false --isolation chroot --network host --pull=never --format docker "${mounts[@]}" --tag "$image" .
 
 say "run"
-# Without --ulimit podman asks for more than this machine may be allowed to give. The health check has no timer: that
-# would need systemd, and the check itself is run below.
+# Without --ulimit, podman asks for more than this machine may be allowed to give. The health check has no
+# timer, because that would need systemd. The check itself is run below.
 limits=(--network none --health-interval disable --ulimit nofile=1000:1000 --ulimit nproc=1000:1000 --read-only
   --cap-drop all --security-opt no-new-privileges)
 if engine run --rm "${limits[@]}" "$image" 2>"$work/refused.log"; then fail "it starts without keys or permission"; fi
 grep -q GRAMIAN_ALLOW_ANONYMOUS "$work/refused.log" || fail "it does not say why it does not start: $(cat "$work/refused.log")"
 say "without keys or permission it does not start"
 
-# The volume is filled from the image, and so belongs to its user.
+# A new volume is filled from the image, so it belongs to the image's user.
 start() {
   engine run --detach --name "$container" "${limits[@]}" --volume gramian-clouds:/var/lib/gramian \
     --env GRAMIAN_ALLOW_ANONYMOUS=1 --env GRAMIAN_STORE=/var/lib/gramian --env GRAMIAN_STORE_REQUIRED=1 "$image" >/dev/null
@@ -162,7 +170,7 @@ jq --exit-status --argjson n "$n_points" '.mean_curvatures | length == $n and al
 say "$n_points mean curvatures of the torus"
 
 id=$(jq --raw-output .diagnostics.cloud_id "$work/answer.json")
-stop() { # stop [SECONDS]: within these
+stop() { # stop [SECONDS]: ends the service within that time, by default stop_seconds
   local started=$SECONDS seconds=${1:-$stop_seconds} exit_code
   engine stop --time $((2 * seconds)) "$container" >/dev/null
   exit_code=$(engine inspect --format '{{.State.ExitCode}}' "$container")

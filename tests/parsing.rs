@@ -1,9 +1,10 @@
-//! Bodies as an attacker writes them: whatever they hold, they are read or refused in seconds, without a panic, and within three
-//! times their size in memory, beside what the limits let a request keep.
+//! Bodies as an attacker writes them. Each is read or refused in seconds and without a panic. Its memory is
+//! at most three times its size, besides what the limits let a request keep.
 //!
-//! A process of its own, for the allocator that counts. The tests wait for each other: its count is everybody's.
+//! These tests are a process of their own, because its allocator counts. They run one at a time, since the
+//! count covers all threads.
 
-// These threads are no pool's.
+// The lint keeps locks and waits off the threads of pools. The threads of tests belong to no pool.
 #![allow(clippy::disallowed_methods)]
 
 use std::collections::HashMap;
@@ -32,16 +33,16 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// What any request takes, however small: tables of decoders, messages, a header of tensors.
+/// Bytes that any request may take, however small: tables of decoders, messages, a header of tensors.
 const BASE_BYTES: usize = 2 << 20;
 
-/// Three quarters of what is the default, so that the bodies here need not be so large.
+/// Size limit of bodies, three quarters of the default, so that the bodies here can be smaller.
 const LIMIT_BYTES: usize = 48 << 20;
 
 const CONTEXT: ParseContext<'static> =
     ParseContext { max_points: 2000, max_queries: 3000, max_dimension: 16, observer: &Unobserved };
 
-/// A request with everything that requests have.
+/// A request with every kind of member.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
@@ -89,7 +90,7 @@ enum Family {
     Matern,
 }
 
-/// A cloud as npy and PLY have it.
+/// A cloud, as in npy and PLY files.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "it is parsed and dropped")]
@@ -99,15 +100,15 @@ struct CloudRequest {
     normals: Option<Points>,
 }
 
-/// For what a test allows, whatever it is unpacked to.
+/// Accepts every unpacked size.
 fn is_room(_n_bytes: usize) -> Result<(), Problem> {
     Ok(())
 }
 
 struct Outcome {
-    /// The document of the problem, if the body was refused.
+    /// Problem document, if the body was refused.
     problem: Option<Value>,
-    /// Bytes at the peak, the body itself included.
+    /// Peak bytes, including the body itself.
     peak: usize,
     took: Duration,
 }
@@ -133,7 +134,7 @@ fn kind(outcome: &Outcome) -> &str {
     outcome.problem.as_ref().map_or("accepted", |problem| problem["type"].as_str().unwrap())
 }
 
-/// A body that must be answered so, within its time and memory.
+/// Parses a body, and checks its outcome, its time and its memory.
 fn expect(what: &str, format: Format, body: &[u8], expected: &str) -> Outcome {
     let outcome = parse(format, Coding::Identity, body);
     assert_eq!(kind(&outcome), expected, "{what}: {:?}", outcome.problem);
@@ -164,7 +165,7 @@ fn lists_beyond_the_limits_are_counted_but_not_kept() {
         (r#"{"cloud":{"normals":[[]"#, ",[1,2]", "]}}", "/cloud/normals", 2000, N_BYTES / 6 + 1),
         (r#"{"cloud":{"points":[[0"#, ",1", "]]}}", "/cloud/points", 16, N_BYTES / 2 + 1),
         (r#"{"queries":[[0,0]"#, ",[1,2]", "]}", "/queries", 3000, N_BYTES / 6 + 1),
-        // A text with an escape is left to the slower parser.
+        // An escape sequence leaves the text to the slower parser.
         (r#"{"kernel":{"family":"g\u0061uss"},"values":[0"#, ",1", "]}", "/values", 2000, N_BYTES / 2 + 1),
         (r#"{"kernel":{"family":"g\u0061uss"},"queries":[[0"#, ",1", "]]}", "/queries", 16, N_BYTES / 2 + 1),
     ] {
@@ -212,7 +213,7 @@ fn texts_nesting_and_names_of_megabytes_are_refused_in_bounds() {
     expect("closed", Format::Json, nested.as_bytes(), "/problems/malformed-json");
 }
 
-/// Safetensors with a header as it is.
+/// Returns a safetensors file with this header, as it is.
 fn with_header(header: &str, data: &[u8]) -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes(), header.as_bytes(), data].concat()
 }
@@ -303,7 +304,7 @@ fn compressed_bodies_take_their_plain_size_at_most() {
         let outcome = parse(Format::Json, coding, &body);
         assert_eq!(kind(&outcome), "/problems/body-too-large");
         assert!(outcome.peak <= body.len() + BASE_BYTES, "{coding:?}: {}", outcome.peak);
-        // A body of nothing but empty members.
+        // A body of nothing but empty compressed members.
         let member = packed(coding, b"");
         let outcome = parse(Format::Json, coding, &member.repeat((1 << 20) / member.len()));
         assert_eq!(kind(&outcome), "/problems/malformed-json");
@@ -386,13 +387,13 @@ fn files_that_announce_more_than_they_have_take_nothing_for_it() {
     let words = format!("{}1 7\n{}", ply_head("ascii", 2), "x".repeat(N_BYTES));
     let outcome = expect("a long word", Format::Ply, words.as_bytes(), "/problems/malformed-body");
     assert!(outcome.problem.unwrap().to_string().len() < 1000);
-    // Beyond the limit of points nothing is read.
+    // Nothing is read beyond the limit of points.
     let many = format!("{}1 7\n{}", ply_head("ascii", 3000), "0 0 0 0 0 1 0 0\n".repeat(3000));
     let outcome = expect("many", Format::Ply, many.as_bytes(), "/problems/problem-too-large");
     assert!(pointer(&outcome) == "/points" && outcome.problem.unwrap()["required"] == 3000);
 }
 
-/// What is done to a body at one place.
+/// A change of a body at one place.
 #[derive(Debug, Clone)]
 enum Mutation {
     Set(u8),
@@ -486,7 +487,7 @@ fn mutated_bodies_are_read_or_refused() {
             mutate(&mut body, at, &mutation);
         }
         let outcome = parse(format, coding, &body);
-        // Numbers take up to twelve times their text while a list of them grows, which the limits bound.
+        // While a list of numbers grows, it takes up to twelve times its text. The limits bound its length.
         let allowed = 16 * plain.len().max(body.len()) + BASE_BYTES;
         prop_assert!(outcome.peak <= allowed, "{} bytes for {}", outcome.peak, plain.len());
         prop_assert!(outcome.took < Duration::from_secs(5), "{:?}", outcome.took);

@@ -4,17 +4,17 @@
     tests/readme.py [BASE_URL] [PAGE]…               asks the server at BASE_URL, http://localhost:8080 if absent
     tests/readme.py --binary GRAMIAN [PAGE]…         starts that binary for each page, on a free port, and ends it
 
-Without pages it runs README.md, docs/walkthrough.md and docs/operations.md, none of which needs what another did.
+Without pages it runs README.md, docs/walkthrough.md and docs/operations.md. No page depends on another.
 
-Every ```sh block that contains curl is run by bash, in order, in the root of the repository, with the server's address in
-place of localhost:8080. What it prints is compared with the fenced block that follows, ```json or ```text:
+Every ```sh block that contains curl is run by bash, in order, in the root of the repository. The server's
+address replaces localhost:8080. The output is compared with the fenced block that follows, ```json or ```text:
 
-- `…` matches anything: a JSON value, any run of entries of a list, any further members of an object, any part of a
-  string, any number of lines of text.
-- Numbers agree within RELATIVE of themselves, or within ROUNDING of the largest number of the list they are in.
-- The order of the members of an object does not matter; that of everything else does.
+- `…` matches anything: a JSON value, any run of entries of a list, any further members of an object, any part
+  of a string, any number of lines of text.
+- Numbers agree within RELATIVE of themselves, or within ROUNDING of the largest number of their list.
+- The order of the members of an object does not matter. Every other order does.
 
-Exits with 1 and the differences if there are any. Needs nothing but the standard library.
+If there are differences, prints them and exits with 1. Needs only the standard library.
 """
 
 import argparse
@@ -56,7 +56,7 @@ def main():
 
 
 def run(base, page):
-    """Checks every example of a page; returns how many fail."""
+    """Checks every example of a page. Returns how many fail."""
     examples = examples_of(page)
     if not examples:
         sys.exit(f"{page} has no ```sh block with curl")
@@ -74,7 +74,7 @@ def run(base, page):
 
 
 def examples_of(page):
-    """Pairs of blocks: (line, script, language of the answer, answer)."""
+    """Returns the examples of a page: (line, script, language of the answer, expected answer)."""
     blocks, language, start, body = [], None, 0, []
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         if not line.startswith("```"):
@@ -95,7 +95,7 @@ def examples_of(page):
 
 
 def check(script, language, expected, base):
-    """Runs one example; returns what it printed and what is wrong with that."""
+    """Runs one example. Returns its output, and the differences from the expected one."""
     here = re.sub(r"(http://)?localhost:8080", lambda _: base, script)
     command = ["bash", "-euo", "pipefail", "-c", here]
     try:
@@ -118,7 +118,10 @@ def check(script, language, expected, base):
 
 
 def differences(pattern, answer, path="", scale=None):
-    """What is wrong with an answer, in words; nothing if it matches. `scale` is the largest number of the list around."""
+    """Returns the differences between pattern and answer, in words. Empty if they match.
+
+    `scale` is the largest number of the surrounding list.
+    """
     if pattern is ANY:
         return []
     if isinstance(pattern, dict) and isinstance(answer, dict):
@@ -192,13 +195,13 @@ def are_close(a, b, scale):
 
 
 def largest(pattern):
-    """The largest absolute value of a list and the lists within it."""
+    """Returns the largest absolute value of a list and the lists within it."""
     numbers = (largest(x) if isinstance(x, list) else abs(x) if is_number(x) else 0.0 for x in pattern)
     return max(numbers, default=0.0)
 
 
 def strings_match(pattern, answer):
-    """Literally, but for … and for numbers in the text, which need only be close."""
+    """Compares strings literally, except that … matches anything and numbers need only be close."""
     numbers, regex = [], []
     for part in re.split("(…)", pattern):
         if part == "…":
@@ -231,7 +234,7 @@ def indented(text):
 
 
 class Pattern:
-    """JSON in which … may stand for a value, for a run of entries, and for further members."""
+    """A parser for JSON in which … may stand for a value, a run of entries, or further members."""
 
     def __init__(self, text):
         self.text, self.at, self.decoder = text, 0, json.JSONDecoder()

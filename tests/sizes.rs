@@ -1,8 +1,8 @@
-//! What a large cloud takes on its way in, and a large answer on its way out, as multiples of the bytes of their arrays; and
-//! what learning from values takes, beside its price.
+//! Memory of large clouds on their way in and large answers on their way out, as multiples of the bytes of
+//! their arrays. Also the memory of learning from values, against its price.
 //!
-//! A process of its own, for the allocator that counts, and one test, since its count is everybody's. What is counted here for
-//! 100,000 points holds for a million: everything is in proportion.
+//! This is a process of its own, because its allocator counts, and a single test, since the count covers all
+//! threads. Figures for 100,000 points hold for a million, since everything is proportional.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 const N: usize = 100_000;
 const OWNER: Owner = Owner(0);
 
-/// What any request takes, however small.
+/// Bytes that any request may take, however small.
 const BASE_BYTES: usize = 1 << 20;
 
 #[derive(Deserialize)]
@@ -50,7 +50,7 @@ struct Request {
     normals: Option<Points>,
 }
 
-/// Bytes at the peak beyond those at the beginning.
+/// Runs a job, and returns its result and its peak bytes beyond those at the beginning.
 fn peak_of<T>(job: impl FnOnce() -> T) -> (T, usize) {
     let before = ALLOCATOR.current_usage();
     ALLOCATOR.reset_peak_usage();
@@ -58,7 +58,7 @@ fn peak_of<T>(job: impl FnOnce() -> T) -> (T, usize) {
     (result, ALLOCATOR.peak_usage().saturating_sub(before))
 }
 
-/// Numbers with all their digits.
+/// Returns numbers that need all their digits.
 fn numbers(n: usize) -> Vec<f64> {
     (0..n).map(|i| (i as f64 * 0.618_033_988_749_894_9).fract() - 0.5).collect()
 }
@@ -111,7 +111,7 @@ fn ply_in_binary(points: &[f64], is_double: bool) -> Vec<u8> {
     ply("binary_little_endian", if is_double { "double" } else { "float" }, points.len() / 3, &data)
 }
 
-/// From the body to the cloud in the store, and what of it is kept.
+/// Registers the cloud of a body in a store, and returns the bytes that are kept.
 fn register(format: Format, body: Vec<u8>) -> usize {
     let limit = body.len();
     let request: Request = RequestBody::new(format, Coding::Identity, body, limit)
@@ -126,7 +126,7 @@ fn register(format: Format, body: Vec<u8>) -> usize {
 }
 
 fn learning_takes_what_it_is_priced() {
-    // The first of them is not counted: products of matrices begin by reserving addresses for each thread.
+    // The first run is not counted, because matrix products begin by reserving addresses for each thread.
     for (at, (n, d)) in [(2000, 3), (300, 2), (2000, 3), (20_000, 6), (N, 2), (N, 3)].into_iter().enumerate()
     {
         let cloud = Cloud::new(numbers(n * d), d).unwrap();
@@ -137,7 +137,7 @@ fn learning_takes_what_it_is_priced() {
         let (_, taken) = peak_of(|| learn(observed, &Unobserved).unwrap());
         let priced = learning_price(n, d, 1).n_bytes;
         println!("learning from {n} values in {d} dimensions: {taken} bytes at the peak, priced {priced}");
-        // Grids and scores take some kilobytes of each.
+        // Grids and scores take some kilobytes in both figures.
         let holds = taken <= priced + BASE_BYTES && priced <= 10 * (taken + BASE_BYTES);
         assert!(at == 0 || holds, "{taken}, {priced}");
     }
@@ -153,7 +153,7 @@ impl Answer for Numbers {
     }
 }
 
-/// Bytes of an answer, read piece by piece.
+/// Reads an answer piece by piece, and returns its bytes.
 async fn read(response: Response) -> usize {
     let (mut body, mut n_bytes) = (response.into_body(), 0);
     while let Some(frame) = body.frame().await {

@@ -1,20 +1,24 @@
 #!/usr/bin/env python3
-"""Loads a server for some minutes as many careless clients would, and says whether it held.
+"""Loads a server for some minutes like many careless clients, and reports whether it held.
 
     tests/soak.py GRAMIAN [--minutes 10] [--report FILE]
 
-The server has a directory as its store. Clients post new clouds to every route, as requests and as jobs, register clouds,
-ask for estimates, post eight at a time the same one, list clouds, scrape metrics, read slowly or not at all, send bodies
-that never end, leave midway, and ask for more than there is memory. Meanwhile a probe sends small requests, whose clouds
-are new or known; before that it has done so beside factorizations of 16,400 points, on a server of its own. At the end:
+The server has a directory as its store. The clients:
 
-- every request that was read to its end was answered within its deadline and two seconds, but for events;
-- there was no status of 500 and above but refusals, 503, and deadlines, 504;
-- the resident memory never exceeded the budget by more than a tenth, and was flat within 5 % over the second half;
-- beside the factorizations small requests took at most ten times as long, at the 99th percentile, as on the idle server,
-  or a few time slices of the scheduler: where every core computes, a thread that wakes waits for its turn.
+- post new clouds to every route, as requests and as jobs, and eight equal requests at a time;
+- register clouds, ask for estimates, list clouds and scrape metrics;
+- read slowly or not at all, send bodies that never end, leave midway, and ask for more than there is memory.
 
-Needs nothing but the standard library. What was measured goes to standard output, as a table, and to the report, as JSON.
+Meanwhile a probe sends small requests, whose clouds are new or known. Before that, on another server, it does so
+beside factorizations of 16,400 points. These conditions must hold at the end:
+
+- Every request that was read to its end was answered within its deadline and two seconds. Events are exempt.
+- There was no status of 500 and above, except 503 for refusals and 504 for deadlines.
+- The resident memory never exceeded the budget by more than a tenth. It was flat within 5 % over the second half.
+- Beside the factorizations, the 99th percentile of small requests was at most ten times that on the idle server.
+  A few time slices of the scheduler are also accepted: when every core computes, a waking thread waits its turn.
+
+Needs only the standard library. The measured figures go to standard output as a table, and to the report as JSON.
 """
 
 import argparse
@@ -41,27 +45,30 @@ from with_server import server
 
 BUDGET = 1 << 30
 DEADLINE = 20.0
-# Beyond the deadline, and beside the network: what the issue of an answer may take.
+# Seconds after the deadline, apart from the network, that the sending of an answer may take.
 GRACE = 2.0
 FLAGS = [
     *("--threads", "2", "--memory-bytes", str(BUDGET), "--cache-bytes", str(192 << 20)),
     *("--cloud-bytes", str(16 << 20), "--deadline-seconds", str(DEADLINE), "--body-seconds", "3"),
     *("--max-queue", "32", "--job-result-seconds", "60"),
 ]
-# Less than what comes in half a minute of clouds, and in some minutes of factors: the oldest go all the time.
+# Less than the clouds of half a minute and the factors of some minutes, so that the oldest are evicted
+# all the time.
 STORE_FLAGS = ["--store-bytes", str(4 << 20), "--store-factor-bytes", str(512 << 20)]
 GEOMETRY = ["/v1/normals", "/v1/curvatures", "/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"]
 VALUES = ["/v1/interpolation", "/v1/posterior", "/v1/surface-gradient", "/v1/laplace-beltrami"]
-# So many that the 99th percentile hangs on ten of them: on the third of 300 it went from 0.5 to 4.2 ms between two runs.
+# Enough for ten probes above the 99th percentile. With 300 it was the third largest, and varied from 0.5 to
+# 4.2 ms between two runs.
 N_PROBES_IDLE = 1000
-# A slice of Linux's scheduler is 3 to 4 ms where two threads share a core; there are up to three such threads before a probe.
+# Up to three threads may run before a probe. Where two threads share a core, a slice of Linux's scheduler
+# takes 3 to 4 ms.
 SECONDS_OF_SLICES = 0.012
-# Each takes more than ten seconds of both cores.
+# Each factorization takes more than ten seconds of both cores.
 N_LARGE, N_LARGE_POINTS, SECONDS_BESIDE = 4, 16_400, 30
 
 
 class Soak:
-    """A run: what was asked, what came back, and how much memory the server had."""
+    """A run: the server under load, statuses and failures so far, and the memory of the server over time."""
 
     def __init__(self, address, pid, minutes):
         self.address = address
@@ -90,7 +97,7 @@ class Soak:
     def note(self, path, status, seconds):
         with self.lock:
             self.statuses[status] += 1
-            # Events go on for as long as their job does.
+            # Events last as long as their job.
             seconds = 0.0 if path.endswith("/events") else seconds
             self.slowest = max(self.slowest, seconds)
             if seconds > DEADLINE + GRACE:
@@ -99,7 +106,7 @@ class Soak:
                 self.failures.append(f"{path} answered {status}")
 
     def call(self, method, path, body=None, connection=None, prefer=None):
-        """One request, read to its end; its status, the seconds that it took, and its body."""
+        """Sends a request and reads its answer. Returns its status, the seconds it took, and its body."""
         own = connection is None
         connection = connection or self.connection()
         began = time.monotonic()
@@ -122,7 +129,10 @@ class Soak:
 
 
 def cloud(n, k, dimension=3):
-    """A sphere that no other request has, or points in a cube of more dimensions. All are as smooth: it is times that are compared."""
+    """Returns a sphere that no other request has, or points in a cube of more dimensions.
+
+    All spheres are equally smooth, because their times are compared.
+    """
     if dimension != 3:
         source = random.Random(k)
         return [[source.random() for _ in range(dimension)] for _ in range(n)]
@@ -137,7 +147,7 @@ def cloud(n, k, dimension=3):
 
 
 def request_of(source, soak, n):
-    """A path and its body: any route, with parameters or without."""
+    """Returns the path and body of a request to any route, with parameters or without."""
     path = source.choice(GEOMETRY + VALUES)
     request = {"cloud": {"points": cloud(n, soak.number())}}
     if path in VALUES:
@@ -164,7 +174,7 @@ def post_large(soak, source):
         request.pop("values", None)
         request["queries"] = request["cloud"]["points"][:100]
         soak.call("POST", "/v1/normals", json.dumps(request))
-        # Many dimensions make the search for neighbours slow, and these points are no surface.
+        # In many dimensions the search for neighbours is slow, and these points do not form a surface.
         soak.call("POST", "/v1/clouds", json.dumps({"points": cloud(3000, soak.number(), 12)}))
 
 
@@ -187,7 +197,10 @@ def list_clouds(soak, source):
 
 
 def register(soak, source):
-    """Registers clouds, asks what work with them would take, reads them, which the store may have forgotten, or deletes them."""
+    """Registers clouds, asks for an estimate, then reads or deletes them.
+
+    The store may have evicted a cloud before it is read.
+    """
     while soak.goes_on():
         request = {"points": cloud(source.choice([100, 1000, 5000]), soak.number())}
         status, _, answer = soak.call("POST", "/v1/clouds", json.dumps(request))
@@ -200,7 +213,7 @@ def register(soak, source):
 
 
 def post_jobs(soak, source):
-    """Follows jobs to their results, or looks at them once, deletes them, or leaves them to end alone."""
+    """Starts jobs. Then waits for the result, follows events, reads the status once, or deletes the job."""
     while soak.goes_on():
         path, body = request_of(source, soak, source.choice([100, 1000, 3000]))
         status, _, answer = soak.call("POST", path, body, prefer="respond-async")
@@ -213,7 +226,7 @@ def post_jobs(soak, source):
 
 
 def send(soak, path, body, length=None):
-    """A request over a socket of its own, of which `length` was announced."""
+    """Sends a request over a new socket and returns the socket. `length` is the announced size of its body."""
     stream = socket.create_connection((soak.host, soak.port), timeout=DEADLINE + 30)
     head = f"POST {path} HTTP/1.1\r\nHost: soak\r\nContent-Type: application/json\r\n"
     stream.sendall(f"{head}Content-Length: {length or len(body)}\r\n\r\n{body}".encode())
@@ -221,7 +234,7 @@ def send(soak, path, body, length=None):
 
 
 def read_slowly(soak, source):
-    """Asks for a matrix of some 20 MB and reads a little of it, or nothing, for up to half a minute."""
+    """Requests a matrix of some 20 MB, and reads a little of it or nothing for up to half a minute."""
     while soak.goes_on():
         with contextlib.suppress(OSError):
             n = 900
@@ -235,7 +248,7 @@ def read_slowly(soak, source):
 
 
 def send_slowly(soak, source):
-    """Begins bodies that never end."""
+    """Sends the beginnings of bodies that never end."""
     while soak.goes_on():
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
             streams = [
@@ -246,7 +259,7 @@ def send_slowly(soak, source):
 
 
 def leave(soak, source):
-    """Asks and leaves before the answer comes."""
+    """Sends requests and closes the connection before the answer."""
     while soak.goes_on():
         with contextlib.suppress(OSError):
             path, body = request_of(source, soak, source.choice([100, 1500, 3000]))
@@ -255,7 +268,10 @@ def leave(soak, source):
 
 
 def probe(soak, first, until=math.inf, count=math.inf):
-    """Small requests, one after the other: cold clouds, numbered from the first, and a known one in turn. Their seconds."""
+    """Sends small requests, alternating between new clouds, numbered from `first`, and a known one.
+
+    Returns the seconds of each kind, `cold` and `warm`.
+    """
     connection, seconds = soak.connection(), {"cold": [], "warm": []}
     known = json.dumps({"cloud": {"points": cloud(100, 0)}})
     for k in itertools.count(first):
@@ -273,25 +289,25 @@ def probe(soak, first, until=math.inf, count=math.inf):
 
 
 def probe_apart(address, pid, until):
-    """A probe in a process of its own, which the threads of the other clients do not hold up."""
+    """Probes from a separate process, which the threads of the other clients do not hold up."""
     soak = Soak(address, pid, 0)
     seconds = probe(soak, 10**7, until=until)
     return seconds, soak.statuses, soak.slowest, soak.failures
 
 
 def probe_beside_large_work(binary):
-    """Seconds of small requests on an idle server, and while four large factorizations wait for each other."""
+    """Measures small requests on an idle server, then while four large factorizations wait for each other."""
     flags = ["--threads", "2", "--deadline-seconds", "600"]
     with server(binary, flags) as (base, pid):
         soak = Soak(base, pid, 0)
         idle = probe(soak, 10**6, count=N_PROBES_IDLE)
         for k in range(N_LARGE):
             request = {"cloud": {"points": cloud(N_LARGE_POINTS, k)}, "queries": [[0, 0, 1]]}
-            # One leaves to the server what follows from looking at its cloud.
+            # The first request has no parameters, so the server derives them from its cloud.
             if k > 0:
                 request |= {"kernel": {"family": "matern", "length_scale": 0.3}, "alpha": 1e-6}
             body = json.dumps(request)
-            # They are cut off with the server.
+            # The end of the server cuts these requests off, so their failures are not kept.
             client = Soak(base, pid, 0)
             threading.Thread(target=client.call, args=("POST", "/v1/normals", body), daemon=True).start()
         time.sleep(2)
@@ -301,7 +317,7 @@ def probe_beside_large_work(binary):
 
 
 def watch(soak):
-    """Notes the resident memory of the server twice a second."""
+    """Records the resident memory of the server twice a second."""
     began = time.monotonic()
     while soak.goes_on():
         status = Path(f"/proc/{soak.pid}/status").read_text()
@@ -317,10 +333,10 @@ def percentile(values, share):
 
 def run(soak):
     soak.until = time.monotonic() + 60 * soak.minutes
-    # Started afresh: a copy of this process would have its threads' locks.
+    # Spawned, not forked: a copy of this process would inherit the locks of its threads.
     apart = multiprocessing.get_context("spawn").Pool(1)
     probing = apart.apply_async(probe_apart, (soak.address, soak.pid, soak.until))
-    # Clients are elsewhere as a rule: those here leave the cores to the server.
+    # Real clients run on other machines. A low priority leaves the cores to the server.
     os.nice(10)
     roles = [post_new_clouds] * 8 + [post_large] * 2 + [post_equal, list_clouds, list_clouds]
     roles += [read_slowly] * 8 + [send_slowly] * 2 + [leave] * 3 + [register] + [post_jobs] * 3
@@ -339,7 +355,7 @@ def run(soak):
 
 
 def judge(soak, idle, beside, loaded):
-    """The figures, and what of them does not hold."""
+    """Returns the figures of a run, and the conditions that do not hold."""
     half = soak.resident[len(soak.resident) // 2 :]
     third, last = half[: len(half) // 2], half[len(half) // 2 :]
     mean = [statistics.fmean(n_bytes for _, n_bytes in part) for part in (third, last)]

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Runs a command against a server of its own.
+"""Runs a command against a fresh server.
 
     tests/with_server.py GRAMIAN COMMAND [ARGUMENT]…
 
-Starts the binary GRAMIAN on a free port, in its default configuration, runs the command with the base URL of the server as
-GRAMIAN_URL and the path of the binary as GRAMIAN_BINARY, for those that start further ones; ends the server and exits as
-the command did. Neither sees other GRAMIAN_ variables. Needs nothing but the standard library.
+Starts the binary GRAMIAN on a free port, in its default configuration, and runs the command. The command gets
+the base URL of the server as GRAMIAN_URL, and the path of the binary as GRAMIAN_BINARY, in case it starts more
+servers. Then ends the server and exits with the status of the command. Neither sees other GRAMIAN_ variables.
+Needs only the standard library.
 """
 
 import contextlib
@@ -32,7 +33,10 @@ def main():
 
 @contextlib.contextmanager
 def server(binary, flags=()):
-    """A server on a port of its own choice, but for the flags in its default configuration; its base URL and process id."""
+    """Runs a server on a free port, with `flags` and otherwise its default configuration.
+
+    Yields its base URL and process id.
+    """
     with tempfile.TemporaryFile() as log:
         command = [str(Path(binary).resolve()), "--bind", "127.0.0.1:0", *flags]
         process = subprocess.Popen(command, env=environment() | {"RUST_LOG": "info"}, stderr=log)
@@ -43,12 +47,12 @@ def server(binary, flags=()):
 
 
 def environment():
-    """The variables of this program but for those that configure gramian or its clients."""
+    """Returns the variables of this program, except those that configure gramian or its clients."""
     return {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
 
 
 def stop(process):
-    """Ends the server, after the requests that it still answers if they do not take too long."""
+    """Ends the server. Waits for the requests under way, for at most SECONDS_TO_STOP."""
     process.terminate()
     try:
         process.wait(SECONDS_TO_STOP)
@@ -58,7 +62,7 @@ def stop(process):
 
 
 def address_of(process, log):
-    """The address that the server logs when it listens."""
+    """Returns the address that the server logs when it listens."""
     for _ in range(10 * SECONDS_TO_START):
         log.seek(0)
         text = log.read().decode(errors="replace")

@@ -1,4 +1,5 @@
-//! The canonical hash of a cloud: the same for the same points, another for any others, and the same from the store.
+//! The canonical hash of a cloud: equal for equal points, also after a round trip through the store, and
+//! different for all others.
 
 #![no_main]
 
@@ -18,7 +19,7 @@ fuzz_target!(|input: (u8, Vec<f64>, Option<Vec<f64>>, u8)| {
     let normals = normals.filter(|normals| normals.n_points() == cloud.n_points());
     let id = CloudId::of(&cloud, normals.as_ref());
     assert_eq!(CloudId::parse(&id.to_string()), Some(id));
-    // −0 is 0, and nothing else is anything else.
+    // −0 counts as 0. All other coordinates differ.
     let flipped = points.iter().map(|&x| if x == 0.0 { -x } else { x }).collect();
     let flipped = Cloud::new(flipped, d).expect("it has the same points");
     assert_eq!(CloudId::of(&flipped, normals.as_ref()), id);

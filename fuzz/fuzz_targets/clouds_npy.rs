@@ -1,4 +1,4 @@
-//! A cloud as a file of NPY.
+//! A cloud as an NPY file.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! A cloud as a file of PLY.
+//! A cloud as a PLY file.
 
 #![no_main]
 

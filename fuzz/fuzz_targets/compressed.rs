@@ -1,4 +1,4 @@
-//! A compressed body: gzip or zstd, as the first byte says. What it unpacks to is bounded, whatever it is.
+//! A compressed body, gzip or zstd by its first byte. The size that it unpacks to is bounded.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! A body in JSON, as the request of every operation. The first byte chooses which; what is read once is read again in the same way.
+//! A JSON body, read as a request of the operation that its first byte selects. Reading it again with white
+//! space must give the same outcome.
 
 #![no_main]
 
@@ -11,6 +12,6 @@ fuzz_target!(|data: &[u8]| {
     let operation = OPERATIONS[usize::from(first) % OPERATIONS.len()];
     let read = |bytes: &[u8]| read_as(operation, Format::Json, Coding::Identity, bytes);
     let told = read(body);
-    // White space around it changes nothing but the columns of what is told.
+    // White space around the body changes only the columns in error messages.
     assert_eq!(told.is_ok(), read(&[b" ", body, b"\n"].concat()).is_ok());
 });

@@ -1,4 +1,4 @@
-//! A body in safetensors, as the request of every operation.
+//! A safetensors body, read as a request of the operation that its first byte selects.
 
 #![no_main]
 

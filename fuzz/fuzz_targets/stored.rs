@@ -1,5 +1,5 @@
-//! Bytes of the store: what is read as a cloud has the name that its points give it, and is written as it was read; what is read as a job or its
-//! result ends.
+//! Bytes from the store. A cloud that can be read has the id of its points, and is encoded to the same bytes.
+//! Reading a job or its result terminates.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Short texts from outside: ids, names of places, origins, and files of keys.
+//! Short texts from outside: ids, places of a store, origins, and key files.
 
 #![no_main]
 

@@ -1,7 +1,7 @@
-//! The speed of the factorization against faer's matrix product of the same size, in one run.
+//! Speed of the factorization against faer's matrix product of the same size.
 //!
-//! `cargo bench --bench factor [-- n]`; the two are measured in turn, so that a drifting machine disturbs both. With
-//! `--lockstep` a round for each line on standard input.
+//! `cargo bench --bench factor [-- n]`. The two are measured in turn, so that a drifting machine affects
+//! both. With `--lockstep` it runs one round for each line on standard input.
 
 #![allow(clippy::disallowed_methods)]
 

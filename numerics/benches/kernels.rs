@@ -1,5 +1,7 @@
-//! Kernel evaluations per second and core, by instruction set and family: entries of the Gram matrix, and values,
-//! gradients and Hessians summed over the points; then by dimension, also in floating-point operations.
+//! Kernel evaluations per second on one core, by instruction set and family.
+//!
+//! Measured are entries of the Gram matrix, and values, gradients and Hessians summed over the points. A
+//! second table is by dimension and has floating-point operations too.
 //!
 //! `cargo bench --bench kernels`
 
@@ -42,9 +44,9 @@ const WORKS: [(&str, Work); 5] = [
 
 #[derive(Clone, Copy)]
 enum Work {
-    /// Rows of the cross-Gram matrix, into a warm buffer.
+    /// Entries of rows of the cross-Gram matrix, written to a warm buffer.
     Gram,
-    /// Sums of everything up to an order.
+    /// Sums of all derivatives up to an order.
     Jets(JetOrder),
 }
 
@@ -72,7 +74,8 @@ fn by_family(set: InstructionSet) {
     }
 }
 
-/// A multiplication or an addition of one pair is an operation; the profile itself is not counted.
+/// Prints rates by dimension. An operation is a multiplication or an addition for one pair, those
+/// of the profile not counted.
 fn by_dimension() {
     println!("\n{:28} {:>10} {:>10} {:>10}", "gauss, best set", "value", "Hessian", "G flop/s");
     for d in [1, 2, 3, 4, 6, 8, 16] {
@@ -85,7 +88,7 @@ fn by_dimension() {
     }
 }
 
-/// G pairs/s.
+/// The rate of a kind of work in G pairs/s.
 fn rate(set: InstructionSet, family: Family, work: Work, d: usize) -> f64 {
     let kernel = Kernel::new(family, 1.5, 1.0).unwrap();
     let (nodes, queries) = (Nodes::on(set, &scattered(N_POINTS, d, 1)), scattered(N_QUERIES, d, 2));

@@ -1,8 +1,10 @@
-//! The operators against their largest parts: a cold Laplace–Beltrami matrix, m = n, and cold posterior variances, m = n/2,
-//! beside a factorization with the triangular solves that each needs; and the fused pass over the points.
+//! Operators against the time of their largest parts.
 //!
-//! `cargo bench --bench operators [-- n]`, or with `--lockstep` a round for each line on standard input. The references are
-//! faer's own Cholesky factorization and triangular solves in warm memory.
+//! Measured from a cold start are a Laplace–Beltrami matrix, m = n, and posterior variances, m = n/2. Each is
+//! compared with a factorization and the triangular solves that it needs, by faer's own routines in warm
+//! memory. The fused pass over the points is measured too.
+//!
+//! `cargo bench --bench operators [-- n]`, or with `--lockstep` one round for each line on standard input.
 
 mod support;
 
@@ -69,7 +71,7 @@ fn factorize(cloud: &Arc<Cloud>) -> Solver {
     System::new(cloud.clone(), kernel(), alpha).and_then(|system| Solver::dense(system, &Unobserved)).unwrap()
 }
 
-/// Weights, surface, geometry at the points and the matrix there.
+/// The matrix at the points, with the weights, surface and geometry that it needs.
 fn laplace_beltrami(factor: &Arc<Solver>) -> Vec<f64> {
     let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
     let geometry = Geometry::of(&fits::surface(factor), factor.cloud(), &request, &Unobserved).unwrap();
@@ -82,7 +84,7 @@ fn pass(cloud: &Cloud, order: JetOrder) -> Duration {
     timed(|| Jets::evaluate(cloud, &kernel(), &weights, cloud, order, &Unobserved).unwrap()).1
 }
 
-/// Buffers that the references are computed in, again and again.
+/// Buffers of the reference computations, used again in every round.
 struct Reference {
     matrix: Mat<f64>,
     factor: Mat<f64>,
@@ -92,7 +94,7 @@ struct Reference {
 }
 
 impl Reference {
-    /// The matrix by the formula of the kernel, `φ = (1 + s + s²/3) e^{−s}`, `s = √5 |x − y|/ℓ`.
+    /// Fills the matrix by the kernel's formula `φ = (1 + s + s²/3) e^{−s}`, `s = √5 |x − y|/ℓ`.
     fn of(cloud: &Cloud) -> Self {
         let n = cloud.n_points();
         let matrix = Mat::from_fn(n, n, |i, j| {
@@ -106,7 +108,7 @@ impl Reference {
         Self { factor: matrix.clone(), matrix, columns, scratch, par }
     }
 
-    /// A factorization, a solve with n columns, and a forward solve with `n_forward`.
+    /// Times of a factorization, a solve with n columns, and a forward solve with `n_forward` columns.
     fn times(&mut self, n_forward: usize) -> Times {
         self.factor.copy_from(&self.matrix);
         let stack = MemStack::new(&mut self.scratch);

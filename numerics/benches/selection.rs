@@ -1,4 +1,4 @@
-//! What a path over 1,000 α takes beside the one eigendecomposition that it needs.
+//! Time of a path over 1,000 α against that of the single eigendecomposition that it needs.
 //!
 //! `cargo bench --bench selection [-- n]`.
 

@@ -1,9 +1,9 @@
-//! Draws docs/defaults.svg: normals of the bunny against those of its mesh, swept around the rule for normals.
+//! Draws docs/defaults.svg: accuracy of the bunny's normals for parameters around the default rule.
 //!
 //! `cargo run --release --example defaults_sweep`.
 //!
-//! Left: the exact points, the median angle against ℓ, one curve per √ε ℓ. Right: the same against α, one curve per noise
-//! of the points. Rings mark what the service chooses by itself.
+//! Both panels show the median angle to the normals of the mesh. Left: exact points, against ℓ, one curve per
+//! √ε ℓ. Right: against α, one curve per noise of the points. Rings mark the service's default.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -15,7 +15,7 @@ use std::path::Path;
 use common::clouds::noisy;
 use common::fits;
 use common::random::Random;
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
@@ -23,11 +23,11 @@ use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceMode
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Multiples of the rule's ℓ, of its √ε ℓ, and values of α.
+/// Multiples of the rule's ℓ and, below, of its √ε ℓ, and values of α.
 const LENGTHS: [f64; 7] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.8, 3.2];
 const SMOOTHINGS: [f64; 4] = [0.25, 1.0, 2.5, 7.5];
 const ALPHAS: [f64; 8] = [1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0];
-/// Standard deviation of the noise against half the diagonal of the bounding box.
+/// Standard deviations of the noise over half the diagonal of the bounding box.
 const NOISES: [f64; 4] = [0.0, 0.002, 0.005, 0.01];
 const COLOURS: [&str; 4] = ["#1b6ca8", "#c2571a", "#3a8f4d", "#7b4ea3"];
 
@@ -78,7 +78,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A cloud with the normals to compare with.
+/// A cloud with the true normals.
 struct Scan<'a> {
     cloud: Cloud,
     truth: &'a [f64],
@@ -89,7 +89,7 @@ impl Scan<'_> {
         fits::default_kernel_and_alpha(&self.cloud, Purpose::Normals)
     }
 
-    /// Median angle between lines, in degrees: signs are another matter.
+    /// Median angle in degrees between normals as lines. Signs are not compared.
     fn median_angle(&self, length: f64, smoothing: f64, alpha: f64) -> Result<f64> {
         let kernel = fits::kernel(Family::Laplace { epsilon: (smoothing / length).powi(2) }, length);
         let surface = fits::surface(&fits::factorize(&self.cloud, kernel, alpha));
@@ -108,7 +108,7 @@ impl Scan<'_> {
     }
 }
 
-/// √ε ℓ of a Laplace kernel.
+/// The product √ε ℓ of a Laplace kernel.
 fn smoothing_length(kernel: &Kernel) -> Result<f64> {
     match kernel.family() {
         Family::Laplace { epsilon } => Ok(epsilon.sqrt() * kernel.length_scale()),
@@ -126,7 +126,7 @@ fn report(name: &str, line: &[(f64, f64)]) {
     println!("{name:28} {}", entries.join("  "));
 }
 
-/// Axes with a logarithmic x and angles from 0° up.
+/// A panel with a logarithmic x axis and angles from 0° up.
 struct Panel {
     x: f64,
     title: &'static str,

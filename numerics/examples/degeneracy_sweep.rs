@@ -1,4 +1,5 @@
-//! Prints how many wrong curvatures are flagged, and how many right ones: the tables of docs/degeneracy.md.
+//! Prints the tables of docs/degeneracy.md: how many wrong and how many right
+//! curvatures and normals are flagged.
 
 #[path = "../tests/degeneracy/closed.rs"]
 mod closed;
@@ -16,12 +17,12 @@ use normals::NormalTally;
 use rayon::prelude::*;
 use sweep::{Tally, cases};
 
-/// Flagged: numbers that are served with a flag. Missed: served without one.
+/// Column heads of curvatures. Flagged answers are served with a flag, missed ones without.
 const HEADER: &str = "\
 | | queries | null | flagged | of them off by > 50 % | right to 10 % | offset | unflagged | missed > 10 % | > 50 % | worst |
 |---|---|---|---|---|---|---|---|---|---|---|";
 
-/// Of lines: more than 30° off.
+/// Column heads of normals. Off are lines by more than 30°.
 const NORMALS_HEADER: &str = "\
 | kernel | length scale | n | noise | points | flagged | of them off | unflagged off | | flipped |
 |---|---|---|---|---|---|---|---|---|---|";
@@ -70,7 +71,7 @@ fn main() {
     print_retirement();
 }
 
-/// The same points with noise, flagged by T3 and T4 and by deviations.
+/// Prints rows of the same points with noise, flagged by T3 and T4 and by deviations.
 fn print_retirement() {
     println!("\nnoise, flags by\n\n{HEADER}");
     let cases: Vec<_> = cases().into_iter().filter(|case| case.kernel.0 == sweep::KERNELS[0].0).collect();

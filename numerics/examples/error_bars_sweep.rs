@@ -1,6 +1,8 @@
-//! Prints how many true values lie within the error bars: the table of docs/error-bars.md.
+//! Prints the table of docs/error-bars.md on normals and curvatures: shares of true
+//! values within the error bars.
 //!
-//! `cargo run --release --example error_bars_sweep [points per row]`, 10,000 if not said; a few minutes.
+//! `cargo run --release --example error_bars_sweep [points per row]`, 10,000 by
+//! default. It takes a few minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -20,7 +22,8 @@ use sweep::{Case, NOISES, Row, quantile};
 
 const SIZES: [usize; 4] = [300, 1000, 4000, 10_000];
 
-/// Per cent, but for the errors: median of the larger error of a principal curvature over the larger curvature, and of the angle.
+/// Column heads. Numbers are per cent, except the two medians. "error" is that of the larger error of a
+/// principal curvature over the larger curvature, "angle" that of the angles of the normals.
 const HEADER: &str = "\
 | shape | sampling | n | noise | normal | mean | κ₁ | κ₂ | error | angle | flagged | off by half | |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|";

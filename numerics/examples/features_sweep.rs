@@ -1,8 +1,9 @@
-//! Prints what posterior bands cover of fields that are local, rough, in many dimensions, or drowned in noise, where nothing is said of the values:
-//! a table of docs/error-bars.md.
+//! Prints a table of docs/error-bars.md: coverage of posterior bands with default parameters, for fields that
+//! are local, rough, in many dimensions, or drowned in noise.
 //!
-//! `cargo run --release --example features_sweep [seeds] [only] [full]`, 10 seeds if not said; `only` is a part of the names of rows, `full` compares
-//! with the likelihood of all values where there are at most 1,000; some minutes.
+//! `cargo run --release --example features_sweep [seeds] [only]
+//! [full]`, 10 seeds by default. `only` is a part of the names of rows. `full` adds a comparison with the
+//! likelihood of all values where there are at most 1,000. It takes some minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

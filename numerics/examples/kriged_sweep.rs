@@ -1,7 +1,8 @@
-//! Prints what bars of operators on values cover, and what is off without a flag, where values are kriged around each query: a table of
-//! docs/error-bars.md.
+//! Prints a table of docs/error-bars.md: coverage of error bars and errors without a flag, for operators on
+//! values that are kriged around each query.
 //!
-//! `cargo run --release --example kriged_sweep [points per cloud …]`, 2000 and 25000 if not said; some minutes.
+//! `cargo run --release --example kriged_sweep [points per cloud …]`, 2,000 and 25,000 by
+//! default. It takes some minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

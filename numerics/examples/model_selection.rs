@@ -1,7 +1,8 @@
-//! Selects a kernel for a table of points and values by its likelihood: what `bench/peers/model_selection.py` compares with scikit-learn.
+//! Selects a kernel by its likelihood, for comparison with scikit-learn by `bench/peers/model_selection.py`.
 //!
-//! `cargo run --release --example model_selection FILE FAMILY RESTARTS`: rows of coordinates and a value, separated by commas; `gauss` or `matern`
-//! of ν = 5/2. Prints likelihood, seconds, evaluations, whether it converged, and the hyperparameters.
+//! `cargo run --release --example model_selection FILE FAMILY RESTARTS`. Rows of FILE are coordinates and a
+//! value, separated by commas. FAMILY is `gauss` or `matern` (ν = 5/2). Prints likelihood, seconds,
+//! evaluations, whether the search converged, and the hyperparameters.
 
 use std::time::Instant;
 
@@ -14,7 +15,7 @@ use gramian_numerics::selection::{
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 
-/// Bounds of length scales, variance and noise, as the script has them.
+/// Bounds of length scales, variance and noise, equal to those of the script.
 const LENGTH_SCALES: [f64; 2] = [1e-2, 1e3];
 const VARIANCE: [f64; 2] = [1e-3, 1e3];
 const ALPHA: [f64; 2] = [1e-5, 1e1];
@@ -32,7 +33,7 @@ fn main() {
     let cloud =
         Cloud::new(rows.iter().flat_map(|row| &row[..dimension]).copied().collect(), dimension).unwrap();
     let values: Vec<f64> = rows.iter().map(|row| row[dimension]).collect();
-    // scikit-learn has exp(−r²/2ℓ²).
+    // The Gauss kernel of scikit-learn is exp(−r²/2ℓ²), so its ℓ is multiplied by √2.
     let (family, unit) = match family.as_str() {
         "gauss" => (Family::Gauss, std::f64::consts::SQRT_2),
         _ => (Family::Matern { order: 2 }, 1.0),

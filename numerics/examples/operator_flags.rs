@@ -1,7 +1,8 @@
-//! Prints how many answers of operators on values are off by half without a flag, for every kernel and for the defaults: a table of
-//! docs/error-bars.md.
+//! Prints a table of docs/error-bars.md: answers of operators on values that are off by half without a flag,
+//! for every kernel and for the defaults.
 //!
-//! `cargo run --release --example operator_flags [clouds per case] [sizes of clouds]`, 2 and 300, 1000 if not said; some minutes.
+//! `cargo run --release --example operator_flags [clouds per case] [sizes of clouds]`, by default 2 clouds of
+//! 300 and of 1,000 points. It takes some minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -1,4 +1,6 @@
-//! Prints the paper's tables with its figures beside ours: `cargo run --release --example paper_tables`.
+//! Prints the tables of docs/paper.md, with the paper's numbers beside ours.
+//!
+//! `cargo run --release --example paper_tables`.
 
 #[path = "../tests/paper/main.rs"]
 mod paper;

@@ -1,7 +1,7 @@
-//! Prints how many posterior bands hold where nothing is said of the values, and what kernels found by other criteria would do: tables of
-//! docs/error-bars.md.
+//! Prints tables of docs/error-bars.md: coverage of posterior bands with default parameters, and with
+//! kernels found by other criteria.
 //!
-//! `cargo run --release --example posterior_sweep [draws]`, 6 if not said; some minutes.
+//! `cargo run --release --example posterior_sweep [draws]`, 6 by default. It takes some minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 const SIZES: [usize; 5] = [30, 120, 300, 800, 2000];
 
-/// Noise over the spread of the field, with a unit and an offset.
+/// Noise over the spread of the field, factor of the values, and offset.
 const SETTINGS: [(f64, f64, f64); 5] =
     [(0.0, 1.0, 0.0), (0.01, 1.0, 1e6), (0.05, 1e-6, 1.0), (0.1, 1e-6, 0.0), (0.2, 1e6, -1e6)];
 
@@ -61,7 +61,7 @@ fn main() {
     }
 }
 
-/// Fields in one, two and three dimensions.
+/// Coverage and error of all fields in one, two and three dimensions.
 fn rows((noise, factor, offset): (f64, f64, f64), n_points: usize, by: By, n_draws: usize) -> Vec<Found> {
     let of = |dimension| FIELDS.map(|field| Sensors { dimension, n_points, field, noise, factor, offset });
     let sensors: Vec<Sensors> = [1, 2, 3].into_iter().flat_map(of).collect();

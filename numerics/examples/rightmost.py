@@ -1,9 +1,12 @@
-"""Prints the rightmost eigenvalues of the matrices that examples/stability_sweep.rs wrote, and what 1,000 steps of backward
-Euler make of random values: `python3 numerics/examples/rightmost.py FOLDER [part of a name]`.
+"""Prints the rightmost eigenvalues of the matrices that examples/stability_sweep.rs wrote, and the growth of
+random values over 1,000 steps of backward Euler.
 
-Beyond 2,000 points there are no dense eigenvalues. An eigenvalue with positive real part, however far up or down, lies in the
-disc |z - s| < s for a large enough s. So the eigenvalue nearest to s is looked for (Arnoldi, shift and invert), for the norm of the matrix as s
-and for two smaller ones. Constants have the eigenvalue 0, at the distance s: nothing may be nearer.
+Run `python3 numerics/examples/rightmost.py FOLDER [part of a name]`.
+
+Dense eigenvalues are computed up to 2,000 points. Beyond, Arnoldi's method with shift and invert finds the
+eigenvalues nearest to s. An eigenvalue with positive real part, however large its imaginary part, lies in the
+disc |z - s| < s for a large enough s. The norm of the matrix and two smaller numbers are tried as s. Constants
+have the eigenvalue 0, at the distance s, so no eigenvalue may be nearer.
 """
 
 import pathlib
@@ -36,7 +39,7 @@ def rightmost(matrix):
 
 
 def growth(matrix, step, n_steps=1000):
-    """The largest max norm on the way, over that at the start."""
+    """Returns the largest max norm over all steps of backward Euler, relative to that of the random start."""
     factor = linalg.splu((sparse.identity(matrix.shape[0]) - step * matrix).tocsc())
     values = np.random.default_rng(0).uniform(-1, 1, matrix.shape[0])
     start, most = np.abs(values).max(), 0.0

@@ -1,7 +1,6 @@
-//! Prints how many normals point to the wrong side, with a flag and without: the table of docs/degeneracy.md,
-//! Sides.
+//! Prints the table of docs/degeneracy.md, Orientation: normals on the wrong side, with a flag and without.
 //!
-//! `cargo run --release --example sides_sweep [largest number of points, 3,000 if not said]`
+//! `cargo run --release --example sides_sweep [largest number of points]`, 3,000 by default.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -13,7 +12,7 @@ use sides::cases::{
 };
 use sides::tally::SideTally;
 
-/// Points beyond which the signature function, of cubic cost, is left out.
+/// Number of points beyond which the signature function, of cubic cost, is left out.
 const MAX_DENSE: usize = 3000;
 
 const HEADER: &str = "\
@@ -49,7 +48,7 @@ fn main() {
     }
 }
 
-/// The rows of some clouds together.
+/// Prints the rows of several clouds together, by both kinds of surfaces.
 fn print_rows(name: &str, cases: &[Case]) {
     let is_small = |case: &&Case| case.sided.cloud.n_points() <= MAX_DENSE;
     print_row(name, "dense", cases.iter().filter(is_small).map(|case| SideTally::dense(&case.sided)));

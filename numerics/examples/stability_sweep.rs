@@ -1,8 +1,9 @@
-//! Writes sparse Laplace–Beltrami operators of random clouds and of the bunny, of which examples/rightmost.py
-//! prints the eigenvalues on the right: the tables of docs/numerics.md.
+//! Writes sparse Laplace–Beltrami operators of random clouds and of the bunny. examples/rightmost.py prints
+//! their rightmost eigenvalues: the tables of docs/numerics.md.
 //!
-//! `cargo run --release --example stability_sweep FOLDER [seeds] [points] && python3 numerics/examples/rightmost.py
-//! FOLDER`, 20 and 1000 if not said. Python needs NumPy and SciPy.
+//! `cargo run --release --example stability_sweep FOLDER [seeds] [points] && python3
+//! numerics/examples/rightmost.py FOLDER`, by default 20 seeds and 1,000 points.
+//! Python needs NumPy and SciPy.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -64,7 +65,7 @@ fn print_kinds(name: &str, found: &Stencils) {
     println!("| {name} | {} |", counts.join(" | "));
 }
 
-/// Little-endian numbers of eight bytes: row ends and columns are integers, weights and points floats.
+/// Writes little-endian numbers of eight bytes. Row ends and columns are integers, weights and points floats.
 fn write(folder: &Path, found: &Stencils, cloud: &Cloud) {
     fs::create_dir_all(folder).unwrap();
     let integers = |values: &[i64]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
@@ -75,7 +76,7 @@ fn write(folder: &Path, found: &Stencils, cloud: &Cloud) {
     fs::write(folder.join("points"), floats(cloud.coordinates())).unwrap();
 }
 
-/// A sphere, sixteen times as dense above the equator as below.
+/// A sphere that is sixteen times as dense above the equator as below.
 fn two_densities(n: usize, random: &mut Random) -> Cloud {
     let mut points = Vec::with_capacity(n);
     while points.len() < n {
@@ -87,7 +88,7 @@ fn two_densities(n: usize, random: &mut Random) -> Cloud {
     cloud(&points)
 }
 
-/// Denser towards the ends of the long axis.
+/// An ellipsoid that is denser towards the ends of its long axis.
 fn ellipsoid(n: usize, random: &mut Random) -> Cloud {
     let axes = [1.0, 0.7, 0.4];
     let points: Vec<[f64; 3]> =
@@ -95,7 +96,7 @@ fn ellipsoid(n: usize, random: &mut Random) -> Cloud {
     cloud(&points)
 }
 
-/// Open: its rim has no consistent stable rows.
+/// Half a sphere. It is open, and its rim has no rows that are both consistent and stable.
 fn half_sphere(n: usize, random: &mut Random) -> Cloud {
     let points: Vec<[f64; 3]> = (0..n).map(|_| random.on_sphere()).map(|[x, y, z]| [x, y, z.abs()]).collect();
     cloud(&points)

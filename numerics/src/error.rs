@@ -1,6 +1,6 @@
-//! The one error type of the numerical layer, and the words in which it refuses.
+//! The error type of the numerical layer, with its messages.
 
-/// What the numerics refuses, named by its cause, with the index of the offending point where there is one.
+/// A refusal of the numerics, named by its cause, with the index of the offending point if there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NumericsError {
     #[error("the cloud has no points")]
@@ -39,7 +39,7 @@ pub enum NumericsError {
     DerivativesVary { order: usize },
     #[error("{} points coincide with another one and alpha is 0", points.len())]
     DuplicatePoints {
-        /// Every point that has a twin, ascending.
+        /// Every point that coincides with another one, ascending.
         points: Vec<usize>,
     },
     #[error("K + alpha I is not positive definite in float64: {reason}")]
@@ -60,7 +60,7 @@ pub enum NumericsError {
     Cancelled,
 }
 
-/// Why no honest answer exists without more regularization.
+/// The reason why a system has no trustworthy answer without more regularization.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotDefinite {
     #[error("the solve leaves a relative residual of {relative_residual:.1e}")]
@@ -77,23 +77,23 @@ pub enum NotDefinite {
     NegativeVariance { query: usize, variance: f64 },
 }
 
-/// The solvers.
+/// A solver of the kernel system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolverKind {
     /// A factorization of the whole matrix.
     Dense,
-    /// The nearest points of each query.
+    /// Local fits to the nearest points of each query.
     Local,
 }
 
-/// What a solver is asked for, where not every solver has it.
+/// A quantity that not every solver can compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// The diagonal of `(K + αI)⁻¹`.
     InverseDiagonal,
     /// A matrix with a column for each point.
     DenseMatrix,
-    /// Values at queries, which it has no weights for.
+    /// Values at queries, for which the solver has no weights.
     Values,
     /// Normals and curvatures in this dimension.
     Geometry,

@@ -3,7 +3,7 @@
 //! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the calling
 //! thread; stages and cancellation pass through an [`observer::Observer`].
 //!
-//! The rooms, each of which knows those before it: `machine`, `points`, `kernel`, `patches`, `sums`, `solver`, `selection`, `function`, `surface`.
+//! The rooms, each of which knows those before it: `machine`, `points`, `kernel`, `patches`, `sums`, `solver`, `selection`, `function`, `surface`, `model`.
 
 // A request must never bring a thread down; tests may.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -23,7 +23,6 @@ pub mod kernel;
 
 pub mod patches;
 
-pub mod defaults;
 pub mod sums;
 
 pub mod solver;
@@ -33,6 +32,8 @@ pub mod selection;
 pub mod function;
 
 pub mod surface;
+
+pub mod model;
 
 #[cfg(test)]
 pub(crate) mod testing;

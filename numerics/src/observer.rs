@@ -1,4 +1,4 @@
-//! How a computation tells its caller where it is, and learns that nobody waits for it any more.
+//! Progress reports to the caller of a computation, and cancellation when nobody waits for it any more.
 
 use super::error::NumericsError;
 
@@ -7,27 +7,29 @@ use super::error::NumericsError;
 pub enum Stage {
     /// Assembly of the Gram matrix.
     Gram,
-    /// Its factorization.
+    /// Factorization of the Gram matrix.
     Factor,
-    /// The estimate of its condition.
+    /// Estimate of the condition of the Gram matrix.
     Condition,
     /// Solves with the factor.
     Solve,
-    /// Sums over the cloud at the queries, and what is derived from them.
+    /// Sums over the cloud at the queries, and quantities derived from them.
     Evaluate,
 }
 
-/// Receives the stages and answers whether to go on; called between blocks of work, from any thread.
+/// A receiver of stages that can cancel. It is called between blocks of work, from any thread.
 pub trait Observer: Sync {
     /// Called when `stage` begins.
     fn enter(&self, stage: Stage);
 
-    /// Whether the work should stop at the next block.
+    /// Returns whether the work should stop at the next block.
     fn is_cancelled(&self) -> bool;
 
-    /// Called when a system is solved, with |Y − (K + αI)Λ|/|Y|.
+    /// Called when a system is solved, with the relative residual |Y − (K + αI)Λ|/|Y|.
     fn solved_to(&self, _relative_residual: f64) {}
 
+    /// Fails if the work should stop.
+    ///
     /// # Errors
     /// [`NumericsError::Cancelled`] once the caller is gone.
     fn checkpoint(&self) -> Result<(), NumericsError> {
@@ -35,7 +37,7 @@ pub trait Observer: Sync {
     }
 }
 
-/// Work beside that of a request: it ends when nobody waits any more, and its stages are nobody's.
+/// An observer for work beside that of a request. It passes cancellation on, but reports no stages.
 pub struct Beside<'a>(pub &'a dyn Observer);
 
 impl Observer for Beside<'_> {
@@ -46,7 +48,7 @@ impl Observer for Beside<'_> {
     }
 }
 
-/// Nobody watches and nothing is cancelled.
+/// An observer that ignores stages and never cancels.
 pub struct Unobserved;
 
 impl Observer for Unobserved {

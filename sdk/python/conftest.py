@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gramian
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 
 @pytest.fixture(autouse=True)

@@ -1,7 +1,7 @@
-//! What the service does, in numbers for Prometheus: counted as it happens (here), or read when they are asked for (routes/gauges.rs).
+//! Prometheus metrics that are counted as events happen. Gauges are read on demand (routes/gauges.rs).
 //!
-//! Names and labels are an interface like any other: dashboards and alerts are built on them, `docs/operations.md` lists them. No label
-//! takes what clients send: routes are those of the router, methods those of HTTP.
+//! Names and labels are an interface, on which dashboards and alerts are built. `docs/operations.md` lists
+//! them. No label contains text sent by clients: routes are those of the router, methods those of HTTP.
 
 use std::time::Duration;
 
@@ -15,20 +15,21 @@ use prometheus::{
 use super::problem::slug::Slug;
 use crate::store::objects::jobs::Outcome;
 
-/// The media type of [`Metrics::text`].
+/// Media type of [`Metrics::text`].
 pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// Bounds of the histogram, in seconds: cached answers take a millisecond, factorizations a minute.
+/// Bucket bounds of the duration histogram, in seconds. Cached answers take a millisecond, factorizations up
+/// to a minute.
 const SECONDS: [f64; 16] =
     [0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0];
 
-/// The status of requests whose client left before there was one; no answer has it.
+/// Status label of requests whose client left before the answer. No answer has this status.
 const ABANDONED: &str = "499";
 
-/// The label of requests that no route has, or whose method HTTP does not know.
+/// Label of requests without a route, or with a method that no route has.
 const OTHER: &str = "other";
 
-/// Everything that is counted.
+/// All counters.
 pub struct Metrics {
     registry: Registry,
     requests: IntCounterVec,
@@ -42,8 +43,10 @@ pub struct Metrics {
 }
 
 impl Metrics {
+    /// Registers the metrics.
+    ///
     /// # Errors
-    /// None but for two families of one name.
+    /// No error occurs unless two metrics have the same name.
     pub fn new() -> Result<Self, Error> {
         let registry = Registry::new();
         let counters = |name: &str, help: &str, labels: &[&str]| {
@@ -87,7 +90,8 @@ impl Metrics {
         Ok(metrics)
     }
 
-    /// Rates of what has not happened yet are 0, not absent.
+    /// Creates all known label values, so that rates of events that have not happened yet are 0 instead of
+    /// absent.
     fn begin_at_zero(&self) {
         for slug in Slug::ALL {
             self.problems.with_label_values(&[slug.as_str()]);
@@ -103,12 +107,12 @@ impl Metrics {
         }
     }
 
-    /// A request came.
+    /// Counts a request that arrived.
     pub fn arrived(&self) {
         self.in_flight.inc();
     }
 
-    /// It was answered, or, without a status, its client left.
+    /// Counts a request that was answered. Without a status, its client left before.
     pub fn left(&self, method: &Method, route: Option<&str>, status: Option<StatusCode>, took: Duration) {
         let (method, route) = (method_label(method), route.unwrap_or(OTHER));
         self.in_flight.dec();
@@ -117,7 +121,7 @@ impl Metrics {
         self.durations.with_label_values(&[method, route]).observe(took.as_secs_f64());
     }
 
-    /// It was refused.
+    /// Counts a refusal.
     pub fn refused(&self, slug: Slug) {
         self.problems.with_label_values(&[slug.as_str()]).inc();
         if slug == Slug::RateLimited {
@@ -125,7 +129,7 @@ impl Metrics {
         }
     }
 
-    /// What the `Cache-Status` of an answer says.
+    /// Counts an answer by the outcome in its `Cache-Status`.
     pub fn cached(&self, cache_status: &str) {
         let outcome = match cache_status {
             "gramian; hit" => "hit",
@@ -135,21 +139,21 @@ impl Metrics {
         self.cache_requests.with_label_values(&[outcome]).inc();
     }
 
-    /// A solver was made ready.
+    /// Counts a solver that was made ready.
     pub fn prepared(&self, kind: &str) {
         self.solvers.with_label_values(&[kind]).inc();
     }
 
-    /// A job came to its end.
+    /// Counts a job that ended.
     pub fn job_ended(&self, outcome: Outcome) {
         let outcome = if outcome == Outcome::Succeeded { "succeeded" } else { "failed" };
         self.jobs.with_label_values(&[outcome]).inc();
     }
 
-    /// All of it in the text format of Prometheus, version 0.0.4, after what others read.
+    /// Returns `families` and all metrics in the text format of Prometheus, version 0.0.4.
     ///
     /// # Errors
-    /// None but for a family without a name.
+    /// No error occurs unless a family has no name.
     pub fn text(&self, mut families: Vec<MetricFamily>) -> Result<Vec<u8>, Error> {
         families.extend(self.registry.gather());
         let mut text = Vec::new();
@@ -158,7 +162,7 @@ impl Metrics {
     }
 }
 
-/// A method that some route has, or `other`.
+/// The label of a method: its name if some route has it, else `other`.
 pub fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",

@@ -1,10 +1,14 @@
-//! Newcomers, and room for them.
+//! Acceptance of new connections, and eviction of old ones to make room.
 //!
-//! ROOM. A newcomer beyond the limit takes the place of the connection that has been without a request for longest, as HTTP lets
-//! a server end such a connection at any time. So connections that are opened and left alone keep nobody out. Where all have
-//! requests, the one goes whose client has been waited for longest to read its answers. If all are being answered, the newcomer is told
-//! so at once (503). The other way, to accept nobody while all places are taken, would leave
-//! clients and probes in the backlog without an answer, for as long as others please.
+//! ROOM. A newcomer beyond the limit takes the place of the connection that has been without a request for
+//! longest. HTTP allows a server to close such a connection at any time. So connections that are opened and
+//! left idle keep nobody out.
+//!
+//! If all connections have requests, the server closes the one whose client has delayed its answers longest.
+//! If all requests are being computed, the newcomer is refused at once (503).
+//!
+//! ALTERNATIVE. Accepting nobody while all places are taken would leave clients and probes in the backlog
+//! without an answer, for as long as others please.
 
 use std::collections::HashMap;
 use std::io;
@@ -24,22 +28,22 @@ use crate::http::problem::Problem;
 /// Pause after a failure to accept, such as too many open files: it would fail again at once.
 const BACK_OFF: Duration = Duration::from_millis(200);
 
-/// Between two log lines about such failures.
+/// Least time between two log lines about failures to accept.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
 
-/// What a client may owe as a reader without giving way to a newcomer.
+/// Time that a client may owe as a reader ([`Activity::owed`]) and still keep its place.
 const UNREAD: Duration = Duration::from_secs(2);
 
-/// Newcomers being turned away at once; more are dropped without a word.
+/// Most newcomers that are being refused at once. More are dropped without an answer.
 const TURNED_AWAY_AT_ONCE: usize = 64;
 
-/// Time for one of them to read why.
+/// Time for a refused newcomer to read the answer.
 const TURNING_AWAY: Duration = Duration::from_secs(1);
 
-/// Seconds after which a newcomer that was turned away should try again.
+/// Seconds after which a refused newcomer should try again.
 const RETRY_AFTER_SECONDS: u64 = 1;
 
-/// Accepts, and reports failures without filling the log.
+/// Accepts connections, and reports failures without filling the log.
 #[derive(Default)]
 pub struct Acceptor {
     n_failures: u64,
@@ -47,12 +51,12 @@ pub struct Acceptor {
 }
 
 impl Acceptor {
-    /// The next newcomer; nobody after a failure, when the pause is over.
+    /// Waits for the next connection. Returns `None` after a failure and its pause.
     pub async fn accept(&mut self, listener: &TcpListener) -> Option<TcpStream> {
         loop {
             match listener.accept().await {
                 Ok((socket, _)) => return Some(socket),
-                // The client was gone again.
+                // The client left before it was accepted.
                 Err(error) if is_of_client(&error) => {}
                 Err(error) => {
                     self.report(&error);
@@ -95,7 +99,7 @@ impl Connections {
         self.activities.insert(id, activity);
     }
 
-    /// Waits for the next one to end; for ever if there is none.
+    /// Waits for the next connection to end. Never resolves if there is none.
     pub async fn ended(&mut self) {
         match self.tasks.join_next_with_id().await {
             Some(Ok((id, ()))) => self.activities.remove(&id),
@@ -104,15 +108,15 @@ impl Connections {
         };
     }
 
-    /// Waits for all of them to end.
+    /// Waits for all connections to end.
     pub async fn all_ended(&mut self) {
         while self.len() > 0 {
             self.ended().await;
         }
     }
 
-    /// Ends the one that has been without a request for longest, or else the one whose client reads least. False if all have requests that
-    /// are being answered.
+    /// Ends the connection that has been without a request for longest, or else the one whose client owes
+    /// most as a reader. Returns false if all connections have requests that are still being answered.
     pub async fn evict(&mut self) -> bool {
         let longest = |time: fn(&Activity) -> Option<Duration>| {
             let times = self.activities.values().filter_map(|activity| Some((time(activity)?, activity)));
@@ -121,24 +125,24 @@ impl Connections {
         let unread = || longest(Activity::owed).filter(|(owed, _)| *owed > UNREAD);
         let Some((_, activity)) = longest(Activity::idle_for).or_else(unread) else { return false };
         activity.evict();
-        // It ends as soon as a thread looks at it; none that hangs may keep others out.
+        // The connection ends as soon as a thread polls it. A hanging one must not keep others out.
         let _ = tokio::time::timeout(Duration::from_secs(1), self.ended()).await;
         true
     }
 
-    /// Has each end after the answers under way.
+    /// Lets each connection end after the answers under way.
     pub fn drain(&self) {
         self.activities.values().for_each(|activity| activity.drain());
     }
 
-    /// Ends all of them, wherever they are.
+    /// Aborts all connections.
     pub async fn cut(&mut self) {
         self.tasks.shutdown().await;
         self.activities.clear();
     }
 }
 
-/// Tells newcomers that there is no room.
+/// Refuses connections for which there is no room.
 pub struct Door(Arc<Semaphore>);
 
 impl Door {
@@ -146,11 +150,11 @@ impl Door {
         Self(Arc::new(Semaphore::new(TURNED_AWAY_AT_ONCE)))
     }
 
-    /// Answers 503 whatever it asks, and leaves.
+    /// Answers 503 to any request and closes the connection, in a task of its own.
     pub fn turn_away(&self, socket: TcpStream) {
         let Ok(place) = self.0.clone().try_acquire_owned() else { return };
         tokio::spawn(async move {
-            // Whoever has gone need not be told.
+            // A client that has left needs no answer.
             let _ = tokio::time::timeout(TURNING_AWAY, refuse(socket)).await;
             drop(place);
         });
@@ -160,13 +164,13 @@ impl Door {
 async fn refuse(mut socket: TcpStream) -> io::Result<()> {
     socket.write_all(&refusal().await).await?;
     socket.shutdown().await?;
-    // Bytes that were not read when the socket is closed would reset it, and take the answer away again.
+    // Closing a socket with unread bytes would reset it, and take the answer away again.
     let mut scratch = [0; 4096];
     while socket.read(&mut scratch).await? > 0 {}
     Ok(())
 }
 
-/// The problem as a whole answer: no head of a request was read, so hyper has no part in it.
+/// Formats the problem as a complete HTTP answer. hyper takes no part, because no head of a request was read.
 async fn refusal() -> Vec<u8> {
     let id = uuid::Uuid::now_v7().to_string();
     let problem =

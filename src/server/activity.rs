@@ -1,5 +1,5 @@
-//! What a connection is doing, for those who decide whether it may go on: its own deadlines, and the newcomer that needs its
-//! place.
+//! State of a connection for the code that decides whether it may go on: its own deadlines, and eviction in
+//! favour of a newcomer.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering::Relaxed};
@@ -12,65 +12,67 @@ use tokio::sync::Notify;
 use super::pace::Pace;
 use crate::http::around::transport::HeadFault;
 
-/// Silence after which a client has read a refusal that came before it had sent its body.
+/// Silence after which a client counts as having read a refusal that came before it had sent its body.
 const LINGERING: Duration = Duration::from_secs(2);
 
-/// How long the work for a client that has ended its side of the connection goes on without a byte of answer
-/// for it. A client that has left and one that only sends no more look the same until something is written to
-/// them.
+/// Time for which work goes on, without a byte of answer, for a client that has closed its sending side. A
+/// client that has left and one that has only finished sending look alike until something is written to them.
 const HALF_CLOSED: Duration = Duration::from_secs(1);
 
 /// Time for half a head to become a request, once the server drains.
 const DRAINING_IDLE: Duration = Duration::from_millis(500);
 
-/// One connection.
+/// State of one connection.
 pub struct Activity {
     began: Instant,
     n_in_flight: AtomicUsize,
-    /// Milliseconds after `began`: when it last had a request or sent a byte that was waited for.
+    /// Milliseconds after `began` at which a request last ended, or the client last took bytes that waited
+    /// for it.
     idle_since: AtomicU64,
-    /// Milliseconds after `began`, plus one; 0 unless its last answer is sent and only the client's end is
-    /// waited for: since when, and when it last sent something.
+    /// Milliseconds after `began`, plus one, at which the last answer was sent and only the close by the
+    /// client was still awaited. 0 before.
     lingering_since: AtomicU64,
+    /// Milliseconds after `began`, plus one, at which the client last sent something after that. 0 before.
     lingering_heard: AtomicU64,
-    /// Milliseconds after `began`, plus one; 0 unless the client has ended its side while it waits for an
-    /// answer: since when, or since it last took a byte.
+    /// Milliseconds after `began`, plus one, at which the client closed its sending side while awaiting an
+    /// answer. Moves to the last byte that it took since. 0 before.
     half_closed_since: AtomicU64,
-    /// Wakes the connection when a request is over, to see the end that was kept from it.
+    /// Wakes the connection when a request is over, so that it sees an end of input that was withheld.
     ended: AtomicWaker,
-    /// The client as a reader of its socket.
+    /// Debt of the client as a reader of its socket.
     pub pace: Pace,
-    /// Streams of HTTP/2 that have something for the client to take, and the client as a reader while there is nothing else.
+    /// Number of HTTP/2 streams with data for the client to take, and its debt while all requests have such
+    /// data.
     n_unread: AtomicUsize,
     streams: Pace,
-    /// Somebody else has decided about it: see [`Activity::notice`].
+    /// Signals a decision by other code about this connection: see [`Activity::notice`].
     noticed: Notify,
     is_evicted: AtomicBool,
     is_draining: AtomicBool,
-    /// An answer was given up before its end: nothing must make it look complete.
+    /// Whether an answer was given up before its end. Nothing must then make it look complete.
     is_broken: AtomicBool,
-    /// An answer was given before its request had been read.
+    /// Whether an answer was given before its request had been read.
     is_answered_early: AtomicBool,
     /// See [`Activity::has_whole_requests`].
     has_whole_requests: AtomicBool,
     fault: AtomicU8,
 }
 
-/// Why a connection is ended.
+/// Reason why a connection is ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expiry {
-    /// Without a request for too long.
+    /// No request for too long.
     Idle,
-    /// Its client does not read what it asked for.
+    /// Answers left unread by the client.
     Unread,
 }
 
-/// What others have decided about a connection.
+/// Decision by other code about a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Notice {
     /// A newcomer needs its place.
     Evicted,
-    /// The server ends.
+    /// The server shuts down.
     Draining,
 }
 
@@ -101,27 +103,28 @@ impl Activity {
         self.began.elapsed().as_millis() as u64
     }
 
-    /// A request has arrived; it is under way until the guard is dropped, with the body of its answer.
+    /// Records the arrival of a request. It is under way until the guard is dropped, with the body of its
+    /// answer.
     pub fn enter(self: &Arc<Self>) -> InFlight {
         self.n_in_flight.fetch_add(1, Relaxed);
-        // The client may wait for this one before it reads the others.
+        // The client may wait for this answer before it reads the others.
         self.streams.took(0);
         self.is_answered_early.store(false, Relaxed);
         InFlight(self.clone())
     }
 
-    /// The client took bytes that waited for it: that is not idle.
+    /// Records that the client took bytes that waited for it, so the connection is not idle.
     pub fn stir(&self) {
         self.idle_since.store(self.now(), Relaxed);
     }
 
-    /// A stream has something for the client to take.
+    /// Records that a stream has data for the client to take.
     pub fn give(&self) {
         self.n_unread.fetch_add(1, Relaxed);
         self.wait_if_all_are_unread();
     }
 
-    /// The client took it, or never will.
+    /// Records that the client took the data of a stream, or never will.
     pub fn took(&self, n_bytes: usize) {
         self.n_unread.fetch_sub(1, Relaxed);
         self.streams.took(n_bytes);
@@ -135,8 +138,9 @@ impl Activity {
         }
     }
 
-    /// How long it was only the client that was waited for, beyond what its bytes take; `None` if it is on its way out. What it owes it
-    /// owes whatever it asks for next: a new request on a connection whose client reads none pays nothing.
+    /// Time for which only the client was waited for, beyond the time that its bytes take. `None` if the
+    /// connection is being evicted. New requests do not reduce it: a client that reads none of its answers
+    /// gains nothing by asking again.
     pub fn owed(&self) -> Option<Duration> {
         (!self.is_evicted.load(Relaxed)).then(|| self.pace.owed().max(self.streams.owed()))
     }
@@ -145,7 +149,7 @@ impl Activity {
         self.is_broken.store(true, Relaxed);
     }
 
-    /// Whether the client would take half an answer for a whole one if the connection ended in order.
+    /// Returns whether an orderly end of the connection would make half an answer look complete.
     pub fn has_half_an_answer(&self) -> bool {
         self.is_broken.load(Relaxed) || self.n_in_flight.load(Relaxed) > 0 || self.pace.is_waiting()
     }
@@ -154,37 +158,39 @@ impl Activity {
         self.is_answered_early.store(true, Relaxed);
     }
 
-    /// Bytes came from the client: up to the end of a request, or not.
+    /// Records that bytes came from the client. `is_whole` tells whether they end with a complete request.
     pub fn receive(&self, is_whole: bool) {
         self.has_whole_requests.store(is_whole, Relaxed);
     }
 
-    /// Whether all requests that have begun were received to their end.
+    /// Returns whether all requests that have begun were received to their end.
     pub fn has_whole_requests(&self) -> bool {
         self.has_whole_requests.load(Relaxed)
     }
 
-    /// Whether the client may still be sending what was refused.
+    /// Returns whether the client may still be sending a request that was refused.
     pub fn is_answered_early(&self) -> bool {
         self.is_answered_early.load(Relaxed)
     }
 
-    /// From now on only the client's end is waited for.
+    /// Records that from now on only the close by the client is awaited.
     pub fn linger(&self) {
         if self.lingering_since.compare_exchange(0, self.now() + 1, Relaxed, Relaxed).is_ok() {
             self.hear_out();
         }
     }
 
-    /// The client still sends what was refused.
+    /// Records that the client still sends a request that was refused.
     pub fn hear_out(&self) {
         self.lingering_heard.store(self.now() + 1, Relaxed);
     }
 
-    /// How long a client that has sent all that it will may still wait for an answer, unless it takes some of
-    /// it; `None` if no request is under way, or it has waited so long in vain that it may as well have left.
-    /// One that makes no room for more is there: its socket would have said otherwise. `waker` is woken when
-    /// a request is over.
+    /// Records that the client has closed its sending side. Returns the time for which it may still wait for
+    /// an answer, unless it takes some of it.
+    ///
+    /// Returns `None` if no request is under way, or if it has waited so long in vain that it may have left.
+    /// A client whose socket buffer is full is still there: otherwise the socket would report an error.
+    /// `waker` is woken when a request is over.
     pub fn half_close(&self, waker: &Waker) -> Option<Duration> {
         self.ended.register(waker);
         if self.n_in_flight.load(Relaxed) == 0 {
@@ -198,19 +204,19 @@ impl Activity {
         HALF_CLOSED.checked_sub(waited).filter(|left| !left.is_zero())
     }
 
-    /// The client took bytes of an answer.
+    /// Records that the client took bytes of an answer.
     pub fn take(&self) {
         if self.half_closed_since.load(Relaxed) > 0 {
             self.half_closed_since.store(self.now() + 1, Relaxed);
         }
     }
 
-    /// Time since a moment in milliseconds after `began`, plus one.
+    /// Time since a moment given in milliseconds after `began`, plus one.
     fn since(&self, moment: u64) -> Duration {
         Duration::from_millis((self.now() + 1).saturating_sub(moment))
     }
 
-    /// A head on this connection cannot be trusted, so none that follows can.
+    /// Records an untrustworthy head. No later head on this connection can be trusted either.
     pub fn distrust(&self, fault: HeadFault) {
         self.fault.store(fault.into(), Relaxed);
     }
@@ -219,34 +225,35 @@ impl Activity {
         HeadFault::from_code(self.fault.load(Relaxed))
     }
 
-    /// How long it has had no request; `None` if it has one, or is on its way out.
+    /// Time without a request. `None` if there is one, or if the connection is being evicted.
     pub fn idle_for(&self) -> Option<Duration> {
         let is_busy = self.n_in_flight.load(Relaxed) > 0 || self.pace.is_waiting();
         (!is_busy && !self.is_evicted.load(Relaxed))
             .then(|| Duration::from_millis(self.now().saturating_sub(self.idle_since.load(Relaxed))))
     }
 
-    /// Ends it at once, in favour of another.
+    /// Ends the connection at once, in favour of another.
     pub fn evict(&self) {
         self.is_evicted.store(true, Relaxed);
         self.noticed.notify_one();
     }
 
-    /// Ends it after the answers under way.
+    /// Ends the connection after the answers under way.
     pub fn drain(&self) {
         self.is_draining.store(true, Relaxed);
         self.noticed.notify_one();
     }
 
-    /// Resolves when it is to end: at once or after the answers under way.
+    /// Resolves when the connection is to end: at once, or after the answers under way.
     pub async fn notice(&self) -> Notice {
         self.noticed.notified().await;
         if self.is_evicted.load(Relaxed) { Notice::Evicted } else { Notice::Draining }
     }
 
-    /// Resolves when it has had no request for `idle`, or its client owes more than `sending` as a reader.
+    /// Resolves when the connection has had no request for `idle`, or its client owes more than `sending` as
+    /// a reader.
     ///
-    /// Looked at from time to time, one timer for each connection: what happens on it stays free of timers.
+    /// The state is polled by one timer per connection. So events on the connection need no timers.
     pub async fn expired(&self, idle: Duration, sending: Duration) -> Expiry {
         let tick = (idle.min(sending) / 8).clamp(Duration::from_millis(10), Duration::from_millis(500));
         loop {

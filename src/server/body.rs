@@ -1,4 +1,4 @@
-//! The bodies of one exchange, as the connection sees them.
+//! Request and answer bodies, instrumented for the connection.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -12,14 +12,16 @@ use super::activity::InFlight;
 use super::pace::Pace;
 use crate::http::around::transport::Arrival;
 
-/// Bytes that hyper is given at a time: few calls of the kernel in HTTP/1, and as much as a stream of HTTP/2 holds. hyper takes
-/// another piece while it has less than its buffer unsent (`connection::BUFFER`, `connection::SEND_BUFFER`), so no more than the
-/// sum of the two is neither with the kernel nor in the body.
+/// Bytes given to hyper at a time: few system calls in HTTP/1, and as much as a stream holds in HTTP/2.
+///
+/// hyper takes another piece while it has less than its buffer unsent (`connection::BUFFER`,
+/// `connection::SEND_BUFFER`). So at most the sum of piece and buffer is neither with the kernel nor in the
+/// body.
 const PIECE: usize = 128 << 10;
 const STREAM_PIECE: usize = 32 << 10;
 
-/// At the end of a frame pieces are copies: a slice that hyper has not sent yet would keep the whole frame, which may be an
-/// answer of hundreds of megabytes, long after the body that paid for it.
+/// Bytes at the end of a frame that are copied. A slice that hyper has not sent yet would keep the whole
+/// frame, perhaps hundreds of megabytes, long after the body that paid for it.
 const COPIED_TAIL: usize = 256 << 10;
 
 /// Frames up to this size are sent as slices throughout.
@@ -28,10 +30,10 @@ const SMALL_FRAME: usize = 2 * COPIED_TAIL;
 /// The body of an answer. Its request is under way until it is dropped.
 pub struct Sending<B> {
     body: B,
-    /// What is left of the last frame.
+    /// Unsent part of the last frame.
     rest: Bytes,
     copies_tail: bool,
-    /// Of one stream of HTTP/2, whose client may refuse to take an answer while it reads the socket.
+    /// Pace of one HTTP/2 stream, whose client may refuse to take an answer while it reads the socket.
     pace: Option<Arc<Pace>>,
     /// Bytes of the last piece.
     n_given: usize,
@@ -42,8 +44,11 @@ pub struct Sending<B> {
 }
 
 impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
-    /// Without `pace` the answer is one of HTTP/1, whose client is watched by its socket. Answers to HEAD are never sent, and
-    /// so not missed. A body of an announced length ends with its last byte: hyper does not ask for more.
+    /// Wraps the body of an answer.
+    ///
+    /// `pace` is `None` in HTTP/1, whose client is watched by its socket. `is_sent` is false for answers to
+    /// HEAD, which are never sent and so never cut off. A body of an announced length ends with its last
+    /// byte, because hyper does not ask for more.
     pub fn new(
         body: B,
         in_flight: InFlight,
@@ -65,8 +70,10 @@ impl<B: Body<Data = Bytes> + Unpin> Sending<B> {
         }
     }
 
-    /// The next piece of the frame. In HTTP/2 its last byte is a piece of its own: hyper hands a piece over as soon as the client has
-    /// room for one byte, so the stream is only through with an answer, and no longer watched, when there is room for it all.
+    /// Splits off the next piece of the frame. In HTTP/2 the last byte is a piece of its own.
+    ///
+    /// hyper hands a piece over as soon as the client has room for one byte. So a stream has handed over its
+    /// whole answer, and is no longer watched, only when the client has room for all of it.
     fn next_piece(&mut self) -> Bytes {
         let left = self.rest.len();
         let most = if self.pace.is_some() { STREAM_PIECE } else { PIECE };
@@ -101,7 +108,7 @@ impl<B: Body<Data = Bytes> + Unpin> Body for Sending<B> {
     ) -> Poll<Option<Result<Frame<Bytes>, B::Error>>> {
         let this = &mut *self;
         if let Some(pace) = &this.pace {
-            // Whoever asks for more has taken what was given.
+            // hyper asks for more only after the client took what was given.
             let n_given = std::mem::take(&mut this.n_given);
             pace.took(n_given);
             if n_given > 0 {
@@ -155,7 +162,7 @@ impl<B> Drop for Sending<B> {
     }
 }
 
-/// The body of a request, which says when it is read to its end.
+/// The body of a request, which records when it is read to its end.
 pub struct Receiving {
     pub body: Incoming,
     pub arrival: Arrival,

@@ -1,4 +1,4 @@
-//! One connection, from its first byte to its last.
+//! A single connection, from its first byte to its last.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -24,56 +24,59 @@ use super::socket::{Socket, Wire};
 use super::tls::Tls;
 use crate::http::around::transport::Arrival;
 
-/// Bytes of a head of HTTP/1, and of what is read ahead or not yet sent; a larger head is answered 431. hyper takes 100
-/// headers at most.
+/// Bytes of a head of HTTP/1, and of data read ahead or not yet sent. A larger head is answered 431. hyper
+/// takes 100 headers at most.
 const BUFFER: usize = 64 << 10;
 
 /// Bytes of a head of HTTP/2.
 const HTTP_2_HEAD: u32 = 16 << 10;
 
-/// Bytes of an answer that a stream of HTTP/2 holds beyond what its client has room for.
+/// Bytes of an answer that a stream of HTTP/2 holds beyond those its client has room for.
 const SEND_BUFFER: usize = 32 << 10;
 
-/// Requests at once on a connection of HTTP/2.
+/// Concurrent requests on a connection of HTTP/2.
 const STREAMS: u32 = 64;
 
-/// Bytes that a client of HTTP/2 may send before a handler reads them: of one request, and of all on its connection.
+/// Bytes that a client of HTTP/2 may send before a handler reads them: for one request, and for all of its
+/// connection.
 const STREAM_WINDOW: u32 = 256 << 10;
 const CONNECTION_WINDOW: u32 = 512 << 10;
 
-/// Streams that a client has reset and the server has not looked at yet, and streams that the server had to reset: beyond
-/// them the connection is ended (CVE-2023-44487, CVE-2025-8671).
+/// Limits on reset streams: those the client has reset and the server has not looked at yet, and those the
+/// server had to reset. Beyond them the connection is ended (CVE-2023-44487, CVE-2025-8671).
 const PENDING_RESETS: usize = 16;
 const LOCAL_RESETS: usize = 64;
 
-/// A client of HTTP/2 that does not answer a ping is gone.
+/// Ping of HTTP/2. A client that does not answer in time is gone.
 const PING_INTERVAL: Duration = Duration::from_secs(20);
 const PING_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Time to take leave of a client whose connection ends: its last frames, or its end of the connection.
+/// Time for a client whose connection ends to take its last frames, or to close its side.
 const LEAVE: Duration = Duration::from_secs(1);
 
-/// Bytes that the kernel takes of each connection's answers, half of what it then reserves. With the kernel's own choice, which
-/// grows to megabytes, a slow reader makes no room for so long that it looks like one that does not read, and many
-/// hold memory that nothing counts. It bounds the speed of one answer to 512 KiB for each round trip.
+/// Bytes of each connection's answers that the kernel takes, half of what it then reserves.
+///
+/// Without this limit the kernel's buffers grow to megabytes. A slow reader then makes no room for so long
+/// that it looks like one that does not read. Many such readers hold memory that nothing counts. The limit
+/// bounds the speed of one answer to 512 KiB per round trip.
 const SOCKET_BUFFER: usize = 256 << 10;
 
-/// How long clients are waited for.
+/// Time limits for clients.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
-    /// Without a request: between two, or until the head of one is complete.
+    /// Time without a request: between two, or until the head of one is complete.
     pub idle: Duration,
-    /// As a reader of an answer, beyond what its bytes take at [`super::pace::LEAST_RATE`].
+    /// Reading of an answer, beyond the time that its bytes take at [`super::pace::LEAST_RATE`].
     pub sending: Duration,
 }
 
 tokio::task_local! {
-    /// The client as the reader of the stream of HTTP/2 that this task serves.
+    /// Pace of the client on the HTTP/2 stream that this task serves.
     static STREAM: Arc<Pace>;
 }
 
-/// Serves what comes on a connection until it ends, or has to: see [`Activity::expired`]. Draining, it ends after the answers
-/// under way.
+/// Serves a connection until it ends or expires ([`Activity::expired`]). When the server drains, the
+/// connection ends after the answers under way.
 pub async fn serve(
     socket: TcpStream,
     tls: Option<Arc<Tls>>,
@@ -81,12 +84,13 @@ pub async fn serve(
     patience: Patience,
     activity: Arc<Activity>,
 ) {
-    // Both fail if the client has gone already. On the listener the buffer would miss who came before it was set.
+    // Both fail if the client has gone already. Set on the listener, the buffer size would miss connections
+    // that came before.
     let _ = socket.set_nodelay(true);
     let _ = SockRef::from(&socket).set_send_buffer_size(SOCKET_BUFFER);
     let Some(socket) = shaken(socket, tls, patience, &activity).await else { return };
     let exchanges = activity.clone();
-    // Under way from here on, before the connection is read any further.
+    // The request is under way from here on, before the connection is read any further.
     let service = service_fn(move |request| exchange(request, router.clone(), exchanges.enter()));
     let io = TokioIo::new(Socket::new(socket, activity.clone()));
     let builder = builder(patience.sending);
@@ -110,12 +114,13 @@ pub async fn serve(
     tracing::debug!(?expiry, "connection is ended");
     if expiry == Expiry::Idle {
         connection.as_mut().graceful_shutdown();
-        // Whoever does not answer is left without a farewell.
+        // A client that does not answer gets no farewell.
         let _ = tokio::time::timeout(LEAVE, connection).await;
     }
 }
 
-/// A newcomer once it has shaken hands, where that is asked for. It takes as long as a head may, and its place may be needed by another.
+/// Returns the stream of a new connection, after the handshake if there is TLS. The handshake may take as
+/// long as a head, and gives way when another connection needs the place.
 async fn shaken(
     socket: TcpStream,
     tls: Option<Arc<Tls>>,
@@ -136,8 +141,8 @@ async fn shaken(
     }
 }
 
-/// No timer of hyper's for heads: [`Activity::expired`] ends half a head as it ends any other idleness, also before it is
-/// known which version a connection speaks, and without a timer for each request.
+/// Configures hyper. Its timer for heads is not used: [`Activity::expired`] ends an incomplete head like any
+/// other idle connection. That also works before the HTTP version is known, and needs no timer per request.
 fn builder(sending: Duration) -> auto::Builder<Streams> {
     let mut builder = auto::Builder::new(Streams { sending });
     builder.http1().max_buf_size(BUFFER);
@@ -156,7 +161,7 @@ fn builder(sending: Duration) -> auto::Builder<Streams> {
     builder
 }
 
-/// One request and its answer.
+/// Serves one request.
 async fn exchange(
     request: Request<Incoming>,
     router: Router,
@@ -176,8 +181,9 @@ async fn exchange(
     if pace.is_none() && !arrival.is_read() {
         let activity = in_flight.activity();
         activity.answer_early();
-        // hyper ends the connection unless it gets to the end of the body in one step, and then the client must not send
-        // another request: chunks take a step each, and a body of known length one if it was received.
+        // hyper closes the connection unless it can read the body to its end in one step. The client must
+        // then not send another request. Chunks take a step each. A body of known length takes one step if
+        // all of it was received.
         if !(has_length && activity.has_whole_requests()) {
             response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
         }
@@ -187,8 +193,8 @@ async fn exchange(
     Ok(response.map(|body| Sending::new(body, in_flight, pace, is_sent, n_announced)))
 }
 
-/// Runs the streams of HTTP/2, each for as long as its client takes what it asked for. The end of the task resets the stream
-/// and frees handler and body, also if the client leaves it no room to send; the other streams go on.
+/// Runs HTTP/2 streams, each for as long as its client takes its answer. The end of the task resets the
+/// stream and frees handler and body, even if the client leaves no room to send. Other streams go on.
 #[derive(Clone)]
 struct Streams {
     sending: Duration,

@@ -1,29 +1,29 @@
-//! A second look at the heads of HTTP/1 requests.
+//! A strict scanner of the heads of HTTP/1 requests, against request smuggling.
 //!
-//! WHY. hyper removes the Content-Length of a request that has a Transfer-Encoding as well, and takes a bare line feed for the
-//! end of a line, so no service behind it can tell. A proxy in front that understands such a request differently would take
-//! what one client sends for the request of another. So the bytes are looked at on their way to hyper, and what two parsers
-//! may understand differently is refused.
+//! WHY. hyper removes the Content-Length of a request that also has a Transfer-Encoding, and accepts a bare
+//! line feed as the end of a line. No service behind hyper can tell. A proxy in front that reads such a
+//! request differently would take the bytes of one client for the request of another. So the bytes are
+//! scanned on their way to hyper, and requests that two parsers may understand differently are refused.
 //!
-//! HOW. Heads are found by following the framing: lines to the empty one, then as many bytes of body as the head says. The
-//! scanner is stricter than hyper, so where it finds no fault the two agree on where a request ends; where it finds one, it
-//! stops for good, and every request from then on is refused and the connection closed.
+//! HOW. The scanner follows the framing: lines up to the empty one, then as many body bytes as the head says.
+//! It is stricter than hyper. Where it finds no fault, both agree on where a request ends. After a fault it
+//! stops for good: every later request is refused and the connection closed.
 
 use crate::http::around::transport::HeadFault;
 
-/// Bytes of a line that are kept: what is longer is no header that matters here, or no good value of one.
+/// Bytes of a line that are kept. A longer line is no header that matters here, or has no good value.
 const KEPT_BYTES: usize = 64;
 
-/// How an HTTP/2 connection begins.
+/// First line of an HTTP/2 connection.
 const HTTP_2: &[u8] = b"PRI * HTTP/2.0";
 
-/// What comes next.
+/// State of the scanner: what comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Line(Line),
-    /// So many bytes of a body or chunk, then a line.
+    /// A number of bytes of a body or chunk to skip, then a line.
     Skip(u64, Line),
-    /// Nothing to look at: HTTP/2, or a fault was found.
+    /// Nothing to scan: HTTP/2, or a fault was found.
     Off,
 }
 
@@ -36,14 +36,14 @@ enum Line {
     Trailer,
 }
 
-/// Follows the requests of one connection.
+/// Scanner of the requests of one connection.
 pub struct HeadScanner {
     state: State,
     kept: [u8; KEPT_BYTES],
     /// Bytes of the line so far, its end included.
     n: usize,
     last: u8,
-    /// Of the head so far.
+    /// Content-Length of the head so far.
     length: Option<u64>,
     is_chunked: bool,
 }
@@ -60,15 +60,15 @@ impl HeadScanner {
         }
     }
 
-    /// Whether all requests so far are whole; false in HTTP/2 and after a fault, where nobody counts.
+    /// Returns whether all requests so far are complete. Always false in HTTP/2 and after a fault.
     pub fn is_between_requests(&self) -> bool {
         self.state == State::Line(Line::Request) && self.n == 0
     }
 
-    /// Looks at what was received next, in any portions.
+    /// Scans received bytes, in portions of any size.
     ///
     /// # Errors
-    /// The first fault, once.
+    /// Returns the first fault, once.
     pub fn scan(&mut self, mut bytes: &[u8]) -> Result<(), HeadFault> {
         while !bytes.is_empty() {
             match self.state {
@@ -104,7 +104,7 @@ impl HeadScanner {
         self.last = part.last().copied().unwrap_or(self.last);
     }
 
-    /// What follows a line, whose last byte but one was `before`.
+    /// Returns the state after a line whose last byte but one was `before`.
     fn end_line(&mut self, line: Line, before: u8) -> Result<State, HeadFault> {
         if self.n < 2 || before != b'\r' {
             return Err(HeadFault::LineEnd);
@@ -114,7 +114,7 @@ impl HeadScanner {
         let text = &kept[..length.min(KEPT_BYTES)];
         let next = |line| Ok(State::Line(line));
         match line {
-            // Empty lines before a request are passed over (RFC 9112, section 2.2).
+            // Empty lines before a request are skipped (RFC 9112, section 2.2).
             Line::Request if length == 0 => next(Line::Request),
             Line::Request if text == HTTP_2 => Ok(State::Off),
             Line::Request => {
@@ -138,7 +138,7 @@ impl HeadScanner {
         }
     }
 
-    /// A header; its text may be cut.
+    /// Checks a header, whose text may be cut.
     fn field(&mut self, text: &[u8], length: usize) -> Result<(), HeadFault> {
         if matches!(text[0], b' ' | b'\t') {
             return Err(HeadFault::Folded);
@@ -166,11 +166,11 @@ fn is_digits(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Hexadecimal digits, and an extension behind a semicolon if there is one.
+/// Parses a chunk size: hexadecimal digits, and an optional extension after a semicolon.
 fn chunk_size(text: &[u8], length: usize) -> Option<u64> {
     let end = text.iter().position(|&byte| byte == b';').unwrap_or(length);
     let digits = text.get(..end).filter(|digits| (1..=15).contains(&digits.len()))?;
-    // `from_str_radix` would take a sign.
+    // `from_str_radix` would accept a sign.
     let digits = str::from_utf8(digits).ok().filter(|_| digits.iter().all(u8::is_ascii_hexdigit))?;
     u64::from_str_radix(digits, 16).ok()
 }
@@ -179,7 +179,7 @@ fn chunk_size(text: &[u8], length: usize) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// What is found when the bytes come in portions of this size.
+    /// Scans a text in portions of this size.
     fn scan(text: &str, portion: usize) -> Result<(), HeadFault> {
         let mut scanner = HeadScanner::new();
         text.as_bytes().chunks(portion).try_for_each(|bytes| scanner.scan(bytes))
@@ -203,7 +203,7 @@ mod tests {
             "POST / HTTP/1.1\r\nTransfer-Encoding: Chunked\r\n\r\n4;a=b\r\n\r\n\n\n\r\nA\r\n0123456789\r\n0\r\nTrailer: x\r\n\r\n",
         ] {
             finds(Ok(()), good);
-            // The next one is looked at from its first byte, wherever the body ended.
+            // The next request is scanned from its first byte, wherever the body ended.
             finds(Ok(()), &good.repeat(3));
             finds(Err(HeadFault::TwoFramings), &format!("{good}{BAD}"));
         }

@@ -1,4 +1,4 @@
-//! Listening and draining.
+//! The HTTP server: listening and draining.
 
 mod accept;
 mod activity;
@@ -29,17 +29,18 @@ use connection::Patience;
 pub use probe::is_ready;
 use tls::Tls;
 
-/// How often a draining server looks whether requests are still being computed.
+/// Interval at which a draining server looks whether requests are still being computed.
 const DRAINING_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Serves until `stop` resolves, then drains and returns.
 ///
-/// DRAINING. Nobody is accepted any more. Requests whose body has not been read are refused (503), those being computed are
-/// finished, each within its deadline. Then the readers of answers have `drain_seconds`; whoever has not read its answer by
-/// then finds its connection broken, never an answer that looks complete and is not.
+/// DRAINING. No connection is accepted any more. Requests whose body has not been read are refused (503).
+/// Requests being computed are finished, each within its deadline. Then clients have `drain_seconds` to read
+/// their answers. The connection of a client that is slower is reset, so its answer never looks complete.
 ///
 /// # Errors
-/// If there is to be TLS and its files are wrong. Failures to accept are logged, and pass.
+/// Returns an error if TLS is configured and its files are wrong. Failures to accept are logged and do not
+/// end the server.
 pub async fn serve(
     app: Arc<App>,
     listener: TcpListener,
@@ -71,7 +72,7 @@ pub async fn serve(
         () = connections.all_ended() => {}
         () = over => {}
     }
-    // They are left in order, so that another process goes on with them at once.
+    // Jobs are released in order, so that another process continues them at once.
     app.jobs.all_left().await;
     if connections.len() > 0 {
         tracing::warn!(n_connections = connections.len(), "connections are cut, their answers are not read");
@@ -83,17 +84,17 @@ pub async fn serve(
     Ok(())
 }
 
-/// What every connection is served with.
+/// Settings shared by all connections.
 struct Listening {
     router: Router,
     tls: Option<Arc<Tls>>,
     patience: Patience,
-    /// Connections at once.
+    /// Most connections at once.
     limit: usize,
 }
 
 impl Listening {
-    /// Serves newcomers until `stop` resolves; what is left are the connections under way.
+    /// Serves new connections until `stop` resolves. Returns the connections under way.
     async fn until(self, listener: TcpListener, stop: impl Future<Output = ()>) -> Connections {
         let (mut acceptor, mut connections, door) =
             (Acceptor::default(), Connections::default(), Door::new());
@@ -105,7 +106,8 @@ impl Listening {
                 newcomer = acceptor.accept(&listener) => newcomer,
             };
             let is_full = connections.len() >= self.limit;
-            // Nobody: files may have run out, which connections that are idle hold as well.
+            // Accepting failed if there is no newcomer: file descriptors may have run out, and idle
+            // connections hold some.
             let has_room = if is_full || newcomer.is_none() { connections.evict().await } else { true };
             match newcomer {
                 Some(socket) if has_room => {
@@ -114,7 +116,7 @@ impl Listening {
                     let served = connection::serve(socket, tls, router, self.patience, activity.clone());
                     connections.add(activity, served);
                 }
-                // What it would be told is not what it expects to hear.
+                // A plain-text refusal would not be understood by a TLS client.
                 Some(_) if self.tls.is_some() => {}
                 Some(socket) => door.turn_away(socket),
                 None => {}

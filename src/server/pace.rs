@@ -1,19 +1,21 @@
-//! How long a client makes an answer wait: the measure behind the deadline for sending.
+//! Time for which a client delays an answer: the measure behind the deadline for sending.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// What a client must take of its answers to be waited for without end, in bytes per second.
+/// Bytes per second that a client must take of its answers to be waited for without end.
 pub const LEAST_RATE: u64 = 64 << 10;
 
-/// Says that nobody is waited for.
+/// Value of `waiting_since` while no client is waited for.
 const NOBODY: u64 = u64::MAX;
 
-/// The time that a client owes: how long it was waited for, less what it took at [`LEAST_RATE`].
+/// Debt of a client as a reader: the time it was waited for, less the time its bytes take at [`LEAST_RATE`].
 ///
-/// A client that takes nothing owes as much as it was waited for, one that is slower than the rate owes a part of it, and a
-/// faster one owes nothing, however long its answer is. Time in which the answer itself was not ready is never counted. The
-/// counters belong to one task; they are atomic so that its parts can share them.
+/// A client that takes nothing owes all the time it was waited for. A client slower than the rate owes a part
+/// of it. A faster one owes nothing, however long its answer is. Time in which the answer itself was not
+/// ready never counts.
+///
+/// The counters belong to one task. They are atomic so that its parts can share them.
 pub struct Pace {
     began: Instant,
     /// Microseconds after `began`, or [`NOBODY`].
@@ -30,7 +32,7 @@ impl Pace {
         self.began.elapsed().as_micros() as u64
     }
 
-    /// There is something to take from now on, if there was not already.
+    /// Starts waiting for the client, unless it is waited for already.
     pub fn wait(&self) {
         if !self.is_waiting() {
             self.waiting_since.store(self.now(), Relaxed);
@@ -41,7 +43,7 @@ impl Pace {
         self.waiting_since.load(Relaxed) != NOBODY
     }
 
-    /// The client took this many bytes, and whatever there was to take is taken.
+    /// Records that the client took `n_bytes`, and that nothing is left for it to take.
     pub fn took(&self, n_bytes: usize) {
         let since = self.waiting_since.swap(NOBODY, Relaxed);
         let mut debt = self.debt_micros.load(Relaxed);
@@ -55,7 +57,7 @@ impl Pace {
         self.debt_micros.store(debt.saturating_sub(worth), Relaxed);
     }
 
-    /// What the client owes.
+    /// Debt of the client now.
     pub fn owed(&self) -> Duration {
         let waiting = match self.waiting_since.load(Relaxed) {
             NOBODY => 0,
@@ -64,14 +66,14 @@ impl Pace {
         Duration::from_micros(self.debt_micros.load(Relaxed) + waiting)
     }
 
-    /// Resolves once the client owes more than it is allowed.
+    /// Resolves once the debt exceeds `allowed`.
     pub async fn is_overdue(&self, allowed: Duration) {
         loop {
             let owed = self.owed();
             if owed > allowed {
                 return;
             }
-            // It cannot owe more than that earlier; a little more, so that rounding does not make another turn.
+            // The debt cannot exceed it earlier. The extra 5 ms avoid another round due to rounding.
             tokio::time::sleep(allowed - owed + Duration::from_millis(5)).await;
         }
     }

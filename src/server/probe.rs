@@ -1,4 +1,4 @@
-//! The readiness probe as a client.
+//! A client for the readiness probe.
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
@@ -14,10 +14,11 @@ use tokio_rustls::rustls::{
 
 use super::tls;
 
-/// Whether a server at this address answers its readiness probe with 200, within two seconds; over TLS or in plain.
+/// Returns whether a server at this address answers its readiness probe with 200 within two seconds, over TLS
+/// or plain.
 ///
 /// # Errors
-/// Those of the connection.
+/// Returns errors of the connection.
 pub fn is_ready(bind: SocketAddr, speaks_tls: bool) -> io::Result<bool> {
     let timeout = Duration::from_secs(2);
     let stream = TcpStream::connect_timeout(&reachable(bind), timeout)?;
@@ -43,8 +44,9 @@ fn over_tls(stream: TcpStream) -> io::Result<StreamOwned<ClientConnection, TcpSt
     Ok(StreamOwned::new(connection.map_err(io::Error::other)?, stream))
 }
 
-/// Trusts whoever listens at the address of the server itself: the probe tells nothing, and believes nothing but that it is ready. What the file
-/// of the certificate has at the moment does not matter: a server whose new one is wrong goes on with the one before.
+/// Accepts any certificate of the server at its own address. The probe reveals nothing, and learns only
+/// whether the server is ready. The certificate file is not checked, because a server whose new certificate
+/// is wrong keeps the old one.
 #[derive(Debug)]
 struct Whoever(Arc<CryptoProvider>);
 
@@ -85,7 +87,7 @@ impl ServerCertVerifier for Whoever {
     }
 }
 
-/// A server that listens on every address is asked on the loopback.
+/// Returns the address to connect to. A server that listens on every address is asked on the loopback.
 fn reachable(bind: SocketAddr) -> SocketAddr {
     let ip = match bind.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),

@@ -1,4 +1,5 @@
-//! The socket beneath hyper, plain or with TLS: notes when its client does not read, looks at heads, and ends as the last answer deserves.
+//! The socket beneath hyper, plain or with TLS. It measures how its client reads, scans heads, and ends in
+//! order or by reset, depending on the last answer.
 
 use std::io;
 use std::pin::Pin;
@@ -14,7 +15,7 @@ use tokio_rustls::server::TlsStream;
 use super::activity::Activity;
 use super::head::HeadScanner;
 
-/// What comes from a client and goes to it.
+/// The byte stream of a client.
 pub enum Wire {
     Plain(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),
@@ -29,7 +30,7 @@ impl Wire {
     }
 }
 
-/// Calls a method of whichever stream it is.
+/// Calls a method of the plain or the TLS stream.
 macro_rules! of_either {
     ($self:expr, $stream:ident => $call:expr) => {
         match &mut $self.inner {
@@ -43,15 +44,15 @@ pub struct Socket {
     inner: Wire,
     activity: Arc<Activity>,
     scanner: HeadScanner,
-    /// The last answer is sent and the client knows that none follows.
+    /// Whether the last answer is sent and the client knows that none follows.
     is_shut_down: bool,
-    /// Once the client has ended its side: when it is looked at whether it may have left.
+    /// Timer after the client has closed its sending side: when to check whether it may have left.
     half_closed: Option<Pin<Box<Sleep>>>,
 }
 
 impl Socket {
-    /// The end of what the client sends. hyper takes it for the end of the client, so it learns of it only
-    /// when no answer is waited for: see [`Activity::half_close`].
+    /// Handles the end of the client's input. hyper takes it for the end of the client. So it is withheld
+    /// while an answer is awaited: see [`Activity::half_close`].
     fn poll_end(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let timer = self.half_closed.get_or_insert_with(|| Box::pin(sleep(Duration::ZERO)));
         while self.scanner.is_between_requests()
@@ -69,7 +70,7 @@ impl Socket {
         Self { inner, activity, scanner: HeadScanner::new(), is_shut_down: false, half_closed: None }
     }
 
-    /// Counts the time in which the client does not take what is written.
+    /// Counts the time for which the client does not take written bytes.
     fn note(&self, outcome: Poll<io::Result<usize>>) -> Poll<io::Result<usize>> {
         match &outcome {
             Poll::Pending => self.activity.pace.wait(),
@@ -136,16 +137,18 @@ impl AsyncWrite for Socket {
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let outcome = of_either!(self, stream => Pin::new(stream).poll_flush(cx));
-        // What TLS has taken it may still hold: the end of an answer, to a client that does not read.
+        // TLS may still hold accepted bytes: the end of an answer, to a client that does not read.
         match self.inner {
             Wire::Tls(_) => self.note(outcome.map_ok(|()| 0)).map_ok(|_| ()),
             Wire::Plain(_) => outcome,
         }
     }
 
-    /// Ends the answers. If the last one came before its request was read, what the client still sends is read and thrown
-    /// away for a while: closing on unread bytes would reset the connection, and take the answer from a client that only
-    /// reads after sending.
+    /// Ends the answers.
+    ///
+    /// If the last answer came before its request was read, further input is read and discarded for a while.
+    /// Closing on unread bytes would reset the connection. A client that reads only after sending would lose
+    /// the answer.
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         if !self.is_shut_down {
             std::task::ready!(of_either!(self, stream => Pin::new(stream).poll_shutdown(cx)))?;
@@ -156,7 +159,7 @@ impl AsyncWrite for Socket {
         }
         self.activity.linger();
         let mut scratch = [0; 16 << 10];
-        // A few at a time, so that one fast client does not keep a thread.
+        // A few reads at a time, so that one fast client does not occupy a thread.
         for _ in 0..16 {
             let mut buffer = ReadBuf::new(&mut scratch);
             let outcome = of_either!(self, stream => Pin::new(stream).poll_read(cx, &mut buffer));
@@ -172,10 +175,10 @@ impl AsyncWrite for Socket {
 }
 
 impl Drop for Socket {
-    /// An answer that is cut ends in a reset: to a client of HTTP/1.0 the orderly end of a connection is the end of an answer.
+    /// Resets the connection if an answer was cut: in HTTP/1.0 an orderly end would mark the answer complete.
     fn drop(&mut self) {
         if self.activity.has_half_an_answer() {
-            // It fails if the client has gone, which is as well.
+            // It fails if the client has gone, which does no harm.
             let _ = self.inner.tcp().set_zero_linger();
         }
     }

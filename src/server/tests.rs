@@ -1,4 +1,4 @@
-//! Connections over real sockets, with answers that say when they are let go.
+//! Connections over real sockets, with answers that record when they are dropped.
 
 use std::convert::Infallible;
 use std::net::SocketAddr;
@@ -19,7 +19,7 @@ use super::*;
 
 const SENDING: Duration = Duration::from_millis(400);
 
-/// Waits, and for so long that only what never comes fails.
+/// Waits until a condition holds. The limit is so long that only an event that never comes fails.
 async fn eventually(what: &str, is_so: impl Fn() -> bool) {
     let began = Instant::now();
     while !is_so() {
@@ -28,7 +28,7 @@ async fn eventually(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// How many answers there are, and how many were let go.
+/// Numbers of answers made and dropped.
 #[derive(Default)]
 struct Count {
     made: AtomicUsize,
@@ -83,7 +83,7 @@ async fn start(sending: Duration) -> (SocketAddr, Arc<Count>) {
     start_with_limit(sending, 100).await
 }
 
-/// Serves answers of several kinds.
+/// Starts a server with answers of several kinds.
 async fn start_with_limit(sending: Duration, limit: usize) -> (SocketAddr, Arc<Count>) {
     let count = Arc::new(Count::default());
     let [huge, small, paused, whole] = [(); 4].map(|()| count.clone());
@@ -116,7 +116,7 @@ async fn an_answer_that_is_never_read_is_let_go_and_ends_in_a_reset() {
         let mut stream = ask(address, "/huge", version).await;
         eventually("made", || count.made.load(SeqCst) > n_before).await;
         eventually("dropped", || count.dropped.load(SeqCst) > n_before).await;
-        // An orderly end would make what was received of it look complete in HTTP/1.0.
+        // An orderly end would make the received part look complete in HTTP/1.0.
         let mut received = Vec::new();
         assert!(stream.read_to_end(&mut received).await.is_err(), "HTTP/{version}: {} bytes", received.len());
     }
@@ -158,7 +158,7 @@ async fn time_that_an_answer_takes_to_come_about_is_not_the_readers() {
 
 type Client = h2::client::SendRequest<Bytes>;
 
-/// A client of HTTP/2 that leaves each answer so many bytes.
+/// Connects a client of HTTP/2 whose window for each answer is `window` bytes.
 async fn http_2(
     address: SocketAddr,
     window: u32,
@@ -207,7 +207,7 @@ async fn who_reads_nothing_of_what_it_asks_for_again_and_again_gives_way_to_a_ne
     let began = Instant::now();
     loop {
         for (client, _) in &mut clients {
-            // One that was turned out asks no more.
+            // An evicted client asks no more.
             let Ok(mut ready) = client.clone().ready().await else { continue };
             let Ok((answer, _)) = ready.send_request(request(address, "/small"), true) else { continue };
             let Ok(answer) = answer.await else { continue };
@@ -230,7 +230,7 @@ async fn who_reads_nothing_of_what_it_asks_for_again_and_again_gives_way_to_a_ne
 #[tokio::test]
 async fn a_client_of_http_2_that_reads_gets_all_of_it() {
     let (address, count) = start(SENDING).await;
-    // The window is that of the answer, to the byte: nothing waits for room that is never needed.
+    // The first window equals the answer to the byte: nothing waits for room that is never needed.
     for (window, path, expected) in [(1000, "/small", 1000), (65_535, "/whole", 8 << 20)] {
         let (mut client, _connection) = http_2(address, window).await;
         let answer = client.send_request(request(address, path), true).unwrap().0.await.unwrap();
@@ -272,7 +272,7 @@ async fn pieces_still_to_be_sent_do_not_keep_a_whole_answer() {
             let piece = piece.unwrap().into_data().unwrap();
             received.extend_from_slice(&piece);
             unsent.push_back(piece);
-            // What hyper has not sent yet, in whichever buffer.
+            // The queue stands for the bytes that hyper has not sent yet, in any buffer.
             while unsent.iter().map(Bytes::len).sum::<usize>() > 192 << 10 {
                 unsent.pop_front();
             }

@@ -1,4 +1,4 @@
-//! TLS for whoever wants no proxy in front: a certificate and its key from files, which are read again when they change.
+//! TLS without a proxy in front: certificate and key are read from files, and again when these change.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,17 +13,17 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
 
-/// How often it is looked whether the files have changed.
+/// Interval at which the files are checked for changes.
 const LOOKING: Duration = Duration::from_secs(1);
 
-/// What is spoken over it, the preferred first.
+/// Protocols offered over TLS, the preferred first.
 const PROTOCOLS: [&[u8]; 2] = [b"h2", b"http/1.1"];
 
 /// A certificate with the authorities up to a root, and its key.
 pub struct Tls {
     certificate: PathBuf,
     key: PathBuf,
-    /// Of both files as they were at the start.
+    /// Digest of both files at the start.
     first: Digest,
     current: ArcSwap<ServerConfig>,
 }
@@ -35,23 +35,25 @@ impl Tls {
     /// Reads both files.
     ///
     /// # Errors
-    /// Says which of them is wrong, and how.
+    /// Returns which file is wrong, and how.
     pub fn new(certificate: &Path, key: &Path) -> Result<Self, String> {
         let (config, first) = read(certificate, key)?;
         let current = ArcSwap::from_pointee(config);
         Ok(Self { certificate: certificate.to_owned(), key: key.to_owned(), first, current })
     }
 
-    /// Shakes hands with a newcomer.
+    /// Performs the handshake with a new connection.
     ///
     /// # Errors
-    /// If the newcomer does not want to, or is gone.
+    /// Returns an error if the client refuses the handshake or is gone.
     pub async fn accept(&self, socket: TcpStream) -> std::io::Result<TlsStream<TcpStream>> {
         TlsAcceptor::from(self.current.load_full()).accept(socket).await
     }
 
-    /// Takes the files again whenever they are others, for as long as the process lives. Files that do not go together, as while one of
-    /// them is replaced, change nothing. They are read each time: their times and lengths do not tell whether they can be.
+    /// Reloads the files whenever they change, for as long as the process lives.
+    ///
+    /// Files that do not match, as while one of them is replaced, change nothing. Both are read each time:
+    /// their times and lengths do not tell whether they can be read.
     pub async fn follow_files(self: Arc<Self>) {
         let mut last = Ok(self.first);
         let mut ticks = tokio::time::interval(LOOKING);
@@ -74,7 +76,7 @@ impl Tls {
     }
 }
 
-/// The primitives, the same for server and probe.
+/// The cryptographic provider shared by server and probe.
 pub fn provider() -> Arc<CryptoProvider> {
     Arc::new(aws_lc_rs::default_provider())
 }
@@ -100,7 +102,7 @@ fn read(certificate: &Path, key: &Path) -> Result<(ServerConfig, Digest), String
     Ok((config, hasher.finalize().into()))
 }
 
-/// The certificates of a file, that of the server first.
+/// Parses the certificates of a file, that of the server first.
 fn certificates(bytes: &[u8]) -> Result<Vec<CertificateDer<'static>>, String> {
     let found = CertificateDer::pem_slice_iter(bytes).collect::<Result<Vec<_>, _>>();
     let found = found.map_err(|error| error.to_string())?;

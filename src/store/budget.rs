@@ -1,12 +1,13 @@
-//! Bytes that many share: taken before they are used, given back when what they pay for is dropped.
+//! Bytes of memory shared by many: reserved before use, given back when whatever they pay for is dropped.
 //!
-//! WHY NOT A SEMAPHORE. A semaphore serves its waiters in order, so that whoever wants a kilobyte waits behind whoever wants a
-//! gigabyte. Here small reservations never wait behind large ones: a part of the budget is closed to the large. Among the
-//! large, those of the owner who holds least come first, and of equals the earliest; none of them is passed by another
-//! that its owner may have, so that each has its turn. With several owners none may hold more than half.
+//! WHY NOT A SEMAPHORE. A semaphore serves its waiters in order, so a request for a kilobyte waits behind one
+//! for a gigabyte. Here small reservations never wait behind large ones: a part of the budget is closed to
+//! large reservations. Among the large ones, those of the owner who holds least come first. Ties go by
+//! arrival. A reservation that its owner's share permits is never overtaken by a later one in this order, so
+//! each has its turn. With several owners, none may hold more than half.
 //!
-//! NO WAITING WHILE HOLDING. Whoever waits here must hold nothing that the others who wait here need; callers take all that
-//! they need at once, and split it afterwards.
+//! NO WAITING WHILE HOLDING. A caller that waits here must hold nothing that other waiters need. Callers
+//! therefore reserve all their bytes at once and split the reservation afterwards.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -17,23 +18,24 @@ use tokio::sync::Notify;
 
 use super::Owner;
 
-/// The part of a budget that large reservations leave free.
+/// Divisor of the budget: large reservations leave `total / SMALL_SHARE` bytes free.
 const SMALL_SHARE: usize = 8;
 
-/// A reservation is small up to this part of what the large leave free, so that several of them fit there at once.
+/// A reservation is small up to `1 / SMALL_PARTS` of the bytes that large ones leave free, so several fit.
 const SMALL_PARTS: usize = 16;
 
-/// How often a waiting reservation looks again, beside being woken: caches may have become able to give something up.
+/// Interval at which a waiting reservation looks again without being woken: caches may have become able to
+/// give up entries.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
-/// A number of bytes, and who holds how many of them.
+/// A number of bytes, with a record of how many each owner holds.
 pub struct Budget {
     ledger: Arc<Ledger>,
 }
 
 struct Ledger {
     total: usize,
-    /// What one owner may hold, if there are several.
+    /// Most bytes that one owner may hold. Unlimited when there is only one owner.
     share: usize,
     state: Mutex<State>,
     released: Notify,
@@ -43,7 +45,7 @@ struct Ledger {
 struct State {
     held: usize,
     by_owner: HashMap<Owner, usize>,
-    /// Large reservations that wait, in the order of their arrival.
+    /// Large reservations that wait, in order of arrival.
     waiting: Vec<Waiting>,
     n_arrived: u64,
 }
@@ -55,31 +57,31 @@ struct Waiting {
     n_bytes: usize,
 }
 
-/// More than an owner may ever hold.
+/// A refused reservation: it exceeds `limit`, the largest that can ever succeed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BeyondBudget {
     pub limit: usize,
 }
 
 impl Budget {
-    /// A budget of so many bytes for so many owners.
+    /// Creates a budget of `total` bytes. With several owners, each may hold at most half.
     pub fn new(total: usize, n_owners: usize) -> Self {
         let share = if n_owners > 1 { total / 2 } else { usize::MAX };
         let ledger = Ledger { total, share, state: Mutex::default(), released: Notify::new() };
         Self { ledger: Arc::new(ledger) }
     }
 
-    /// The largest reservation that there can be.
+    /// The largest reservation that can ever succeed, in bytes.
     pub fn largest(&self) -> usize {
         self.ledger.largest()
     }
 
-    /// Bytes that are held.
+    /// Bytes held now.
     pub fn n_held(&self) -> usize {
         self.ledger.state().held
     }
 
-    /// Takes so many bytes if they are to be had now, whoever waits.
+    /// Reserves `n_bytes` if they are free now, ahead of any waiters.
     pub fn try_reserve(&self, owner: Owner, n_bytes: usize) -> Option<Reservation> {
         let mut state = self.ledger.state();
         self.ledger.has_room(&state, owner, n_bytes).then(|| self.take(&mut state, owner, n_bytes))
@@ -91,11 +93,13 @@ impl Budget {
         self.take(&mut self.ledger.state(), owner, n_bytes)
     }
 
-    /// Takes so many bytes when it is their turn. Whenever they are not to be had `look` is called with what is missing
-    /// apart from the turn, to let go of what can be done without, and to say whether they are still wanted: `None` if not.
+    /// Waits for the turn of this reservation and for `n_bytes` to be free, and reserves them.
+    ///
+    /// While they are not, `look` is called with the shortage apart from the turn. It should release memory
+    /// that can be spared. If it breaks, the bytes are no longer wanted and the result is `None`.
     ///
     /// # Errors
-    /// [`BeyondBudget`] if there will never be so many.
+    /// [`BeyondBudget`] if `n_bytes` exceeds [`Budget::largest`].
     pub async fn reserve(
         &self,
         owner: Owner,
@@ -119,13 +123,13 @@ impl Budget {
             if let Some(reservation) = self.take_turn(&place) {
                 return Ok(Some(reservation));
             }
-            // Either way it looks again.
+            // Woken or timed out, it looks again.
             let _ = tokio::time::timeout(LOOK_AGAIN, released).await;
         }
     }
 
-    /// Grows a reservation within `patience`; says whether it could. It waits while it holds what others may wait for, so it
-    /// must not wait for long.
+    /// Grows a reservation within `patience`. Returns whether it succeeded. It waits while holding bytes that
+    /// others may wait for, so `patience` must be short.
     pub async fn grow(&self, reservation: &mut Reservation, n_bytes: usize, patience: Duration) -> bool {
         let growing = async {
             loop {
@@ -141,7 +145,7 @@ impl Budget {
         tokio::time::timeout(patience, growing).await.is_ok()
     }
 
-    /// What is missing for a reservation, apart from its turn.
+    /// Returns the bytes missing for a reservation, its turn aside, or `None` if it fits.
     pub fn shortage(&self, owner: Owner, n_bytes: usize) -> Option<Shortage> {
         let state = self.ledger.state();
         let of_owner = state.of(owner).saturating_add(n_bytes).saturating_sub(self.ledger.share);
@@ -191,7 +195,7 @@ impl Ledger {
         n_bytes > self.total / SMALL_SHARE / SMALL_PARTS
     }
 
-    /// What a reservation of this size must leave free.
+    /// Bytes that a reservation of this size must leave free.
     fn closed_to(&self, n_bytes: usize) -> usize {
         if self.is_large(n_bytes) { self.total / SMALL_SHARE } else { 0 }
     }
@@ -219,7 +223,7 @@ impl State {
     }
 }
 
-/// Bytes that must be let go before a reservation fits: by its owner, and by all together.
+/// Bytes to release before a reservation fits: by its owner, and by all owners together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shortage {
     pub owner: Owner,
@@ -227,7 +231,7 @@ pub struct Shortage {
     pub of_all: usize,
 }
 
-/// A place among those who wait, given up when dropped.
+/// A place in the queue, given up when dropped.
 struct Place<'a> {
     ledger: &'a Ledger,
     waiting: Waiting,
@@ -247,7 +251,7 @@ impl Drop for Place<'_> {
     }
 }
 
-/// Bytes that are held until this is dropped; it travels with what they pay for.
+/// Bytes that are held until this value is dropped. It travels with the data that they pay for.
 pub struct Reservation {
     ledger: Arc<Ledger>,
     owner: Owner,
@@ -263,14 +267,14 @@ impl Reservation {
         self.owner
     }
 
-    /// Cuts off a part, at most all of it.
+    /// Splits off `n_bytes`, or all bytes if there are fewer.
     pub fn split(&mut self, n_bytes: usize) -> Reservation {
         let n_bytes = n_bytes.min(self.n_bytes);
         self.n_bytes -= n_bytes;
         Reservation { ledger: self.ledger.clone(), owner: self.owner, n_bytes }
     }
 
-    /// Gives back what is beyond so many bytes.
+    /// Gives back all but `n_bytes`.
     pub fn shrink_to(&mut self, n_bytes: usize) {
         drop(self.split(self.n_bytes.saturating_sub(n_bytes)));
     }
@@ -280,7 +284,7 @@ impl Reservation {
         self.n_bytes += std::mem::take(&mut other.n_bytes);
     }
 
-    /// Takes more if it is to be had now; says whether it was.
+    /// Reserves `n_bytes` more if they are free now. Returns whether they were.
     pub fn try_grow(&mut self, n_bytes: usize) -> bool {
         let mut state = self.ledger.state();
         if !self.ledger.has_room(&state, self.owner, n_bytes) {

@@ -1,10 +1,11 @@
-//! Values of many owners within one number of bytes, least recently used out first, whoever has most.
+//! A byte-bounded LRU cache shared by owners. When it is full, the owner holding most bytes loses its least
+//! recently used entry.
 //!
-//! An owner who holds no more than an equal share of the bytes loses nothing to the others: what is evicted is that of the
-//! owner who holds most, and somebody holds more than an equal share when all together hold too much. What nobody else
-//! needs, one owner may have.
+//! An owner with at most an equal share of the bytes loses nothing to others. For whenever the cache is over
+//! its bound, some owner holds more than an equal share. An owner may use all bytes that nobody else needs.
 //!
-//! Not a concurrent map: the lock is held for a look-up in a table, and never while a value is made or dropped.
+//! The cache is not a concurrent map. Its lock is held for table look-ups only, never while a value is made
+//! or dropped.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -14,14 +15,14 @@ use lru::LruCache;
 
 use super::Owner;
 
-/// Bytes that an entry takes beside key and value: two links, their node and a slot of the table at its usual filling.
-/// As measured by tests/footprint.rs.
+/// Bytes of an entry beside key and value: two links, their node and a table slot at its usual load factor.
+/// Measured by tests/footprint.rs.
 const ENTRY_BYTES: usize = 64;
 
-/// A bounded cache; values are handles that are cheap to clone.
+/// A byte-bounded cache. Values are handles that are cheap to clone.
 pub(super) struct FairCache<K, V> {
     max_bytes: usize,
-    /// What makes no room for others.
+    /// Values that are never evicted.
     must_stay: fn(&V) -> bool,
     entries: Mutex<Entries<K, V>>,
 }
@@ -29,11 +30,11 @@ pub(super) struct FairCache<K, V> {
 struct Entries<K, V> {
     of: HashMap<Owner, OfOwner<K, V>>,
     n_bytes: usize,
-    /// Values that made room for others, since the start.
+    /// Values evicted since the start.
     n_evicted: u64,
 }
 
-/// How many values there are, and were.
+/// Numbers of entries: kept now, and evicted since the start.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
     pub n_kept: usize,
@@ -51,24 +52,25 @@ struct Entry<V> {
 }
 
 impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
-    /// An empty cache of at most so many bytes.
+    /// Creates an empty cache of at most `max_bytes`.
     pub(super) fn new(max_bytes: usize) -> Self {
         Self::sparing(max_bytes, |_| false)
     }
 
-    /// The same, where some values make no room for others: if there is no other, new ones are not kept.
+    /// Creates a cache that never evicts values for which `must_stay` holds. If only such values are left to
+    /// evict, a new one is not kept.
     pub(super) fn sparing(max_bytes: usize, must_stay: fn(&V) -> bool) -> Self {
         let entries = Entries { of: HashMap::new(), n_bytes: 0, n_evicted: 0 };
         Self { max_bytes, must_stay, entries: Mutex::new(entries) }
     }
 
-    /// Finds a value, which is the most recently used one then.
+    /// Finds a value and marks it as the most recently used.
     pub(super) fn get(&self, owner: Owner, key: &K) -> Option<V> {
         self.lock().of.get_mut(&owner)?.by_use.get(key).map(|entry| entry.value.clone())
     }
 
-    /// Keeps a value of so many bytes in place of what the key had, and lets go of others that have no room beside it.
-    /// What is larger than the cache is not kept; says whether it was.
+    /// Keeps a value of `n_bytes`, replaces any value of the key and evicts others until the bound holds.
+    /// Returns false if the value is larger than the cache, which keeps it out.
     pub(super) fn insert(&self, owner: Owner, key: K, value: V, n_bytes: usize) -> bool {
         let mut gone = Vec::new();
         let mut entries = self.lock();
@@ -77,7 +79,8 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         is_kept
     }
 
-    /// Finds the value of a key, or keeps this one; says whether it is new. What is larger than the cache is new and not kept.
+    /// Finds the value of a key, or keeps this one. Returns the value and whether it is new. A value larger
+    /// than the cache counts as new and is not kept.
     pub(super) fn get_or_insert(
         &self,
         owner: Owner,
@@ -98,31 +101,31 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         (found.unwrap_or(value), is_new)
     }
 
-    /// Weighs a value again that has grown; one that is gone stays away.
+    /// Updates the weight of a value that has grown. An evicted value is not inserted again.
     pub(super) fn reweigh(&self, owner: Owner, key: K, n_bytes: usize) {
         if let Some(value) = self.peek(owner, &key) {
             self.insert(owner, key, value, n_bytes);
         }
     }
 
-    /// Lets go of the least recently used value for which `may_go` holds: of one owner, or of
-    /// whoever has most among those who have such a one.
+    /// Evicts the least recently used value for which `may_go` holds. It is taken from `owner`, or else from
+    /// the owner with most bytes among those who have such a value.
     pub(super) fn evict(&self, owner: Option<Owner>, may_go: impl Fn(&V) -> bool) -> Option<V> {
         self.lock().evict(owner, may_go).map(|entry| entry.value)
     }
 
-    /// Finds a value without using it: it stays where it is in the order of eviction.
+    /// Finds a value without marking it as used: its place in the order of eviction stays.
     pub(super) fn peek(&self, owner: Owner, key: &K) -> Option<V> {
         self.lock().of.get(&owner)?.by_use.peek(key).map(|entry| entry.value.clone())
     }
 
-    /// Forgets a value, and returns it.
+    /// Removes a value and returns it.
     pub(super) fn remove(&self, owner: Owner, key: &K) -> Option<V> {
         let gone = self.lock().remove(owner, key);
         gone.map(|entry| entry.value)
     }
 
-    /// Forgets all values of an owner whose key is meant.
+    /// Removes all values of an owner whose key satisfies `is_meant`.
     pub(super) fn remove_if(&self, owner: Owner, is_meant: impl Fn(&K) -> bool)
     where
         K: Clone,
@@ -141,26 +144,26 @@ impl<K: Hash + Eq, V: Clone> FairCache<K, V> {
         drop(gone);
     }
 
-    /// All values of an owner, in no order.
+    /// All values of an owner, in arbitrary order.
     pub(super) fn values(&self, owner: Owner) -> Vec<V> {
         let entries = self.lock();
         let of_owner = entries.of.get(&owner);
         of_owner.into_iter().flat_map(|of| of.by_use.iter()).map(|(_, entry)| entry.value.clone()).collect()
     }
 
-    /// Bytes of all values that are kept.
+    /// Bytes of all values in the cache.
     pub(super) fn n_bytes(&self) -> usize {
         self.lock().n_bytes
     }
 
-    /// How many values are kept, and how many made room for others since the start.
+    /// Numbers of values kept now and evicted since the start.
     pub(super) fn counts(&self) -> Counts {
         let entries = self.lock();
         let n_kept = entries.of.values().map(|of| of.by_use.len()).sum();
         Counts { n_kept, n_evicted: entries.n_evicted }
     }
 
-    /// What is let go is handed out, to be dropped when the lock is free.
+    /// Inserts an entry and evicts others. Removed entries go to `gone`, to be dropped after the lock.
     fn keep(
         &self,
         entries: &mut Entries<K, V>,
@@ -224,7 +227,7 @@ impl<K: Hash + Eq, V> Entries<K, V> {
                 self.n_evicted += 1;
                 return self.account_for(owner, entry);
             }
-            // It is in use, and by that the most recently used one.
+            // It is in use, so it becomes the most recently used one.
             of.by_use.put(key, entry);
         }
         None
@@ -288,7 +291,7 @@ mod tests {
         assert_eq!(cache.evict(Some(A), |&value| value >= 4), None);
         assert_eq!(cache.evict(Some(B), |_| true), None);
         assert_eq!(keys(&cache, A), [0, 1, 3]);
-        // All that the richest has is in use: then somebody else's.
+        // All values of the owner with most bytes are in use, so another owner loses one.
         assert!(cache.insert(B, 7, 7, 100));
         assert_eq!(cache.evict(None, |&value| value >= 4), Some(7));
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use super::Owner;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::model::Recipe;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
@@ -64,33 +65,20 @@ impl FitKey {
         blake3::Hash::from(self.fit).to_string()
     }
 
-    /// Names local regressions of a cloud, which choose all else by themselves, as it is at sites where these
-    /// are given.
-    pub fn of_local(owner: Owner, cloud_id: CloudId, sites: Option<&Cloud>) -> Self {
+    /// Names what a recipe makes of a cloud (with duplicates merged or not).
+    pub fn of(owner: Owner, cloud_id: CloudId, recipe: &Recipe, is_merged: bool) -> Self {
         let mut hasher = blake3::Hasher::new();
-        hasher.update(b"local");
-        if let Some(sites) = sites {
-            update_with_floats(&mut hasher, sites.coordinates());
-        }
-        Self { owner, cloud_id, fit: hasher.finalize().into() }
-    }
-
-    /// Names a fit of values to a cloud (with duplicates merged or not).
-    pub fn of(
-        solver: SolverKind,
-        owner: Owner,
-        cloud_id: CloudId,
-        kernel: &Kernel,
-        regularization: &Regularization,
-        merged: bool,
-    ) -> Self {
-        let mut hasher = blake3::Hasher::new();
-        if solver == SolverKind::Local {
+        if recipe.solver() == SolverKind::Local {
             hasher.update(b"local");
         }
-        hasher.update(&[u8::from(merged)]);
-        update_with_kernel(&mut hasher, kernel);
-        update_with_regularization(&mut hasher, regularization);
+        if let Some((kernel, regularization)) = recipe.process() {
+            hasher.update(&[u8::from(is_merged)]);
+            update_with_kernel(&mut hasher, kernel);
+            update_with_regularization(&mut hasher, regularization);
+        }
+        if let Some(sites) = recipe.sites() {
+            update_with_floats(&mut hasher, sites.coordinates());
+        }
         Self { owner, cloud_id, fit: hasher.finalize().into() }
     }
 }
@@ -212,9 +200,14 @@ mod tests {
         let id = CloudId::of(&cloud, None);
         let kernel = |family, length_scale, variance| Kernel::new(family, length_scale, variance).unwrap();
         let alpha = Regularization::Uniform;
-        let of = |owner, kernel: &Kernel, regularization: &Regularization, merged| {
-            FitKey::of(SolverKind::Dense, Owner(owner), id, kernel, regularization, merged)
+        let recipe = |solver, kernel: &Kernel, regularization: &Regularization| {
+            Recipe::of_values(solver, kernel.clone(), regularization.clone())
         };
+        let of = |owner, kernel: &Kernel, regularization: &Regularization, is_merged| {
+            let recipe = recipe(SolverKind::Dense, kernel, regularization);
+            FitKey::of(Owner(owner), id, &recipe, is_merged)
+        };
+        let of_local = |recipe| FitKey::of(Owner(0), id, &recipe, false);
         let gauss = kernel(Family::Gauss, 1.0, 1.0);
         let keys = [
             of(0, &gauss, &alpha(0.0), false),
@@ -229,9 +222,9 @@ mod tests {
             of(0, &kernel(Family::InverseMultiquadric, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
-            FitKey::of(SolverKind::Local, Owner(0), id, &gauss, &alpha(0.0), false),
-            FitKey::of_local(Owner(0), id, None),
-            FitKey::of_local(Owner(0), id, Some(&cloud)),
+            of_local(recipe(SolverKind::Local, &gauss, &alpha(0.0))),
+            of_local(Recipe::LocalSurface { sites: None }),
+            of_local(Recipe::LocalSurface { sites: Some(cloud.clone().into()) }),
         ];
         let distinct: std::collections::HashSet<_> = keys.iter().collect();
         assert_eq!(distinct.len(), keys.len());

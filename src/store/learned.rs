@@ -1,4 +1,4 @@
-//! What was learned from values, so that they are looked at once.
+//! A cache of facts learned from values, so that each set of values is analysed once.
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use super::single_flight::SingleFlight;
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::selection::Learned;
 
-/// Bytes of everything that is kept here: thousands of entries, a part of what the process takes by itself.
+/// Bytes of the whole cache: thousands of entries, and part of the fixed footprint of the process.
 const MAX_BYTES: usize = 1 << 20;
 
-/// Values at the points of a cloud, with what was said of their mean and noise.
+/// Key of a learned entry: owner, cloud, and values with what the request said of their mean and noise.
 pub type LearnedKey = (Owner, CloudId, ValuesKey);
 
-/// What was learned lately. `E` is what a computation may fail with.
+/// Recently learned facts by cloud and values. `E` is the error of a computation.
 pub struct LearnedStore<E> {
     kept: Arc<FairCache<LearnedKey, Arc<Learned>>>,
     flights: SingleFlight<LearnedKey, Arc<Learned>, E>,
@@ -28,15 +28,15 @@ impl<E: Clone + Send + Sync + 'static> Default for LearnedStore<E> {
 }
 
 impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
-    /// What was learned from these values, if it is kept.
+    /// The facts learned from these values, if they are cached.
     pub fn get(&self, key: LearnedKey) -> Option<Arc<Learned>> {
         self.kept.get(key.0, &key)
     }
 
-    /// What is learned from these values, by `compute` at most once however many ask.
+    /// Returns the facts learned from these values. Concurrent callers share one run of `compute`.
     ///
     /// # Errors
-    /// Those of `compute`; they are not kept.
+    /// Returns the errors of `compute`. They are not cached.
     pub async fn get_or_learn<F>(
         &self,
         key: LearnedKey,
@@ -52,7 +52,7 @@ impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
         let begin = || {
             let learning = compute();
             async move {
-                // A flight may have landed between the look-up and this one's beginning.
+                // Another flight may have landed between the look-up and the start of this one.
                 if let Some(found) = kept.get(key.0, &key) {
                     return Ok(found);
                 }
@@ -65,7 +65,7 @@ impl<E: Clone + Send + Sync + 'static> LearnedStore<E> {
         self.flights.join(key, begin).await.1
     }
 
-    /// Forgets what was learned from values on a cloud.
+    /// Removes everything learned from values on a cloud.
     pub fn forget_cloud(&self, owner: Owner, id: CloudId) {
         self.kept.remove_if(owner, |(_, of, _)| *of == id);
     }

@@ -9,29 +9,19 @@ use super::budget::{BeyondBudget, Budget, Reservation, Shortage};
 use super::fair_cache::{Counts, FairCache};
 use super::key::{CloudId, FitKey, ValuesKey};
 use super::single_flight::{Boarding, SingleFlight};
-use gramian_numerics::function::moving::Moving;
 use gramian_numerics::machine::heap::{arc_payload, block_bytes};
 use gramian_numerics::machine::pages::SpareBuffer;
+use gramian_numerics::model::Model;
 use gramian_numerics::solver::{Solution, Solver};
 use gramian_numerics::surface::Surface;
 
 /// The share of the cache that weights may take: they are n numbers beside the n² of a dense solver.
 const WEIGHTS_SHARE: usize = 16;
 
-/// What is kept under a [`FitKey`].
-pub enum Prepared {
-    /// A system made ready.
-    Solver(Arc<Solver>),
-    /// A system that is solved around each query.
-    Moving(Arc<Moving>),
-    /// Nothing: local regressions need no solver.
-    Local,
-}
-
 /// What a fit is served from, with the surface of its cloud, once that was asked for, and the time it took. It holds the memory
 /// that it was made in for as long as anybody holds it, kept or not.
 pub struct PreparedFit {
-    prepared: Prepared,
+    model: Model,
     pub gram_time: Duration,
     pub factor_time: Duration,
     /// It was read, not made.
@@ -50,39 +40,21 @@ struct PreparedSurface {
 }
 
 impl PreparedFit {
-    /// What local regressions are kept under: their surface comes later.
-    pub fn local(mut memory: Reservation) -> Self {
-        memory.shrink_to(0);
-        let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
-        let memory = Arc::new(memory);
-        Self {
-            prepared: Prepared::Local,
-            gram_time,
-            factor_time,
-            is_restored: false,
-            surface: OnceLock::new(),
-            memory,
-        }
+    /// A model that was made in this memory, of which goes back what it does not take.
+    pub fn new(model: Model, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
+        memory.shrink_to(model.n_bytes());
+        let (surface, memory) = (OnceLock::new(), Arc::new(memory));
+        Self { model, gram_time, factor_time, is_restored: false, surface, memory }
     }
 
-    /// Gives back what of the memory it does not take.
-    pub fn moving(moving: Moving, mut memory: Reservation) -> Self {
-        memory.shrink_to(moving.n_bytes());
-        let (prepared, memory) = (Prepared::Moving(Arc::new(moving)), Arc::new(memory));
-        let (gram_time, factor_time) = (Duration::ZERO, Duration::ZERO);
-        Self { prepared, gram_time, factor_time, is_restored: false, surface: OnceLock::new(), memory }
+    /// A model that took no time: made without work, or read again.
+    pub fn at_once(model: Model, memory: Reservation) -> Self {
+        Self::new(model, Duration::ZERO, Duration::ZERO, memory)
     }
 
-    /// Gives back what of the memory the finished solver does not take.
-    pub fn new(solver: Solver, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
-        memory.shrink_to(solver.n_bytes());
-        let (prepared, memory) = (Prepared::Solver(Arc::new(solver)), Arc::new(memory));
-        Self { prepared, gram_time, factor_time, is_restored: false, surface: OnceLock::new(), memory }
-    }
-
-    /// The same of a solver that was made before, and read again.
-    pub fn restored(solver: Solver, memory: Reservation) -> Self {
-        Self { is_restored: true, ..Self::new(solver, Duration::ZERO, Duration::ZERO, memory) }
+    /// A model that was made before, and read again.
+    pub fn restored(model: Model, memory: Reservation) -> Self {
+        Self { is_restored: true, ..Self::at_once(model, memory) }
     }
 
     /// Whether it was read, not made.
@@ -90,32 +62,13 @@ impl PreparedFit {
         self.is_restored
     }
 
-    /// The system made ready.
-    pub fn solver(&self) -> Option<&Arc<Solver>> {
-        match &self.prepared {
-            Prepared::Solver(solver) => Some(solver),
-            Prepared::Moving(_) | Prepared::Local => None,
-        }
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
-    /// The system that is solved around each query.
-    pub fn of_queries(&self) -> Option<&Arc<Moving>> {
-        match &self.prepared {
-            Prepared::Moving(moving) => Some(moving),
-            Prepared::Solver(_) | Prepared::Local => None,
-        }
-    }
-
-    /// What it is, by name: a factorization that was read; one of all of the matrix, or of as many pivots as it has rank; neighbourhoods; or
-    /// nothing.
+    /// The label of the model in metrics.
     pub fn kind(&self) -> &'static str {
-        match &self.prepared {
-            Prepared::Solver(_) if self.is_restored => "restored",
-            Prepared::Solver(solver) if solver.rank() < solver.n_points() => "pivoted",
-            Prepared::Solver(_) => "dense",
-            Prepared::Moving(_) => "moving",
-            Prepared::Local => "local",
-        }
+        if self.is_restored { "restored" } else { self.model.name() }
     }
 
     /// The surface of the signature function, once it was asked for.
@@ -126,12 +79,7 @@ impl PreparedFit {
     /// Bytes held on the heap, those of the surface once there is one.
     fn n_bytes(&self) -> usize {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Solver>());
-        let of_solver = match &self.prepared {
-            Prepared::Solver(solver) => solver.n_bytes(),
-            Prepared::Moving(moving) => moving.n_bytes(),
-            Prepared::Local => 0,
-        };
-        own + of_solver + self.surface().map_or(0, |surface| surface.n_bytes())
+        own + self.model.n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
     }
 
     /// Bytes that are given back when it is dropped.

@@ -1,4 +1,4 @@
-//! One computation for all who ask for the same thing at once.
+//! Deduplication of concurrent computations: all callers with the same key share one future.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -13,13 +13,13 @@ type WeakFlight<V, E> = WeakShared<BoxFuture<'static, Outcome<V, E>>>;
 
 /// Futures under way, by key.
 ///
-/// Whoever waits polls the shared future, so it goes on when the client that began it leaves; the map itself holds it
-/// weakly, so when the last waiter leaves it is dropped and with it the work.
+/// Every waiter polls the shared future, so it survives the client that began it. The map holds it weakly.
+/// When the last waiter leaves, the future is dropped and the work with it.
 pub(super) struct SingleFlight<K, V, E> {
     flights: Arc<Mutex<HashMap<K, WeakFlight<V, E>>>>,
 }
 
-/// Whether a waiter's flight was already under way.
+/// Tells whether a caller began the flight or joined one under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Boarding {
     Began,
@@ -41,12 +41,12 @@ where
         self.flights.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether a flight of `key` is under way.
+    /// Returns whether a flight of `key` is under way.
     pub(super) fn is_under_way(&self, key: &K) -> bool {
         self.flights().get(key).and_then(under_way).is_some()
     }
 
-    /// Joins the flight of `key` if there is one.
+    /// Joins the flight of `key`, if there is one.
     pub(super) async fn join_if_under_way(&self, key: &K) -> Option<Outcome<V, E>> {
         let flight = self.flights().get(key).and_then(under_way);
         match flight {
@@ -64,7 +64,7 @@ where
         (boarding, flight.await)
     }
 
-    /// What `compute` holds is dropped if it is not needed, before anybody waits.
+    /// Finds or begins a flight. If one is under way, `compute` and its captures are dropped before any wait.
     fn board<F>(&self, key: K, compute: impl FnOnce() -> F) -> (Boarding, Flight<V, E>)
     where
         F: Future<Output = Outcome<V, E>> + Send + 'static,
@@ -75,7 +75,7 @@ where
             return (Boarding::Joined, flight);
         }
         let flight = compute().boxed().shared();
-        // Entries of flights that nobody finished are swept here, so the map stays as small as the traffic.
+        // Entries of abandoned flights are swept here, so the map stays as small as the traffic.
         flights.retain(|_, weak| weak.upgrade().is_some());
         if let Some(weak) = flight.downgrade() {
             flights.insert(key, weak);
@@ -84,8 +84,8 @@ where
     }
 }
 
-/// The flight, unless it has landed: those who waited may not all have looked yet, and hold it, but whoever comes now comes
-/// too late for its outcome.
+/// Returns the flight unless it has landed. A landed flight may still be held by waiters that have not read
+/// its outcome yet. A caller that comes now must not get that outcome.
 fn under_way<V: Clone, E: Clone>(weak: &WeakFlight<V, E>) -> Option<Flight<V, E>> {
     weak.upgrade().filter(|flight| flight.peek().is_none())
 }

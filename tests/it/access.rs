@@ -1,4 +1,4 @@
-//! Who may ask: API keys, and browsers of other origins.
+//! Access control: API keys and CORS.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -75,7 +75,7 @@ async fn every_operation_refuses_keys_and_media_types_where_the_document_says_so
         for (method, operation) in item.as_object().unwrap() {
             let method: Method = method.to_uppercase().parse().unwrap();
             for (status, headers) in [("401", ["wrong-key", "*/*"]), ("406", ["alpha-key", "text/csv"])] {
-                // What a result is depends on another request.
+                // The answer for a result depends on an earlier request.
                 if path.ends_with("/result") && status == "406" {
                     continue;
                 }
@@ -120,7 +120,7 @@ async fn clouds_of_one_key_are_invisible_to_the_other() {
         let refused = send(&server, Method::POST, route.path, &beta, &body).await;
         refused.expect_problem(404, "unknown-cloud");
         send(&server, Method::POST, route.path, &alpha, &body).await.expect_ok();
-        // What one key has computed is no hit for the other.
+        // A factor computed with one key is no cache hit for the other key.
         body["cloud"] = points.clone();
         let answer = send(&server, Method::POST, route.path, &alpha, &body).await;
         assert_eq!(answer.header("cache-status"), "gramian; hit", "{}", route.path);
@@ -128,7 +128,7 @@ async fn clouds_of_one_key_are_invisible_to_the_other() {
     let body = json!({"cloud": points, "values": [1, 2], "kernel": {"family": "matern", "length_scale": 1.0}, "alpha": 1e-8});
     let answer = send(&server, Method::POST, "/v1/interpolation", &beta, &body).await;
     assert_eq!(answer.header("cache-status"), "gramian; fwd=miss; stored");
-    // Deleting one's own leaves the other's.
+    // Deleting the cloud with one key leaves it for the other.
     assert_eq!(send(&server, Method::DELETE, &path, &beta, &json!({})).await.status, 204);
     send(&server, Method::GET, &path, &alpha, &json!({})).await.expect_ok();
     let list = send(&server, Method::GET, "/v1/clouds", &alpha, &json!({})).await.expect_ok();
@@ -157,7 +157,7 @@ async fn configured_origins_may_call_and_others_may_not() {
         for name in ["authorization", "content-type", "prefer", "idempotency-key"] {
             assert!(allowed.contains(name), "{allowed}");
         }
-        // Problems are read by browsers as well.
+        // Browsers read problems as well.
         for (headers, status) in [
             (&[("origin", origin)][..], 401),
             (&[("origin", origin), ("authorization", "Bearer alpha-key")], 200),

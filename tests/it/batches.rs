@@ -1,11 +1,11 @@
-//! Many lists of values on one cloud, and what a posterior has beside means and variances.
+//! Batches of value lists on one cloud, and the optional parts of a posterior besides means and variances.
 
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// Lists of noisy values on the unit sphere, each with a mean of its own.
+/// Returns `n` points of the unit sphere and `k` lists of noisy values at them, each with its own mean.
 fn lists(n: usize, k: usize) -> (Vec<[f64; 3]>, Vec<Vec<f64>>) {
     let (points, mut random) = (fibonacci_sphere(n), Random(11));
     let mut list = |at: usize| {
@@ -62,7 +62,7 @@ async fn lists_share_a_fit_and_are_answered_as_each_alone() {
                     };
                     let is_shared = name.contains("varianc") || name.contains("deviations");
                     let found = if is_shared { found } else { &found[at] };
-                    // Solves and sums in another order.
+                    // The order of solves and sums differs.
                     assert_close(found, of_alone, 1e-9);
                 }
             }
@@ -77,7 +77,7 @@ async fn a_kernel_that_is_not_given_is_learned_from_all_lists() {
     let mut body = json!({"cloud": {"points": points}, "values": values});
     let answer = server.post("/v1/interpolation/batch", &body).await.expect_ok();
     let noise = answer["diagnostics"]["alpha"].as_f64().unwrap().sqrt();
-    // Sixteen lists of 200 say it to 2 %; steps of the grid are 15 %.
+    // Sixteen lists of 200 values determine the noise to 2 %. The grid has steps of 15 %.
     assert!((0.042..0.058).contains(&noise), "{noise}");
     assert!(answer["mean_coefficients"].as_array().unwrap().len() == 40);
     body["values"] = json!(values[..1]);
@@ -110,7 +110,7 @@ async fn samples_are_those_of_the_seed_and_of_the_posterior() {
     }
     body["samples"]["count"] = json!(2);
     let fewer = server.post("/v1/posterior", &body).await.expect_ok();
-    // Products of other shapes may differ in the last bit.
+    // Products of different shapes may differ in the last bit.
     assert_close(&fewer["samples"], &json!(answer["samples"].as_array().unwrap()[..2]), 1e-13);
     body["samples"]["seed"] = json!(6);
     let other = server.post("/v1/posterior", &body).await.expect_ok();
@@ -136,7 +136,7 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
             assert!((answer["quantiles"][row][query].as_f64().unwrap() - expected).abs() < 1e-13);
         }
     }
-    // Far away the observation is normal with variance 1.04 about 0: Φ(−0.25/√1.04), by scipy.stats.norm.
+    // Far away the observation is normal with variance 1.04 and mean 0: Φ(−0.25/√1.04), by scipy.stats.norm.
     let probabilities = numbers(&answer["exceedance_probabilities"]);
     assert!((probabilities[2] - 0.40317086).abs() < 1e-3, "{probabilities:?}");
     assert!(probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
@@ -145,7 +145,7 @@ async fn quantiles_and_exceedances_are_those_of_normal_distributions() {
     let deviations = server.post("/v1/interpolation", &deviations).await.expect_ok();
     let squares: Vec<f64> = numbers(&deviations["gradient_deviations"]).iter().map(|s| s * s).collect();
     assert_close(&answer["gradient_variances"], &json!(squares), 1e-14);
-    // Nothing varies at a point that is met exactly.
+    // The variance is 0 at a point that is interpolated exactly.
     body["alpha"] = json!(0.0);
     body["queries"] = json!([points[0]]);
     for (threshold, expected) in [(values[0][0] - 1e-3, 1.0), (values[0][0] + 1e-3, 0.0)] {
@@ -217,7 +217,7 @@ async fn what_is_no_batch_or_no_probability_is_refused() {
     body["noise_variances"] = noisy;
     let problem = server.post("/v1/posterior", &body).await.expect_problem(422, "invalid-request");
     assert_eq!(problem["errors"][0]["pointer"], "/threshold");
-    // More draws than an answer may hold are refused before any is made.
+    // A request for more draws than an answer may hold is refused before any is drawn.
     let mut body = posterior;
     body["samples"] = json!({"count": 1_000_000_000u64});
     server.post("/v1/posterior", &body).await.expect_problem(413, "problem-too-large");
@@ -230,7 +230,7 @@ async fn where_nothing_varies_samples_are_the_means_and_zeros_are_told() {
         "kernel": {"family": "gauss", "length_scale": 1.0}});
     let answer = server.post("/v1/posterior", &body).await.expect_ok();
     assert_eq!(answer["samples"], json!([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]]));
-    // At points without noise variances are 0 but for rounding, which makes some of them negative.
+    // At points without noise the variances are 0 up to rounding, which makes some of them negative.
     let (points, values) = lists(150, 1);
     let mut body = json!({"cloud": {"points": points}, "values": values[0], "alpha": 0, "include": ["deviations"],
         "kernel": {"family": "gauss", "length_scale": 0.3}});
@@ -238,7 +238,7 @@ async fn where_nothing_varies_samples_are_the_means_and_zeros_are_told() {
         body["solver"] = json!(solver);
         let answer = server.post("/v1/interpolation", &body).await.expect_ok();
         let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
-        // The local solver leaves points out before rounding is all that is left of a variance.
+        // The local solver leaves points out before only rounding is left of a variance.
         let is_told = warnings.iter().any(|warning| warning["code"] == "variance_clamped");
         assert!(is_told || solver == "local", "{warnings:?}");
         assert!(numbers(&answer["value_deviations"]).iter().all(|deviation| *deviation >= 0.0));

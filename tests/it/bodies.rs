@@ -1,4 +1,4 @@
-//! Bodies in and out: JSON, safetensors, npy and PLY, compressed or not, at once or streamed.
+//! Bodies of requests and answers: JSON, safetensors, npy and PLY, compressed or not, whole or streamed.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -31,7 +31,7 @@ async fn post(
     receive(request).await
 }
 
-/// What a JSON request is answered, in a format.
+/// Returns the answer to a JSON request in the media type `accept`.
 async fn ask(server: &Server, path: &str, body: &Value, accept: &str) -> Received {
     let headers = [("content-type", JSON), ("accept", accept)];
     let answer = post(server, path, &headers, body.to_string()).await;
@@ -44,7 +44,7 @@ fn float64s(bytes: &[u8]) -> Vec<f64> {
     bytes.chunks(8).map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap())).collect()
 }
 
-/// Numbers of nested arrays of a shape, NaN for null.
+/// Returns the numbers of nested arrays with this shape, row-major. NaN stands for null.
 fn flat(value: &Value, shape: &[usize]) -> Vec<f64> {
     match (value, shape.split_first()) {
         (Value::Null, _) => vec![f64::NAN; shape.iter().product()],
@@ -61,7 +61,7 @@ fn are_same(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan())
 }
 
-/// A request with one query on the surface and one where it has no normal.
+/// Returns a request with one query on the surface and one at which the normal is undefined.
 fn with_null(route: &Route) -> Value {
     let mut request = route.with("/queries", &json!([[0, 0, 1], [0, 0, 0]]));
     if route.is_geometry() {
@@ -132,7 +132,7 @@ async fn matrices_come_as_npy_and_nothing_else_does() {
     }
 }
 
-/// The request as safetensors: its arrays of numbers as tensors, the rest as metadata.
+/// Returns the request as safetensors: arrays of numbers as tensors, the rest as metadata.
 fn as_safetensors(request: &Value) -> Vec<u8> {
     let mut rest = request.clone();
     let mut tensors = Vec::new();
@@ -202,7 +202,7 @@ async fn clouds_come_as_npy_too() {
     assert_eq!((refused.status, &problem["errors"][0]["pointer"]), (422, &json!("/points/4/2")));
 }
 
-/// A scan as a scanner writes it: text, or numbers of 64 bits in either byte order.
+/// Returns a PLY file as a scanner writes it: text, or 64-bit numbers in either byte order.
 fn scan(format: &str, points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<u8> {
     let names = ["x", "y", "z", "nx", "ny", "nz"];
     let properties: String = names.iter().map(|name| format!("property double {name}\r\n")).collect();
@@ -242,7 +242,7 @@ async fn clouds_come_as_scanners_write_them() {
             assert_eq!((answer.status, answer.text()), (200, known.text.as_str()), "{format} {coding}");
         }
     }
-    // Nothing but the registration of clouds takes a file.
+    // Only the registration of clouds accepts files.
     let route = route_of("/v1/normals");
     assert_eq!(post(&server, route.path, &[("content-type", PLY)], "").await.status, 415);
 }
@@ -348,7 +348,7 @@ async fn what_decompresses_beyond_the_limit_is_too_large() {
     }
 }
 
-/// A matrix of more numbers than are encoded at once, with rows of null.
+/// Returns a request for a matrix with more numbers than are encoded at once, and with rows of null.
 fn large_request() -> Value {
     let points = fibonacci_sphere(200);
     let mut queries = points.clone();
@@ -388,7 +388,7 @@ async fn large_answers_are_streamed_to_the_same_text() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_client_that_reads_nothing_holds_no_thread() {
-    // Two threads, so that a client has jobs waiting for one while others run.
+    // Two threads, so that a client has jobs that wait for a thread while others run.
     let server = Server::with_flags(&["--threads", "2", "--max-queue", "0"]).await;
     let points = fibonacci_sphere(1000);
     let kernel = json!({"family": "matern", "length_scale": 0.3});
@@ -402,7 +402,7 @@ async fn a_client_that_reads_nothing_holds_no_thread() {
             request.len()
         );
         stream.write_all(head.as_bytes()).await.unwrap();
-        // The answer, some 20 MB, has begun; the rest of it waits in the sockets and behind them.
+        // The answer, some 20 MB, has begun. The rest waits in the sockets and in the server.
         let mut status = [0; 12];
         stream.read_exact(&mut status).await.unwrap();
         assert_eq!(&status, b"HTTP/1.1 200");

@@ -1,4 +1,4 @@
-//! One factorization, however many ask.
+//! The factor cache: concurrent and repeated requests share one factorization.
 
 use std::time::Instant;
 
@@ -35,7 +35,8 @@ async fn the_second_request_is_a_hit_and_ten_times_faster() {
         assert_eq!(next.json()["values"], first.json()["values"]);
     }
     times.sort();
-    // The factor 10 is the issue's; one of five measurements may be disturbed.
+    // The factor 10 is the requirement of the issue. The median is used because single measurements may be
+    // disturbed.
     assert!(times[2] * 10 <= first_time, "{first_time:?} first, then {times:?}");
 }
 
@@ -77,7 +78,7 @@ async fn with_two_factors_only_two_hits_are_a_hit() {
     assert_eq!(outcome().await, "gramian; hit");
 }
 
-/// How often the answers say that they computed a factor.
+/// Counts the answers by cache outcome: (stored, collapsed, hit). A stored one computed the factor.
 async fn count_outcomes(requests: Vec<tokio::task::JoinHandle<String>>) -> (usize, usize, usize) {
     let mut outcomes = Vec::new();
     for request in requests {
@@ -112,15 +113,15 @@ async fn they_cost_one_factorization_also_when_the_first_client_disconnects() {
     let server = Server::start().await;
     let body = interpolation(2500, &[[1.0, 0.0, 0.0]]).to_string();
     let first = spawn_request(&server, &body);
-    // The first one is under way once its cloud is registered.
+    // The first request is under way once its cloud is registered.
     let is_registered =
         async || server.get("/v1/clouds").await.json()["clouds"].as_array().unwrap().len() == 1;
     while !is_registered().await {}
     let others: Vec<_> = (0..31).map(|_| spawn_request(&server, &body)).collect();
     first.abort();
     let (stored, collapsed, hit) = count_outcomes(others).await;
-    // Whoever joins the first one's computation collapses on it; none begins a second one while it runs. If the first had
-    // left before any other came, exactly one of them begins anew.
+    // Requests that join the first computation collapse on it, and none begins a second one while it runs. If
+    // the first client left before any other came, exactly one of the others starts again.
     assert!(stored <= 1, "{stored} factorizations");
     assert_eq!(stored + collapsed + hit, 31);
     let after = server.post_text("/v1/interpolation", body).await;

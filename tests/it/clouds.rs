@@ -1,4 +1,4 @@
-//! Registered clouds: named by their content, listed, used by id, dropped.
+//! Registered clouds: identified by their content, listed, used by id, deleted, evicted.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -14,7 +14,8 @@ async fn ask(server: &Server, method: Method, path: &str, if_none_match: &str) -
     server.send(request).await
 }
 
-/// d and n, then the numbers, all little-endian, as the interface documents it.
+/// Returns the cloud id as the interface documents it: the BLAKE3 hash of d, n, then the numbers, all
+/// little-endian.
 fn documented_id(d: u64, points: &[f64], normals: &[f64]) -> String {
     let mut bytes = Vec::new();
     bytes.extend(d.to_le_bytes());
@@ -88,7 +89,7 @@ async fn the_id_is_the_hash_of_the_documented_bytes() {
     let with_normals = json!({"points": [[0.0, 1.5], [-2.25, 1e-310]], "normals": [[1, 0], [-0.0, 2]]});
     let expected = documented_id(2, &[0.0, 1.5, -2.25, 1e-310], &[1.0, 0.0, 0.0, 2.0]);
     assert_eq!(id(with_normals).await, expected);
-    // The same numbers in another shape are another cloud.
+    // The same numbers in another shape are a different cloud.
     let expected = documented_id(1, &[0.0, 1.5, -2.25, 1e-310], &[]);
     assert_eq!(id(json!({"points": [[0.0], [1.5], [-2.25], [1e-310]]})).await, expected);
 }
@@ -222,7 +223,8 @@ async fn inline_points_are_registered_on_every_route() {
 
 #[tokio::test]
 async fn the_least_recently_used_cloud_makes_room() {
-    // 1,000 points of dimension 3 weigh some 26 KB, and their sampling 42 KB: there is room for two.
+    // 1,000 points in 3 dimensions take some 26 KB, and their sampling 42 KB, so there is room for two
+    // clouds.
     let server = Server::with_flags(&["--cloud-bytes", "170000"]).await;
     let post = async |shift: f64| {
         let points: Vec<_> = fibonacci_sphere(1000).iter().map(|x| [x[0] + shift, x[1], x[2]]).collect();

@@ -1,5 +1,4 @@
-//! One cloud that many post and delete at the same moment: its list says what its objects say, and nothing is
-//! left over.
+//! Concurrent posts and deletes of one cloud: its list agrees with its objects, and no file is left over.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -16,16 +15,16 @@ use crate::support::{Server, receive};
 
 const N_CLIENTS: usize = 8;
 
-/// Requests of one client between two looks at what came of all of them.
+/// Requests that each client sends per round, before the state is checked.
 const N_REQUESTS: usize = 30;
 
 const N_ROUNDS: usize = 6;
 
-/// The longest time after which a process knows that another one has deleted a cloud is 10 s: twice that on a
-/// busy machine.
+/// Time after which every process must know that another one deleted a cloud. The bound is 10 s. Doubled for
+/// busy machines.
 const KNOWN_TO_ALL: Duration = Duration::from_secs(20);
 
-/// Points of the cloud that everybody wants, or of one that is always there.
+/// Returns the points of cloud 0, which all clients post and delete, or of another, which is never deleted.
 fn points(cloud: usize) -> Value {
     json!({"points": [[cloud, 0.5], [1.5, 2.5], [3.5, 0.25]]})
 }
@@ -39,7 +38,7 @@ async fn ask(url: String, method: Method, body: Option<&Value>) -> Received {
     .await
 }
 
-/// All pages of the list, of two clouds each; only the last page may be empty.
+/// Returns the ids on all pages of the list, two clouds a page. Only the last page may be empty.
 async fn listed(process: &Process) -> Vec<String> {
     let (mut ids, mut cursor) = (Vec::new(), String::new());
     loop {
@@ -53,7 +52,7 @@ async fn listed(process: &Process) -> Vec<String> {
     }
 }
 
-/// Requests of one client, to any of the processes.
+/// Sends one client's requests, each to a random process.
 async fn client(processes: &[Process], id: &str, seed: u64) {
     let mut random = Random(seed);
     for _ in 0..N_REQUESTS {
@@ -72,13 +71,17 @@ async fn client(processes: &[Process], id: &str, seed: u64) {
     }
 }
 
-/// Files of clouds, without those of the clouds that are always there.
+/// Returns the files of clouds other than `always`, the clouds that are never deleted.
 fn left(folder: &Folder, always: &[String]) -> Vec<PathBuf> {
     let is_of = |file: &PathBuf, id: &String| file.to_string_lossy().contains(id.as_str());
     folder.files().into_iter().filter(|file| !always.iter().any(|id| is_of(file, id))).collect()
 }
 
-/// Whether the process says of the cloud everywhere what the store says.
+/// Checks that the process and the store agree on the cloud.
+///
+/// # Errors
+/// Returns what was found if GET, the list and the files disagree, or if a cloud of `always` is not listed
+/// exactly once.
 async fn agrees(process: &Process, id: &str, folder: &Folder, always: &[String]) -> Result<(), String> {
     let status = ask(process.url(&format!("/v1/clouds/{id}")), Method::GET, None).await.status;
     let ids = listed(process).await;
@@ -124,14 +127,15 @@ async fn two_processes_on_one_store_agree_on_a_cloud_that_both_post_and_delete()
     rounds(&[Process::start(&folder.flags()), Process::start(&folder.flags())], &folder).await;
 }
 
-/// DELETE of one cloud by many at once, round by round, through each of these addresses in turn.
+/// Deletes one cloud from many clients at once, spread over `urls`, in 20 rounds. Exactly one DELETE must
+/// succeed.
 async fn delete_at_once(urls: &[String]) {
     for round in 0..20 {
         let created = ask(urls[0].clone(), Method::POST, Some(&points(9))).await;
         assert_eq!(created.status, 201, "round {round}");
         let id = created.json().unwrap()["cloud_id"].as_str().unwrap().to_owned();
         for url in urls {
-            // All of them have it in memory.
+            // The cloud is now in memory behind every address.
             assert_eq!(ask(format!("{url}/{id}"), Method::GET, None).await.status, 200);
         }
         let deleting =

@@ -1,4 +1,4 @@
-//! Connections: who is waited for and for how long, what is refused before a handler sees it, and clients that mean harm.
+//! Connections: timeouts, limits, refusals before any handler runs, and hostile clients.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -11,21 +11,21 @@ use crate::contract::{self, Received};
 use crate::routes::route_of;
 use crate::support::{Server, fibonacci_sphere};
 
-/// Longer than anything here should take, on a machine that does much else.
+/// Timeout of a wait. Longer than anything here should take, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 async fn connect(server: &Server) -> TcpStream {
     TcpStream::connect(server.address).await.unwrap()
 }
 
-/// A connection to which this was sent.
+/// Opens a connection and sends `bytes`.
 async fn sent(server: &Server, bytes: impl AsRef<[u8]>) -> TcpStream {
     let mut stream = connect(server).await;
     stream.write_all(bytes.as_ref()).await.unwrap();
     stream
 }
 
-/// Everything until the server ends the connection, in whichever way.
+/// Reads until the server ends the connection, by close or reset.
 async fn rest_of(stream: &mut TcpStream) -> String {
     let mut received = Vec::new();
     let read = async { while stream.read_buf(&mut received).await.is_ok_and(|n| n > 0) {} };
@@ -33,7 +33,7 @@ async fn rest_of(stream: &mut TcpStream) -> String {
     String::from_utf8_lossy(&received).into_owned()
 }
 
-/// One answer of known length; the connection stays as it is.
+/// Reads one answer of known length. The connection stays open.
 async fn answer(stream: &mut TcpStream) -> Received {
     let mut received = String::new();
     let read = async {
@@ -51,7 +51,8 @@ async fn answer(stream: &mut TcpStream) -> Received {
     Received::parse(&received)
 }
 
-/// The problem in an answer, which is also the last one on its connection.
+/// Returns status and type of the problem in an answer. Checks that the answer announces the end of its
+/// connection.
 fn closing_problem(method: &str, path: &str, text: &str) -> (u16, String) {
     let answer = Received::parse(text);
     contract::check(method, path, &answer);
@@ -67,7 +68,7 @@ fn same(found: &(u16, String), expected: (u16, &str), what: &str) {
     assert_eq!((found.0, &*found.1), expected, "{what}");
 }
 
-/// 3 MB, which no socket takes without a reader.
+/// Returns a request whose answer of 3 MB exceeds every socket buffer.
 fn large_request() -> String {
     let points = fibonacci_sphere(400);
     let kernel = json!({"family": "matern", "length_scale": 0.3});
@@ -84,7 +85,7 @@ async fn answers_of_a_known_length_end_in_order() {
     let cloud =
         json!({"cloud": {"points": fibonacci_sphere(300)}, "kernel": {"family": "gauss"}, "alpha": 1e-3});
     let body = cloud.to_string();
-    // An answer of a few hundred bytes, and one that takes more than the socket's buffer at once.
+    // An answer of a few hundred bytes, and one larger than the socket's buffer.
     for (path, least) in [("/v1/normals", 1000), ("/v1/laplace-beltrami/matrix", 700_000)] {
         let head = format!(
             "POST {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n\
@@ -94,7 +95,7 @@ async fn answers_of_a_known_length_end_in_order() {
         let mut stream = sent(&server, head + &body).await;
         stream.readable().await.unwrap();
         let mut received = Vec::new();
-        // A reset would be an error, and would have thrown away what was not read yet.
+        // A reset would be an error here, and would have discarded unread bytes.
         let read = stream.read_to_end(&mut received);
         tokio::time::timeout(PATIENCE, read).await.expect("the connection stays open").unwrap();
         let head = received.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap() + 4;
@@ -120,7 +121,7 @@ async fn connections_without_a_request_are_ended() {
         assert!(!received.contains("200"), "{half:?}: {received}");
         assert!(began.elapsed() >= Duration::from_millis(390), "{half:?} was ended early");
     }
-    // The time begins anew with each answer.
+    // The idle time starts again with each answer.
     let mut stream = connect(&server).await;
     for _ in 0..4 {
         stream.write_all(LIVE.as_bytes()).await.unwrap();
@@ -151,7 +152,7 @@ async fn a_connection_of_http_2_that_only_answers_pings_is_ended() {
     let mut client = client.ready().await.unwrap();
     let request = hyper_request(server.address, "/health/live");
     assert_eq!(client.send_request(request, true).unwrap().0.await.unwrap().status(), 200);
-    // Holds on to the connection, and so asks for nothing and answers everything.
+    // `client` keeps the connection open. It sends no requests, but answers every ping.
     tokio::time::timeout(PATIENCE, connection).await.expect("it stays open").unwrap().ok();
     drop(client);
 }
@@ -171,7 +172,8 @@ fn hyper_request(address: SocketAddr, path: &str) -> axum::http::Request<()> {
 #[tokio::test]
 async fn answers_that_are_not_read_are_cut() {
     let server = Server::with_flags(&["--send-seconds", "0.5"]).await;
-    // Once, and a hundred times on one connection: the first answers fill it, the others are never begun.
+    // Once, and a hundred times on one connection: the first answers fill the socket, and the others never
+    // begin.
     for requests in [
         large_request(),
         large_request().repeat(100),
@@ -182,7 +184,7 @@ async fn answers_that_are_not_read_are_cut() {
         stream.read_exact(&mut beginning).await.unwrap();
         assert_eq!(&beginning, b"HTTP/1.1 200");
         let began = Instant::now();
-        // The reset of a connection is seen without reading from it.
+        // A reset connection is noticed without reading from it.
         while stream.take_error().unwrap().is_none() {
             assert!(began.elapsed() < PATIENCE, "it is not cut: {:.60} {}", requests, requests.len());
             tokio::time::sleep(Duration::from_millis(10)).await;
@@ -192,7 +194,7 @@ async fn answers_that_are_not_read_are_cut() {
         assert!(received.matches("HTTP/1.1 200").count() < 20);
         server.get("/health/ready").await.expect_ok();
     }
-    // Who reads gets the same answer whole, however long it takes.
+    // A client that reads receives the same answer whole, however long it takes.
     let mut stream = sent(&server, large_request().replace("Host: x", "Host: x\r\nConnection: close")).await;
     let mut received = Vec::new();
     while stream.read_buf(&mut received).await.unwrap() > 0 {
@@ -208,7 +210,7 @@ async fn idle_connections_make_room_for_newcomers() {
     for i in 0..200 {
         idle.push(sent(&server, if i % 2 == 0 { "" } else { "GET / HT" }).await);
         if i % 20 == 0 {
-            // A client that has just come, and keeps its connection.
+            // A client that has just connected, and keeps its connection.
             server.get("/health/live").await.expect_ok();
         }
     }
@@ -228,7 +230,7 @@ async fn newcomers_are_told_if_every_connection_has_a_request() {
     let mut busy = Vec::new();
     for _ in 0..3 {
         let mut stream = connect(&server).await;
-        // An answer says that the connection is served, before it has a request that does not end.
+        // The answer shows that the connection is served, before it sends a request that never ends.
         stream.write_all(LIVE.as_bytes()).await.unwrap();
         assert_eq!(answer(&mut stream).await.status, 200);
         stream.write_all(half.as_bytes()).await.unwrap();
@@ -239,7 +241,7 @@ async fn newcomers_are_told_if_every_connection_has_a_request() {
         let mut newcomer = sent(&server, LIVE).await;
         let text = rest_of(&mut newcomer).await;
         if text.is_empty() || text.starts_with("HTTP/1.1 200") {
-            // One of the three was not read yet, and had to make room.
+            // The server had not yet read from one of the three, so that one had to make room.
             assert!(began.elapsed() < PATIENCE);
             continue;
         }
@@ -287,12 +289,12 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
         ),
     ] {
         let request = format!("{method} {path} HTTP/1.1\r\n{rest}");
-        // Also behind requests that are as they should be, with bodies of every framing, at once and one by one.
+        // Also after well-formed requests with bodies of every framing, sent at once and one by one.
         let before = [
             String::new(),
             LIVE.repeat(2),
             "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\n{}".to_owned(),
-            // Chunks that are not read would end the connection.
+            // Chunks left unread would end the connection.
             format!(
                 "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n{chunks}"
             ),
@@ -305,7 +307,7 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
                     assert!([200, 415, 422].contains(&answer(&mut stream).await.status));
                 }
             }
-            // What follows must not be taken for a request.
+            // The bytes after the refused head must not be read as a request.
             stream.write_all(format!("{request}{LIVE}").as_bytes()).await.unwrap();
             let text = rest_of(&mut stream).await;
             assert_eq!(text.matches("HTTP/1.1 ").count(), 1, "{request}: {text}");
@@ -318,14 +320,14 @@ async fn heads_that_two_programs_may_read_differently_are_refused() {
         let text = rest_of(&mut sent(&server, &absolute).await).await;
         same(&closing_problem("GET", "/health/live", &text), MALFORMED, &absolute);
     }
-    // In HTTP/2 the target names the host, and a fault ends its stream alone.
+    // In HTTP/2 the target names the host, and a malformed request ends only its own stream.
     let (client, connection) = http_2(server.address).await;
     let mut client = client.ready().await.unwrap();
     let request = axum::http::Request::get(format!("http://me:pw@{}/health/live", server.address));
     let refused = client.send_request(request.body(()).unwrap(), true).unwrap().0.await.unwrap();
     assert_eq!(refused.status(), 400);
     connection.abort();
-    // HTTP/1.0 knows no Host.
+    // HTTP/1.0 has no Host header.
     let text = rest_of(&mut sent(&server, "GET /health/live HTTP/1.0\r\n\r\n").await).await;
     assert!(text.contains(" 200 "), "{text}");
 }
@@ -373,7 +375,7 @@ async fn an_answer_that_comes_before_the_request_has_ended_arrives() {
         "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {n_bytes}\r\n\r\n"
     );
     let mut stream = sent(&server, head).await;
-    // This client reads only once it has sent everything.
+    // This client reads only after it has sent everything.
     let chunk = vec![b' '; 1 << 16];
     for _ in 0..n_bytes / chunk.len() {
         stream.write_all(&chunk).await.expect("the connection was reset before the answer could be read");
@@ -390,16 +392,17 @@ async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
             let head = format!(
                 "POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n{expectation}Content-Length: 1000000000\r\n\r\n"
             );
-            // Nothing follows for now, and this client waits for the answer.
+            // The body does not follow: this client waits for the answer first.
             let mut stream = sent(&server, head).await;
             let refused = answer(&mut stream).await;
             assert_eq!(refused.status, 413, "{path}");
-            // A client that keeps its connections would send the next request into one that ends.
+            // Without this header, a client that reuses connections would send its next request into one that
+            // is ending.
             assert_eq!(refused.headers["connection"], "close");
             contract::check("POST", path, &refused);
         }
     }
-    // One that reads only once it has sent everything, slowly, is heard out.
+    // A client that slowly sends everything before it reads still receives its answer.
     let (n_bytes, chunk) = (4 << 20, vec![b' '; 1 << 16]);
     let head = format!(
         "POST /v1/clouds HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {n_bytes}\r\n\r\n"
@@ -416,7 +419,7 @@ async fn a_body_that_is_announced_as_too_large_is_refused_before_it_is_read() {
 #[tokio::test]
 async fn an_answer_before_its_body_is_read_ends_the_connection_only_if_it_says_so() {
     let server = Server::start().await;
-    // None has a media type, so that the head is enough to refuse it.
+    // No request has a media type, so the head is enough to refuse it.
     let head = "POST /v1/clouds HTTP/1.1\r\nHost: x\r\n";
     let spaces = " ".repeat(3000);
     let known = format!("{head}Content-Length: 3000\r\n\r\n");
@@ -444,7 +447,7 @@ async fn an_answer_before_its_body_is_read_ends_the_connection_only_if_it_says_s
     }
 }
 
-/// A request with the end of what its client sends right behind it.
+/// Sends a request and closes the sending side right after it.
 async fn half_closed(server: &Server, request: &str) -> TcpStream {
     let mut stream = sent(server, request).await;
     stream.shutdown().await.unwrap();
@@ -467,16 +470,16 @@ async fn a_client_that_only_sends_no_more_gets_its_answers() {
             assert_eq!(text.matches("HTTP/1.1 200 OK\r\n").count(), n_answers, "{request}: {text}");
         }
     }
-    // An answer of megabytes goes on for as long as it is taken.
+    // An answer of megabytes is sent for as long as the client keeps reading.
     let text = rest_of(&mut half_closed(&server, &large_request()).await).await;
     assert!(text.starts_with("HTTP/1.1 200 ") && text.len() > 1 << 20, "{} bytes", text.len());
-    // Half a body is none.
+    // Half a body is not a request.
     let half = &normals[..normals.len() - 10];
     let text = rest_of(&mut half_closed(&server, half).await).await;
     assert!(!text.contains(" 200 "), "{text}");
 }
 
-/// The end of what a client sends may be its end: work for nobody is not gone on with.
+/// Half-closing may mean that the client has left, so long computations stop.
 #[tokio::test]
 async fn long_work_ends_with_a_client_that_may_have_left() {
     let server = Server::start().await;
@@ -520,7 +523,8 @@ async fn a_client_that_opens_and_resets_streams_is_shown_out() {
             Err(_) => break,
         }
     }
-    // Shown out or served: others are served at once, and nothing is left of it.
+    // Whether the client is disconnected or served, other clients are served at once and nothing is left
+    // behind.
     server.get("/health/live").await.expect_ok();
     connection.abort();
     server.get("/health/ready").await.expect_ok();
@@ -531,7 +535,7 @@ async fn a_flood_of_pings_keeps_nobody_from_being_served() {
     let server = Server::with_flags(&["--send-seconds", "0.5"]).await;
     let mut stream = sent(&server, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0").await;
     let pings = [0, 0, 8, 6, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8].repeat(1000);
-    // Nothing that comes back is read, until the server has had enough.
+    // Reads nothing that comes back, until the server closes the connection.
     let flood = async { while stream.write_all(&pings).await.is_ok() {} };
     let others = async {
         let began = Instant::now();
@@ -555,7 +559,7 @@ async fn browsers_are_told_what_pages_may_do() {
             assert!(policy.contains(part), "{path}: {policy}");
         }
         assert_eq!((page.header("x-frame-options"), page.header("referrer-policy")), ("DENY", "no-referrer"));
-        // The policy lets no script run that is written into the page.
+        // The policy forbids inline scripts.
         for script in page.text.split("<script").skip(1) {
             let (attributes, rest) = script.split_once('>').unwrap();
             assert!(

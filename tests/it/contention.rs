@@ -1,4 +1,4 @@
-//! Equal requests at the same moment: what many want is made once, and nobody waits for ever.
+//! Contention: equal requests at the same moment are computed once, and none waits for ever.
 
 use std::time::Duration;
 
@@ -8,27 +8,28 @@ use serde_json::{Value, json};
 use crate::routes::ROUTES;
 use crate::support::Server;
 
-/// Requests at once.
+/// Concurrent requests in a round.
 const N_CLIENTS: usize = 8;
 
-/// Clouds that no request has named before, one after the other, on every route.
+/// Rounds on each route, each with a new cloud.
 const N_ROUNDS: usize = 200;
 
-/// Points of a cloud: enough for the sums over them to be split between threads.
+/// Points of a cloud, enough for sums over them to be split between threads.
 const N_POINTS: usize = 100;
 
-/// All the requests of one route, some of whose rounds take milliseconds: that long on any machine only if they hang.
+/// Timeout of all rounds of one route. Some rounds take milliseconds, so that only a hang takes this long.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// A sphere that differs from round to round.
+/// Returns a sphere that differs for every route and round.
 fn cloud(route: usize, round: usize) -> Value {
     let mut points = crate::support::fibonacci_sphere(N_POINTS);
     points[0][0] += 1e-6 * (1 + round + N_ROUNDS * route) as f64;
     json!(points)
 }
 
-/// Eight requests at once of each round, without parameters, so that the service looks at the cloud to choose them. They
-/// arrive while the first of them is being planned, which takes several jobs of the pool.
+/// Sends [`N_CLIENTS`] equal requests at once in each round, on every route. They carry no parameters, so the
+/// service analyses the cloud to choose them. That planning takes several jobs of the pool, and the other
+/// requests arrive during it.
 async fn rounds(n_threads: usize) {
     let server = Server::with_flags(&["--threads", &n_threads.to_string()]).await;
     for (index, route) in ROUTES.iter().enumerate() {

@@ -1,10 +1,15 @@
-//! The document as a contract: every answer that a test receives is checked against it.
+//! The OpenAPI document as a contract: every answer that a test receives is checked against it.
 //!
-//! `support::receive` calls [`check`] for every request of a `Server`, so no test can forget it. An answer is right if the document has its
-//! path, method and status; if its media type is declared and its body is of the declared form, with no member that the
-//! document does not name; if the headers are there that must be, and no others. Two kinds of answers have no operation of
-//! their own: what is served beside the interface ([`BESIDE`]), and refusals of paths and methods that it does not have, which
-//! are problems.
+//! `support::receive` calls [`check`] for every request of a `Server`, so no test can forget it. An answer is
+//! right under three conditions:
+//!
+//! - The document has its path, method and status.
+//! - Its media type is declared, and its body has the declared form, with no member that the document does
+//!   not name.
+//! - All required headers are present, and no undeclared ones.
+//!
+//! Two kinds of answers have no operation: pages outside the interface ([`BESIDE`]), and refusals of unknown
+//! paths and methods, which are problems.
 
 mod answer;
 mod closed;
@@ -19,11 +24,11 @@ use serde_json::{Value, json};
 pub use answer::{Received, decompressed};
 use document::{Contract, Operation, Response, Served};
 
-/// Paths beside the interface, and all below them: pages for people, and the documents themselves.
+/// Paths outside the interface, with everything below them: pages for people, and the documents themselves.
 const BESIDE: [&str; 3] = ["/docs", "/openapi.json", "/openapi-3.0.json"];
 
-/// Headers that HTTP, its compression, CORS and what browsers obey bring along with any answer. All others belong to the interface.
-/// Refusals repeat the cloud that a request named to proxies.
+/// Headers that any answer may have: those of HTTP, compression, CORS and browser policies. All others must
+/// be declared. `gramian-cloud` is here because refusals repeat, for proxies, the cloud that a request named.
 const OF_HTTP: [&str; 13] = [
     "cache-control",
     "gramian-cloud",
@@ -40,7 +45,7 @@ const OF_HTTP: [&str; 13] = [
     "referrer-policy",
 ];
 
-/// Panics if the document does not promise this answer.
+/// Panics if the document does not allow this answer.
 pub fn check(method: &str, path: &str, answer: &Received) {
     static CONTRACT: LazyLock<Contract> = LazyLock::new(|| {
         let document = crate::support::document();
@@ -57,7 +62,7 @@ pub fn check(method: &str, path: &str, answer: &Received) {
 }
 
 impl Contract {
-    /// What the document does not promise of an answer; empty if all is well.
+    /// Returns every deviation of an answer from the document. Empty if there is none.
     pub fn mismatches(&self, method: &str, path: &str, answer: &Received) -> Vec<String> {
         let mut found = match self.find(method, path) {
             Served::By(operation) => of_operation(operation, method, answer),
@@ -74,7 +79,7 @@ impl Contract {
         found
     }
 
-    /// A problem has the same form wherever it comes from, and a type with its status.
+    /// Checks a problem: one form for all of them, and the status that belongs to its type.
     fn of_problem(&self, method: &str, answer: &Received) -> Vec<String> {
         if method == "HEAD" {
             return no_body(answer);
@@ -118,7 +123,7 @@ fn of_operation(operation: &Operation, method: &str, answer: &Received) -> Vec<S
     found
 }
 
-/// A problem is one of those that the operation declares for its status.
+/// Checks that the operation declares the type of a problem for its status.
 fn of_problem_type(response: &Response, answer: &Received) -> Option<String> {
     let problem = answer.json()?;
     let kind = problem["type"].as_str().unwrap_or_default();
@@ -126,7 +131,8 @@ fn of_problem_type(response: &Response, answer: &Received) -> Option<String> {
     (!is_declared).then(|| format!("the type {kind} is not declared for {}", answer.status))
 }
 
-/// A method that the path does not have: the preflight of a browser where origins are configured, else 405 with those it has.
+/// Checks the answer to an undeclared method: a CORS preflight where origins are configured, else 405 with
+/// `Allow`.
 fn of_undeclared_method(allowed: &[String], method: &str, answer: &Received) -> Vec<String> {
     if method == "OPTIONS" && !answer.header("access-control-allow-methods").is_empty() {
         return no_body(answer);
@@ -155,7 +161,7 @@ fn of_headers(response: &Response, answer: &Received) -> Vec<String> {
             None => {}
             Some(value) => {
                 let value = value.to_str().unwrap();
-                // Values are text; those that are declared as numbers, such as Retry-After, are read as such.
+                // Values are text. Those declared as numbers, such as Retry-After, are parsed as numbers.
                 let text = json!(value);
                 let number = serde_json::from_str(value).ok().filter(Value::is_number);
                 let value = number.filter(|_| !header.schema.is_valid(&text)).unwrap_or(text);
@@ -198,7 +204,8 @@ fn no_body(answer: &Received) -> Vec<String> {
     if answer.bytes.is_empty() { vec![] } else { vec!["a body, and none is declared".to_owned()] }
 }
 
-/// What a schema finds in a value, by JSON pointer; the first few, as one mistake may be in every entry of an array.
+/// Returns the violations of a schema, by JSON pointer. At most five, since one mistake may repeat in every
+/// entry of an array.
 fn violations(name: &str, schema: &jsonschema::Validator, value: &Value) -> Vec<String> {
     let errors = schema.iter_errors(value).take(5);
     errors.map(|error| format!("{name}{}: {:.500}", error.instance_path(), error.to_string())).collect()

@@ -1,7 +1,11 @@
-//! Pages say what the service does: the examples of docs/api.md are the document's and its tables are complete, the settings of
-//! docs/operations.md are those of the process, links lead somewhere, and the README is short.
+//! Tests of the documentation:
 //!
-//! A block of JSON is preceded by a comment that names a file, a pointer into it, and members that are left out:
+//! - The examples of docs/api.md are those of the OpenAPI document, and its tables are complete.
+//! - The settings in docs/operations.md are those of the process.
+//! - Links lead somewhere.
+//! - The README is short.
+//!
+//! A comment before each JSON block names a file, a pointer into it, and members left out:
 //! `<!-- openapi/examples/compute_normals.json /response without diagnostics -->`.
 
 use std::path::{Path, PathBuf};
@@ -14,7 +18,7 @@ use serde_json::Value;
 use crate::support::overwrites;
 
 const PAGE: &str = "docs/api.md";
-/// Columns that a line of an example may have.
+/// Maximum columns in a line of an example.
 const WIDTH: usize = 125;
 
 fn at_root(path: &str) -> PathBuf {
@@ -25,11 +29,11 @@ fn page() -> String {
     std::fs::read_to_string(at_root(PAGE)).unwrap()
 }
 
-/// A block of JSON, by the numbers of its first line and of the fence behind it.
+/// A block of JSON, by the indices of its first line and of its closing fence.
 struct Block {
     begin: usize,
     end: usize,
-    /// What the line before its fence says it shows.
+    /// The value that the block must show, according to the comment before it.
     expected: Value,
 }
 
@@ -42,7 +46,7 @@ fn blocks(lines: &[&str]) -> Vec<Block> {
     fences.map(block).collect()
 }
 
-/// What a comment refers to.
+/// Returns the value to which the comment before a block refers.
 fn marked(line: &str, number: usize) -> Value {
     let marker = line.strip_prefix("<!-- ").and_then(|rest| rest.strip_suffix(" -->"));
     let marker =
@@ -91,7 +95,8 @@ fn rewritten(lines: &[&str], blocks: &[Block]) -> String {
     text + &lines[done..].join("\n") + "\n"
 }
 
-/// JSON with each value on one line if it fits, else with its entries below. `column` is where it begins.
+/// Formats JSON with each value on one line if it fits, else with one entry a line. `column` is where the
+/// value begins.
 fn laid_out(value: &Value, indent: usize, column: usize) -> String {
     let flat = on_one_line(value);
     if column + flat.chars().count() < WIDTH {
@@ -113,7 +118,7 @@ fn laid_out(value: &Value, indent: usize, column: usize) -> String {
     format!("{open}\n{inner}{}\n{outer}{close}", lines.join(&format!(",\n{inner}")))
 }
 
-/// The items of an array, as many on a line as fit.
+/// Formats the items of an array, with as many on a line as fit.
 fn filled(items: &[Value], indent: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for item in items.iter().map(|item| laid_out(item, indent, indent)) {
@@ -188,7 +193,7 @@ fn every_setting_is_in_the_table() {
     });
     let expected: Vec<_> = settings
         .zip(&listed)
-        // What has no default says in words what holds without it.
+        // Settings without a default describe their behaviour in words.
         .map(|((variable, flag, default), (.., words))| {
             (variable, flag, default.unwrap_or_else(|| words.clone()))
         })
@@ -227,7 +232,7 @@ fn markdown_in(folder: &str) -> Vec<PathBuf> {
     entries.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()
 }
 
-/// A page without its blocks of code and its comments.
+/// Returns a page without its code blocks and comments.
 fn prose(page: &Path) -> String {
     let text = std::fs::read_to_string(page).unwrap();
     let mut is_code = false;
@@ -239,7 +244,7 @@ fn prose(page: &Path) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// What a link may name behind `#`: headings in lower case, without punctuation, with hyphens for spaces.
+/// Returns the anchors of a page: its headings in lower case, without punctuation, with hyphens for spaces.
 fn anchors(prose: &str) -> impl Iterator<Item = String> {
     let headings =
         prose.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());

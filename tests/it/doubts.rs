@@ -1,4 +1,4 @@
-//! Operators on values that do not bear out what is found, over the wire.
+//! Warnings about uncertain results: operators on values that do not support what is computed from them.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use crate::support::{Server, fibonacci_sphere, numbers};
 
 const N: usize = 300;
 
-/// x₃ with noise on the unit sphere about an offset: Laplace–Beltrami of it is −2 x₃.
+/// Returns a request with x₃ + offset on the unit sphere, plus noise. Its Laplace–Beltrami is −2 x₃.
 fn request(kernel: Value, noise: f64, offset: f64) -> Value {
     let (points, mut random) = (fibonacci_sphere(N), Random(5));
     let values: Vec<f64> = points.iter().map(|x| offset + x[2] + noise * random.normal()).collect();
@@ -24,7 +24,7 @@ fn uncertain(answer: &Value) -> Vec<usize> {
     of_values.map(|entry| entry["query"].as_u64().unwrap() as usize).collect()
 }
 
-/// Queries without a flag, and those of them that are off by half of the root mean square.
+/// Counts the queries without a flag, and those among them with an error above half of the root mean square.
 fn unflagged_and_off(answer: &Value) -> (usize, usize) {
     let mut is_flagged = [false; N];
     for entry in answer["degenerate"].as_array().unwrap() {
@@ -55,7 +55,7 @@ async fn noise_that_nobody_told_and_offsets_are_seen_whatever_the_kernel() {
             let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();
             let (n_unflagged, n_off) = unflagged_and_off(&answer);
             assert!(n_off * 50 <= n_unflagged, "{kernel}, {noise}, {offset}: {n_off} of {n_unflagged}");
-            // What is exact and about 0 is served without a doubt by all that resolve it.
+            // Exact values without offset are mostly served unflagged, by every kernel that resolves them.
             let resolves = kernel["length_scale"] != 0.05;
             assert!(noise + offset > 0.0 || !resolves || n_unflagged > N / 2, "{kernel}: {n_unflagged}");
             if noise > 0.0 && !kernel.is_null() {
@@ -72,7 +72,7 @@ async fn what_is_asked_for_its_deviations_is_judged_by_the_values_as_well() {
         let mut body = request(json!({"family": "gauss"}), 0.2, 0.0);
         let plain = server.post(path, &body).await.expect_ok();
         assert!(uncertain(&plain).len() > N / 2, "{path}");
-        // That kernel takes values as exact, so that its own deviations see nothing.
+        // This kernel takes the values as exact, so its own deviations notice nothing.
         body["include"] = json!(["deviations"]);
         let answer = server.post(path, &body).await.expect_ok();
         assert!(uncertain(&answer).len() >= uncertain(&plain).len(), "{path}");
@@ -92,7 +92,7 @@ async fn a_process_without_second_derivatives_has_no_sure_laplacian() {
     }
 }
 
-/// Nothing is refused for a doubt.
+/// Checks that uncertainty never leads to a refusal.
 #[tokio::test]
 async fn values_that_say_nothing_are_answered() {
     let server = Server::start().await;
@@ -104,7 +104,7 @@ async fn values_that_say_nothing_are_answered() {
             server.post(path, &body).await.expect_ok();
         }
     }
-    // Fewer values than decide anything, one query where the truth is 0, and one far from all points.
+    // Too few values to decide anything, one query where the truth is 0, and one far from all points.
     let mut body = request(kernel, 0.0, 0.0);
     body["queries"] = json!([[1.0, 0.0, 0.0]]);
     let answer = server.post("/v1/laplace-beltrami", &body).await.expect_ok();

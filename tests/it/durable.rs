@@ -1,4 +1,4 @@
-//! Clouds that outlive the process.
+//! Clouds and factors that survive the process, in a store on disk.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::common::random::Random;
 use crate::process::Process;
 use crate::support::{fibonacci_sphere, receive};
 
-/// A folder that goes with the test.
+/// A temporary folder, removed at the end of the test.
 pub struct Folder(PathBuf);
 
 impl Folder {
@@ -28,7 +28,7 @@ impl Folder {
         ["--store", self.0.to_str().unwrap()]
     }
 
-    /// Files below, by the last part of their names.
+    /// Returns all files in the folder and its subfolders.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();
         let mut folders = vec![self.0.clone()];
@@ -81,7 +81,7 @@ async fn clouds_are_there_after_the_process_was_killed() {
     let (status, first) =
         post(&process, "/v1/clouds", &json!({"points": points(0.0, 50), "normals": points(0.0, 50)})).await;
     assert_eq!(status, 201);
-    // Points in a request are registered as well.
+    // Points inside a request are registered as well.
     let values: Vec<f64> = (0..40).map(f64::from).collect();
     let body = json!({"cloud": {"points": points(1.0, 40)}, "values": values, "kernel": {"family": "gauss"}});
     let (status, answer) = post(&process, "/v1/interpolation", &body).await;
@@ -101,7 +101,7 @@ async fn clouds_are_there_after_the_process_was_killed() {
     let by_id = json!({"cloud": {"id": inline}, "values": values, "kernel": {"family": "gauss"}});
     let (status, other) = post(&process, "/v1/interpolation", &by_id).await;
     assert_eq!((status, &other["values"]), (200, &answer["values"]));
-    // The same points are known, by whoever and whenever they come.
+    // Points that are already stored are recognised.
     let (status, known) = post(&process, "/v1/clouds", &json!({"points": points(1.0, 40)})).await;
     assert_eq!((status, &known["cloud_id"]), (200, &json!(inline)));
     let deleted = receive(reqwest::Client::new().delete(process.url(&format!("/v1/clouds/{id}")))).await;
@@ -120,7 +120,7 @@ async fn no_moment_to_be_killed_at_loses_what_was_acknowledged() {
     let mut acknowledged: Vec<(String, Value)> = Vec::new();
     for moment in 0..100 {
         let process = Process::start(&folder.flags());
-        // One of the earlier ones, whole and right.
+        // An earlier cloud must be complete and correct.
         if let Some((id, points)) = acknowledged.get((random.uniform() * acknowledged.len() as f64) as usize)
         {
             let n = points.as_array().unwrap().len();
@@ -168,14 +168,14 @@ async fn no_moment_to_be_killed_at_loses_what_was_acknowledged() {
     }
 }
 
-/// A request whose factor is worth keeping.
+/// Returns a request whose factor is large enough to be stored.
 fn large_fit() -> Value {
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     let values: Vec<f64> = (0..4000).map(|i| f64::from(i).sin()).collect();
     json!({"cloud": {"points": points(0.0, 4000)}, "values": values, "kernel": kernel, "alpha": 1e-6})
 }
 
-/// How many solvers of a kind a process has made ready, and how many objects it found damaged.
+/// Returns how many solvers of a kind a process has prepared, and how many damaged objects it found.
 async fn counts(process: &Process, kind: &str) -> (String, String) {
     let metrics = receive(reqwest::Client::new().get(process.url("/metrics"))).await;
     let text = String::from_utf8(metrics.bytes).unwrap();
@@ -192,7 +192,7 @@ async fn a_factor_is_read_instead_of_made_again() {
     let folder = Folder::new("factors");
     let factors = || {
         let is_factor = |path: &PathBuf| path.to_str().unwrap().contains("/factors/");
-        // What is being written has another name.
+        // Unfinished files have a different name.
         let is_whole = |path: &PathBuf| !path.to_str().unwrap().contains('#');
         folder.files().into_iter().filter(|path| is_factor(path) && is_whole(path)).collect::<Vec<_>>()
     };
@@ -215,7 +215,7 @@ async fn a_factor_is_read_instead_of_made_again() {
     assert_eq!(counts(&process, "restored").await, ("1".to_owned(), "0".to_owned()));
     kill(process);
 
-    // A byte of it is another one: it is made again, written again, and told.
+    // After one flipped byte, the factor is computed again, stored again, and the damage is counted.
     let path = factors().pop().unwrap();
     let mut bytes = fs::read(&path).unwrap();
     let middle = bytes.len() / 2;
@@ -247,7 +247,7 @@ async fn what_is_damaged_is_not_served() {
     let process = Process::start(&folder.flags());
     let (status, problem) = get(&process, &format!("/v1/clouds/{id}")).await;
     assert_eq!((status, &problem["type"]), (404, &json!("/problems/unknown-cloud")));
-    // It can be posted again.
+    // The cloud can be posted again.
     assert_eq!(post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.0, 201);
     assert_eq!(get(&process, &format!("/v1/clouds/{id}")).await.0, 200);
     process.terminate();
@@ -259,7 +259,7 @@ async fn what_is_damaged_is_not_served() {
 async fn a_store_that_takes_nothing_leaves_memory_and_catches_up() {
     let folder = Folder::new("full");
     let process = Process::start(&[&folder.flags()[..], &["--store-required", "true"]].concat());
-    // A file where a folder should be takes no file, whoever asks.
+    // A file in the place of the folder makes every write fail, whichever user runs the tests.
     let owner = folder.0.join("everyone");
     fs::write(&owner, b"").unwrap();
     let (status, cloud) = post(&process, "/v1/clouds", &json!({"points": points(0.0, 30)})).await;
@@ -276,7 +276,8 @@ async fn a_store_that_takes_nothing_leaves_memory_and_catches_up() {
     assert_eq!(get(&process, &path).await.0, 200);
 }
 
-/// Memory has room for some of the clouds that the store does not take: those are acknowledged, and the others refused.
+/// Checks that memory keeps clouds that the store does not take. Those acknowledged must survive, and the
+/// rest is refused.
 #[tokio::test]
 async fn what_was_acknowledged_while_the_store_takes_nothing_makes_no_room_for_others() {
     let folder = Folder::new("acknowledged");
@@ -316,7 +317,7 @@ async fn catching_up_brings_nothing_back_that_was_deleted() {
     let path_of = |cloud: Value| format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap());
     let deleted = path_of(post(&one, "/v1/clouds", &json!({"points": points(0.0, 30)})).await.1);
     assert_eq!(receive(reqwest::Client::new().delete(two.url(&deleted))).await.status, 204);
-    // The first one has it in memory, and a cloud that the store does not take.
+    // The first process has it in memory, and another cloud that the store does not take.
     fs::remove_dir_all(folder.0.join("everyone")).ok();
     fs::write(folder.0.join("everyone"), b"").unwrap();
     let late = path_of(post(&one, "/v1/clouds", &json!({"points": points(1.0, 30)})).await.1);
@@ -335,7 +336,7 @@ async fn a_damaged_cloud_is_whole_again_once_it_is_posted_again() {
     let (_, cloud) = post(&process, "/v1/clouds", &body).await;
     let id = cloud["cloud_id"].as_str().unwrap();
     kill(process);
-    // A byte of its points, which no list looks at.
+    // Damages a byte of the points, which no listing reads.
     let object = folder.object(id);
     let mut bytes = fs::read(&object).unwrap();
     let last = bytes.len() - 40;
@@ -363,7 +364,7 @@ async fn what_another_process_deletes_is_gone_and_can_be_posted_again() {
     assert_eq!(get(&two, &path).await, (200, cloud));
     let deleted = receive(reqwest::Client::new().delete(two.url(&path))).await;
     assert_eq!((deleted.status, get(&two, &path).await.0), (204, 404));
-    // The first one has it in memory; its list is that of the store, and an acknowledgement is kept.
+    // The first process still has it in memory. But its list is the store's, and a new acknowledgement holds.
     assert_eq!(get(&one, "/v1/clouds").await.1["clouds"], json!([]));
     let (status, again) = post(&one, "/v1/clouds", &body).await;
     assert_eq!((status, get(&two, &path).await), (201, (200, again)));
@@ -397,7 +398,7 @@ async fn a_store_that_is_full_lets_the_oldest_go() {
     }
     let left = listed().await;
     assert!(left.len() >= 5 && ids.ends_with(&left), "{} are left", left.len());
-    // Also from memory.
+    // Also gone from memory.
     assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[0])).await.0, 404);
     assert_eq!(get(&process, &format!("/v1/clouds/{}", ids[19])).await.0, 200);
 }
@@ -405,7 +406,7 @@ async fn a_store_that_is_full_lets_the_oldest_go() {
 #[tokio::test]
 async fn what_could_not_be_read_again_is_not_kept() {
     let folder = Folder::new("unreadable");
-    // A digit in two bytes becomes a number of eight.
+    // A digit of two bytes in JSON becomes a number of eight bytes.
     let digits = |n: usize| {
         let point = |i: usize| (0..16).map(|k| (i >> (2 * k)) % 4).collect::<Vec<_>>();
         json!({"points": (0..n).map(point).collect::<Vec<_>>()})
@@ -421,7 +422,8 @@ async fn what_could_not_be_read_again_is_not_kept() {
     let process = Process::start(&small);
     assert_eq!(get(&process, &format!("/v1/clouds/{}", cloud["cloud_id"].as_str().unwrap())).await.0, 200);
     kill(process);
-    // Where there was more memory before, asking again does not help, and nothing asks again.
+    // A cloud stored with more memory cannot be read with less. Asking again does not help, and the service
+    // does not retry.
     let process = Process::start(&[&folder.flags()[..], &["--memory-bytes", "1073741824"]].concat());
     let (status, cloud) = post(&process, "/v1/clouds", &digits(100_000)).await;
     assert_eq!(status, 201);
@@ -438,7 +440,8 @@ async fn what_could_not_be_read_again_is_not_kept() {
     assert_eq!(status, 500, "{problem}");
 }
 
-/// Copies of one cloud under other names: their heads are whole, and nothing else is looked at before they are asked for.
+/// Stores hard links to one cloud under other names. Their heads are intact, and nothing else is read before
+/// a request needs it.
 #[tokio::test]
 async fn ten_thousand_clouds_are_no_reason_to_be_late() {
     let folder = Folder::new("many");
@@ -451,7 +454,7 @@ async fn ten_thousand_clouds_are_no_reason_to_be_late() {
         let other = blake3::hash(&u64::to_le_bytes(k)).to_hex();
         fs::hard_link(&object, object.with_file_name(other.as_str())).unwrap();
     }
-    // To its first line of the log, and to its first answer.
+    // Time from the start to the first answer, which includes the first line of the log.
     let began = std::time::Instant::now();
     let process = Process::start(&folder.flags());
     assert_eq!(get(&process, "/health/ready").await.0, 200);
@@ -461,7 +464,7 @@ async fn ten_thousand_clouds_are_no_reason_to_be_late() {
     let bare = Process::start(&[]);
     assert_eq!(get(&bare, "/health/ready").await.0, 200);
     println!("with none after {:.3} s", began.elapsed().as_secs_f64());
-    // A second, as is asked, and a wide margin for a machine that is busy with other tests.
+    // The requirement is a second. The margin is wide, for a machine that is busy with other tests.
     assert!(took < 4 * began.elapsed().max(std::time::Duration::from_millis(250)), "{took:?}");
     let (_, page) = get(&process, "/v1/clouds?limit=1000").await;
     assert_eq!(page["clouds"].as_array().unwrap().len(), 1000);

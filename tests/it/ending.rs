@@ -1,4 +1,4 @@
-//! Readiness, and how the process ends.
+//! Readiness and shutdown of the process.
 
 use std::io::{Read, Write};
 use std::process::Command;
@@ -31,7 +31,7 @@ async fn the_probe_of_the_container_says_whether_the_server_is_ready() {
     let address = process.address().to_owned();
     process.terminate();
     assert_eq!(process.finish().0.code(), Some(0));
-    // Nothing listens any more.
+    // Nothing listens any longer.
     let health = gramian().args(["--bind", &address, "health"]).output().unwrap();
     assert!(health.status.code().is_some_and(|code| code != 0));
     assert!(!health.stderr.is_empty());
@@ -41,7 +41,7 @@ async fn the_probe_of_the_container_says_whether_the_server_is_ready() {
 async fn a_request_under_way_is_finished_before_the_process_ends() {
     let process = Process::start(&[]);
     let slow = spawn_post(&process, "/v1/curvatures", &curvatures(5000));
-    // It is under way once its cloud is registered.
+    // The request is under way once its cloud is registered.
     while get(&process, "/v1/clouds").await.1["clouds"][0].is_null() {}
     process.terminate();
     let (status, answer) = slow.await.unwrap();
@@ -62,7 +62,7 @@ async fn a_client_that_never_finishes_its_request_does_not_hold_the_process() {
         let mut process = Process::start(&["--deadline-seconds", "1"]);
         let mut connection = std::net::TcpStream::connect(process.address()).unwrap();
         connection.write_all(stalled.as_bytes()).unwrap();
-        // Connections are accepted in order: the stalled one is there once this one is answered.
+        // Connections are accepted in order: the stalled one has been accepted once this request is answered.
         assert_eq!(get(&process, "/health/live").await.0, 200);
         process.terminate();
         let began = Instant::now();
@@ -74,7 +74,7 @@ async fn a_client_that_never_finishes_its_request_does_not_hold_the_process() {
     }
 }
 
-/// Asks for an answer of some 10 MB, and reads its beginning.
+/// Requests an answer of some 10 MB, and reads its beginning.
 fn begin_large_answer(process: &Process) -> std::net::TcpStream {
     let mut body = curvatures(700);
     body.as_object_mut().unwrap().remove("queries");
@@ -114,7 +114,7 @@ async fn readers_are_waited_for_and_then_cut_without_an_end() {
 #[tokio::test]
 async fn what_has_not_been_read_is_refused_while_the_server_drains() {
     let process = Process::start(&["--drain-seconds", "60"]);
-    // It keeps the process alive.
+    // The unread answer keeps the process alive.
     let reader = begin_large_answer(&process);
     let head = "POST /v1/normals HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n";
     let mut uploads = [head.to_owned(), format!("{head}{{")].map(|text| {
@@ -134,7 +134,7 @@ async fn what_has_not_been_read_is_refused_while_the_server_drains() {
         assert_eq!((answer.status, answer.header("connection")), (503, "close"), "{text}");
         assert_eq!(answer.json().unwrap()["type"], "/problems/overloaded");
     }
-    // Idle connections are ended, and nobody is accepted.
+    // Idle connections are closed, and no new ones are accepted.
     kept.read_to_end(&mut Vec::new()).unwrap();
     assert!(std::net::TcpStream::connect(process.address()).is_err());
     drop(reader);

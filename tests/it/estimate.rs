@@ -1,4 +1,4 @@
-//! What a request would take, before it is sent.
+//! Estimates: the cost of a request before it is sent.
 
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ async fn estimate(server: &Server, operation: &str, request: &Value) -> Answer {
     server.post("/v1/estimate", &body).await
 }
 
-/// Operations with a body that compute, by name, with their paths.
+/// Returns id and path of each operation that computes from a body.
 fn operations() -> Vec<(String, String)> {
     let document = document();
     let named = |(path, item): (&String, &Value)| {
@@ -26,7 +26,7 @@ fn operations() -> Vec<(String, String)> {
     document["paths"].as_object().unwrap().iter().filter_map(named).collect()
 }
 
-/// A request of an operation over a sphere of n points, which is another cloud for every `shift`.
+/// Returns a request of an operation over a sphere of `n` points. Each `shift` gives a different cloud.
 fn request(path: &str, n: usize, shift: f64) -> Value {
     let points: Vec<_> = fibonacci_sphere(n).iter().map(|x| [x[0] + shift, x[1], x[2]]).collect();
     let queries = points[..n / 4].to_vec();
@@ -74,7 +74,7 @@ async fn an_estimate_says_what_is_missing_and_makes_none_of_it() {
         assert_eq!(answer.json()["diagnostics"]["solver"], before["solver"], "{id}");
         let after = estimate(&server, id, &request).await.expect_ok();
         assert_eq!(after["cached"], true, "{id}: {after}");
-        // Searches make what they look at themselves, whatever is there.
+        // Model selection computes everything itself, whatever the caches hold.
         let is_found = path.ends_with("model-selection");
         let smaller = |name: &str| after[name].as_f64().unwrap() < before[name].as_f64().unwrap();
         assert!(is_found || smaller("flops") && smaller("bytes"), "{id}: {before} {after}");
@@ -111,7 +111,7 @@ async fn what_would_be_refused_is_refused_with_the_same_problem() {
     }
     let problem = server.post("/v1/estimate", &good).await.expect_problem(422, "invalid-request");
     assert_eq!(problem["errors"][0]["pointer"], "/operation");
-    // What is estimated is a request of that operation and no other.
+    // The request is checked as one of the named operation.
     estimate(&server, "compute_interpolation", &good).await.expect_problem(422, "invalid-request");
     estimate(&server, "compute_normals", &json!({"cloud": {"id": "0".repeat(64)}}))
         .await
@@ -124,19 +124,19 @@ async fn what_takes_too_long_is_told_and_not_begun() {
     let request = request("/v1/normals", 6000, 0.0);
     let estimated = estimate(&server, "compute_normals", &request).await.expect_ok();
     assert_eq!(estimated["admissible"], false, "{estimated}");
-    // 6000³/3 flops at 20 Gflop/s, before anything ran.
+    // 6000³/3 flops at 20 Gflop/s, before any measurement.
     assert!(estimated["seconds"].as_f64().unwrap() > 3.0, "{estimated}");
     let problem = server.post("/v1/normals", &request).await.expect_problem(504, "deadline-exceeded");
     assert!(problem["detail"].as_str().unwrap().contains("nothing was computed"), "{problem}");
 }
 
-/// Dimensions in which prices are held against times.
+/// Dimensions in which estimated times are compared with measured ones.
 const DIMENSIONS: [usize; 7] = [2, 3, 4, 6, 8, 12, 16];
 
-/// Seconds that a request takes, or was expected to take, for its time to say something of its price.
+/// Seconds from which on a request counts: shorter times say little about its estimate.
 const LEAST_SECONDS: f64 = 1e-3;
 
-/// n points near the unit sphere of d dimensions.
+/// Returns `n` random points on the unit sphere in `d` dimensions.
 fn sphere(n: usize, d: usize) -> Vec<Vec<f64>> {
     let mut random = Random(d as u64);
     let point = |_| {
@@ -147,7 +147,7 @@ fn sphere(n: usize, d: usize) -> Vec<Vec<f64>> {
     (0..n).map(point).collect()
 }
 
-/// A request of an operation in d dimensions that every dimension admits.
+/// Returns a request of an operation in `d` dimensions, with parameters that suit every dimension.
 fn request_in(path: &str, n: usize, d: usize) -> Value {
     let points = sphere(n, d);
     let outside = |x: &Vec<f64>| x.iter().map(|c| 1.01 * c).collect::<Vec<_>>();
@@ -162,8 +162,8 @@ fn request_in(path: &str, n: usize, d: usize) -> Value {
     request
 }
 
-/// What may be added to a request of an operation: everything that its `include` names, alone and with each
-/// order of derivatives, solver and surface, as the document has them.
+/// Returns the optional parts of an operation's request, as the document lists them. Each name of `include`
+/// comes alone. Orders of derivatives, the local solver, surfaces and samples follow.
 fn variants(document: &Value, path: &str) -> Vec<Value> {
     let resolve = |schema: &Value| match schema["$ref"].as_str() {
         Some(name) => document.pointer(name.trim_start_matches('#')).unwrap().clone(),
@@ -197,15 +197,15 @@ fn variants(document: &Value, path: &str) -> Vec<Value> {
     all
 }
 
-/// Every operation in every dimension, as it is and with all that can be included. What is included is
-/// estimated before any of it is computed in that dimension, so that the times are those of its price and not
-/// of itself.
+/// Compares estimates with times, for every operation in every dimension, plain and with each optional part.
+/// All optional parts are estimated before any is computed in that dimension. So each time measures its
+/// estimate, not the calibration by itself.
 #[tokio::test]
 async fn seconds_are_within_a_factor_of_two_in_the_median_over_routes_dimensions_and_inclusions() {
     let server = Server::with_flags(&["--deadline-seconds", "300"]).await;
     let document = document();
     let mut ratios = Vec::new();
-    // The first round says how fast the machine is.
+    // The first round only calibrates the speed of the machine.
     for (round, d) in [3].into_iter().chain(DIMENSIONS).enumerate() {
         for (id, path) in operations().iter().filter(|(_, path)| d <= 4 || !path.ends_with("sparse-matrix")) {
             let plain = request_in(path, 240 - usize::from(round == 0), d);
@@ -214,7 +214,7 @@ async fn seconds_are_within_a_factor_of_two_in_the_median_over_routes_dimensions
                 request.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
                 request
             });
-            // What is missing first, and then with everything there.
+            // First with everything missing from the caches, then with everything present.
             let mut found = ratios_of(&server, id, path, std::slice::from_ref(&plain)).await;
             let extended: Vec<Value> = extended.chain([plain.clone()]).collect();
             found.extend(ratios_of(&server, id, path, &extended).await);
@@ -227,12 +227,12 @@ async fn seconds_are_within_a_factor_of_two_in_the_median_over_routes_dimensions
     let at = |share: f64| ratios[(share * ratios.len() as f64) as usize];
     println!("factors of {} requests: median {:.2}, nine tenths {:.2}", ratios.len(), at(0.5), at(0.9));
     assert!(ratios.len() > 200 && at(0.5) <= 2.0, "{ratios:?}");
-    // Whatever a price leaves out is off by more.
+    // A cost that the estimate omits would cause larger errors.
     assert!(at(0.9) <= 6.0, "{ratios:?}");
 }
 
-/// By which factors the times of requests were missed that were estimated before any of them was answered;
-/// what is refused has none.
+/// Returns the factors by which estimates missed the times of requests. All are estimated before any is
+/// answered. Requests with a refused estimate are skipped.
 async fn ratios_of(server: &Server, id: &str, path: &str, requests: &[Value]) -> Vec<f64> {
     let mut expected = Vec::new();
     for request in requests {
@@ -257,7 +257,7 @@ async fn ratios_of(server: &Server, id: &str, path: &str, requests: &[Value]) ->
     ratios
 }
 
-/// The parsing of the body is known before anything is estimated.
+/// Returns the seconds spent on parsing the body, which no estimate includes.
 fn parsing_seconds(answer: &Answer) -> f64 {
     let stages = answer.header("server-timing").split(", ");
     let duration = |stage: &str| stage.split_once(";dur=").unwrap().1.parse::<f64>().unwrap() * 1e-3;

@@ -1,4 +1,4 @@
-//! The examples of the document: every one is sent, and its answer compared.
+//! Examples of the document: each is sent, and its answer compared.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use serde_json::{Map, Value, json};
 use crate::limits::slow_request;
 use crate::support::{Answer, Server, overwrites};
 
-/// What depends on the moment or the machine: it is only there.
+/// Members that depend on the moment or the machine. They must exist, with any value.
 const VARYING: [&str; 6] =
     ["created_at", "relative_residual", "instruction_set", "threads", "version", "seconds"];
 
-/// Numbers agree up to rounding of the largest number of an array.
+/// Asserts that two documents agree. Numbers may differ by 1e-9 relative, or 1e-12 for those below 1e-3.
 fn assert_like(name: &str, found: &Value, expected: &Value) {
     match (found, expected) {
         (Value::Number(a), Value::Number(b)) => {
@@ -43,7 +43,7 @@ fn write(name: &str, value: &Value) {
     std::fs::write(file(name), serde_json::to_string_pretty(value).unwrap() + "\n").unwrap();
 }
 
-/// Methods and paths of the document with what they do, by operation id.
+/// Returns method, path and definition of every operation, by operation id.
 fn operations() -> Map<String, Value> {
     let document = crate::support::document();
     let mut operations = Map::new();
@@ -56,7 +56,8 @@ fn operations() -> Map<String, Value> {
     operations
 }
 
-/// Sends the request of an operation: the example as its body, the examples of its parameters in its path.
+/// Sends the request of an operation, with the example as its body and the examples of its parameters in its
+/// path.
 async fn send(server: &Server, entry: &Value, body: Option<&Value>) -> Answer {
     let mut path = entry["path"].as_str().unwrap().to_owned();
     let parameters = entry["operation"].get("parameters").and_then(Value::as_array);
@@ -103,7 +104,7 @@ async fn every_example_is_what_the_service_answers() {
 #[test]
 fn every_operation_with_a_body_has_an_example() {
     for (id, entry) in operations() {
-        // Metrics and jobs say something else at every moment.
+        // Metrics and jobs change at every moment.
         let is_of_a_moment = id == "get_metrics" || id.contains("job");
         let has_body = entry.pointer("/operation/responses/200/content").is_some() && !is_of_a_moment;
         assert_eq!(EXAMPLES.iter().any(|(name, _)| *name == id), has_body, "{id}");
@@ -118,7 +119,7 @@ fn every_operation_with_a_body_has_an_example() {
     }
 }
 
-/// What a request that provokes a problem is answered with. Three problems are no answer to a request as such.
+/// Returns the problem that a request provokes. Three of them cannot be provoked by a single request.
 async fn provoked(slug: Slug, sample: &Value) -> Value {
     match slug {
         Slug::Internal => return document(&Problem::internal()),

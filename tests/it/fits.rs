@@ -1,11 +1,11 @@
-//! What a fit is made of when little is said: defaults, another surface than the values', merged duplicates.
+//! Fits from few parameters: defaults, a surface other than that of the values, merged duplicates.
 
 use serde_json::{Value, json};
 
 use crate::routes::{N_POINTS, ROUTES};
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// Row by row, the matrix times the values.
+/// Returns the product of a matrix and the values.
 fn times(matrix: &Value, values: &[f64]) -> Vec<f64> {
     let product = |row: &Value| numbers(row).iter().zip(values).map(|(a, b)| a * b).sum();
     matrix.as_array().unwrap().iter().map(product).collect()
@@ -76,7 +76,7 @@ async fn the_surface_may_come_from_another_cloud_and_kernel_than_the_values() {
     let server = Server::start().await;
     let nodes = fibonacci_sphere(150);
     let values: Vec<f64> = nodes.iter().map(|x| x[2]).collect();
-    // The same sphere, sampled elsewhere: turned about the first axis.
+    // The same sphere with other samples: turned about the first axis.
     let turned: Vec<_> = fibonacci_sphere(200)
         .iter()
         .map(|x| [x[0], 0.6 * x[1] - 0.8 * x[2], 0.8 * x[1] + 0.6 * x[2]])
@@ -98,18 +98,18 @@ async fn the_surface_may_come_from_another_cloud_and_kernel_than_the_values() {
     assert_eq!(applied["diagnostics"]["geometry"]["kernel"]["family"], "matern");
     assert_eq!(applied["diagnostics"]["kernel"]["family"], "gauss");
     assert_eq!(applied["diagnostics"]["n_points"], 150);
-    // On the unit sphere Δz = −2z; queries absent, the answer is at the points of the surface's cloud.
+    // On the unit sphere Δz = −2z. Without queries, the answer is at the points of the surface's cloud.
     let expected: Vec<f64> = turned.iter().map(|x| -2.0 * x[2]).collect();
     assert_close(&numbers(&applied["values"]), &expected, 1e-3);
     let gradients = server.post("/v1/surface-gradient", &body).await.expect_ok()["gradients"].clone();
-    // And its gradient is e₃ − z x.
+    // The surface gradient of z is e₃ − z x.
     let tangent = |x: &[f64; 3]| [-x[2] * x[0], -x[2] * x[1], 1.0 - x[2] * x[2]];
     assert_close(&numbers(&gradients), &turned.iter().flat_map(tangent).collect::<Vec<_>>(), 1e-3);
 
     body.as_object_mut().unwrap().remove("values");
     let matrix = server.post("/v1/laplace-beltrami/matrix", &body).await.expect_ok()["matrix"].clone();
     assert_eq!((matrix.as_array().unwrap().len(), matrix[0].as_array().unwrap().len()), (200, 150));
-    // Rounding is relative to the entries of the matrix, which are much larger than what they add up to.
+    // Rounding is relative to the entries of the matrix, which are much larger than their sums.
     let largest = numbers(&matrix).iter().fold(0.0f64, |a, b| a.max(b.abs()));
     assert_close(&times(&matrix, &values), &numbers(&applied["values"]), 1e-10 * largest.max(10.0));
     let matrices = server.post("/v1/surface-gradient/matrix", &body).await.expect_ok()["matrices"].clone();

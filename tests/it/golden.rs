@@ -1,13 +1,14 @@
-//! Every case of tests/reference/golden.json (60-digit arithmetic) over HTTP, to 1e-11 of each array's maximum.
+//! Cases of tests/reference/golden.json (60-digit arithmetic) over HTTP, to 1e-11 of each array's maximum.
 
 use serde_json::{Value, json};
 
 use crate::support::{Server, numbers};
 
-/// What the service promises for these cases, whose conditions reach 1e4 or so; plain float64 reaches 1e-13.
+/// Tolerance that the service promises for these cases, with condition numbers up to about 1e4. Plain float64
+/// reaches 1e-13.
 const TOLERANCE: f64 = 1e-11;
 
-/// Entries that are null in the answer are left out of the comparison, and the case must allow them.
+/// Asserts agreement within [`TOLERANCE`] of the maximum. Entries may be null only if the case allows it.
 fn assert_close(case: &str, what: &str, found: &Value, expected: &Value, sign: f64) {
     let scale = numbers(expected).iter().fold(0.0f64, |a, b| a.max(b.abs()));
     compare(case, what, found, expected, sign, TOLERANCE * scale);
@@ -30,13 +31,14 @@ fn compare(case: &str, what: &str, found: &Value, expected: &Value, sign: f64, t
     }
 }
 
-/// With Matérn ½ no query has a resolved gradient: |∇u| is 0.3, 0.2 and 0.7 of the threshold of criterion T2, in every other
-/// case at least 1.8 times it. Null is the right answer there, and only there.
+/// Checks whether null is the right answer for a case, which holds only for Matérn ½. There no query has a
+/// resolved gradient: |∇u| is 0.3, 0.2 and 0.7 of the threshold of criterion T2. In every other case it is at
+/// least 1.8 times the threshold.
 fn may_be_null(case: &str) -> bool {
     case.contains("\"nu\":0.5")
 }
 
-/// One case with its requests.
+/// A reference case with its requests.
 struct Case<'a> {
     server: &'a Server,
     case: &'a Value,
@@ -84,7 +86,7 @@ impl Case<'_> {
             // The reference has ν = −∇u/|∇u| in every case.
             let sign = if orientation == "gradient" { -1.0 } else { 1.0 };
             let found = self.post("/v1/curvatures", json!({"orientation": orientation})).await;
-            // Two dozen points do not resolve these surfaces, and the answers say so; but they are answers.
+            // Two dozen points do not resolve these surfaces. The answers flag this, but they are not null.
             let is_null = |k: &&Value| k.is_null();
             let n_null = found["principal_curvatures"].as_array().unwrap().iter().filter(is_null).count();
             assert_eq!(n_null, if may_be_null(&self.name) { 3 } else { 0 }, "{}", self.name);
@@ -130,7 +132,8 @@ impl Case<'_> {
         let expected = &self.case["posterior"];
         self.check("mean", &found["means"], &expected["mean"]);
         self.check("covariance", &found["covariance"], &expected["covariance"]);
-        // A variance is a difference from k₀: its rounding is relative to k₀, which is at least its maximum.
+        // A variance is a difference from k₀. Its rounding is relative to k₀, which is at least the maximum
+        // variance.
         self.check("variance", &found["variances"], &expected["variance"]);
         self.check("gradients", &found["gradients"], &self.case["interpolant"]["gradient"]);
         let likelihood = &self.case["log_marginal_likelihood"];

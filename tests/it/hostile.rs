@@ -1,4 +1,5 @@
-//! Clouds that are hard on searches, through every route: as quick as others, and cancelled at their deadline.
+//! Clouds that are hard for neighbour searches, on every route: as fast as others, and cancelled at their
+//! deadline.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,7 @@ use serde_json::{Value, json};
 use crate::common::hostile::HOSTILE;
 use crate::process::Process;
 
-/// Every route that computes, with what its request has beside cloud, values and kernel.
+/// Every route that computes, with its members besides cloud, values and kernel.
 const REQUESTS: [(&str, &str); 22] = [
     ("/v1/interpolation", r#"{"derivatives": 2}"#),
     ("/v1/interpolation", r#"{"include": ["deviations"], "duplicates": "merge"}"#),
@@ -39,7 +40,7 @@ const REQUESTS: [(&str, &str); 22] = [
     ("/v1/estimate", r#"{}"#),
 ];
 
-/// The body of one of the requests.
+/// Returns the body of a request.
 fn body(path: &str, members: &str, cloud_id: &str, n_points: usize) -> Value {
     let mut body: Value = serde_json::from_str(members).unwrap();
     body["cloud"] = json!({"id": cloud_id});
@@ -54,7 +55,7 @@ fn body(path: &str, members: &str, cloud_id: &str, n_points: usize) -> Value {
     body
 }
 
-/// A cloud as npy, compressed: repeated positions are small then.
+/// Returns a cloud as npy, compressed with zstd. Repeated positions become small.
 fn packed(cloud: &Cloud) -> Vec<u8> {
     let shape = format!("({}, {})", cloud.n_points(), cloud.dimension());
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
@@ -66,15 +67,16 @@ fn packed(cloud: &Cloud) -> Vec<u8> {
     zstd::encode_all(npy.as_slice(), 3).unwrap()
 }
 
-/// Seconds of processor time that a process has used.
+/// Returns the processor time that a process has used, s.
 fn cpu_seconds(process: &Process) -> f64 {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.child.id())).unwrap();
-    // Behind the name, which may have blanks: the 12th and 13th are ticks of a hundredth of a second.
+    // After the name, which may contain blanks, fields 12 and 13 are user and system time in hundredths of a
+    // second.
     let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split_whitespace().collect();
     (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
 }
 
-/// Seconds of processor time until the process has nothing to do.
+/// Returns the processor time until the process is idle, s.
 async fn cpu_seconds_until_idle(process: &Process) -> f64 {
     let start = cpu_seconds(process);
     let mut before = start;
@@ -97,7 +99,7 @@ async fn register(process: &Process, client: &reqwest::Client, cloud: &Cloud) ->
     (status, answer["cloud_id"].as_str().unwrap_or_default().to_owned())
 }
 
-/// Sends every request at once; says how each was answered.
+/// Sends every request at once, and returns status and path of each answer.
 async fn ask_all(
     process: &Process,
     client: &reqwest::Client,
@@ -116,13 +118,13 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
     let flags = ["--deadline-seconds", "2", "--threads", "2", "--max-queue", "64"];
     let process = Process::start(&flags);
     let client = reqwest::Client::new();
-    // Beyond what is factorized, and well within.
+    // Too large to be factorized, and well within that limit.
     let large = HOSTILE.iter().map(|hostile| (hostile, 60_000));
     let small = HOSTILE.iter().step_by(4).map(|hostile| (hostile, 4000));
     let (mut n_ended, mut n_unregistered) = (0, 0);
     for (hostile, n_points) in large.chain(small) {
         let (status, id) = register(&process, &client, &hostile.cloud(n_points)).await;
-        // Where others use this machine as well, looking at a cloud may take longer than the deadline by itself.
+        // On a shared machine, analysing a cloud may exceed the deadline by itself.
         let is_registered = status == 201;
         assert!(is_registered || status == 504, "{}: {status}", hostile.name);
         n_unregistered += usize::from(!is_registered);
@@ -133,7 +135,8 @@ async fn the_deadline_ends_the_work_on_every_route_whatever_the_cloud() {
         n_ended += answers.iter().filter(|(status, _)| *status == 504).count();
         let expected = |status: &u16| matches!(status, 200 | 413 | 422 | 503 | 504);
         assert!(answers.iter().all(|(status, _)| expected(status)), "{}: {answers:?}", hostile.name);
-        // Idle after a second: two threads have used two seconds of processor time by then at most.
+        // The process must be idle after a second. Two threads use at most two seconds of processor time by
+        // then.
         let seconds = cpu_seconds_until_idle(&process).await;
         assert!(seconds < 2.0, "{} of {n_points}: {seconds} s of work nobody waits for", hostile.name);
     }
@@ -146,7 +149,7 @@ async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
     let process = Process::start(&["--deadline-seconds", "2", "--threads", "2"]);
     let client = reqwest::Client::new();
     let few_positions = HOSTILE.iter().find(|hostile| hostile.name == "5 positions").unwrap();
-    // As many as there are threads and more, each of another size so that none is known.
+    // At least as many clouds as threads, each of another size so that none is known.
     let hostile = [57_000, 58_000, 59_000, 60_000].map(|n_points| few_positions.cloud(n_points));
     let two_points = Cloud::new(vec![0.0, 1.0], 1).unwrap();
     let clouds = hostile.iter().chain([&two_points]);
@@ -156,7 +159,7 @@ async fn two_points_are_registered_beside_four_clouds_of_few_positions() {
     assert_eq!(statuses, [201; 5]);
 }
 
-/// The least time of three that looking at the neighbours of a cloud takes, seconds.
+/// Returns the time to compute the sampling of a cloud, s: the minimum of three.
 fn seconds_to_sample(cloud: &Cloud) -> f64 {
     let time = |_| {
         let start = Instant::now();
@@ -169,7 +172,7 @@ fn seconds_to_sample(cloud: &Cloud) -> f64 {
 #[test]
 fn neighbours_of_hostile_clouds_take_no_three_times_as_long_as_those_of_random_ones() {
     for hostile in &HOSTILE {
-        // Random points of many dimensions take a time that is quadratic.
+        // Random points in many dimensions take quadratic time.
         let n_points = if hostile.dimension > 3 { 3000 } else { 20_000 };
         let [hard, ordinary] =
             [hostile, &hostile.ordinary()].map(|of| seconds_to_sample(&of.cloud(n_points)));

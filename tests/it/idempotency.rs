@@ -1,4 +1,4 @@
-//! `Idempotency-Key` with `Prefer: respond-async`: a request that is repeated is one job.
+//! `Idempotency-Key` with `Prefer: respond-async`: repeated requests become one job.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ use crate::support::{Answer, Server};
 
 const NORMALS: &str = "/v1/normals";
 
-/// A request for a job with these further headers.
+/// Returns a request for a job, with further headers.
 fn asking(url: String, body: &Value, headers: &[(&str, &str)]) -> reqwest::RequestBuilder {
     let request = reqwest::Client::new().post(url).header("prefer", "respond-async").json(body);
     headers.iter().fold(request, |request, (name, value)| request.header(*name, *value))
@@ -43,7 +43,7 @@ async fn equal_requests_with_one_key_are_one_job() {
             let path = answers[0].1.clone();
             assert!(answers.iter().all(|answer| *answer == (202, path.clone())), "{answers:?}");
             result(&server, &path).await.expect_ok();
-            // Also once it has ended.
+            // Also after the job has ended.
             assert_eq!(ask(server.url(NORMALS), &request, &headers).await, (202, path));
         }
         let metrics = server.get("/metrics").await.text;
@@ -63,13 +63,13 @@ async fn equal_requests_to_several_processes_are_one_job() {
         let answers = futures_util::future::join_all(asked).await;
         let path = answers[0].1.clone();
         assert!(answers.iter().all(|answer| *answer == (202, path.clone())), "{answers:?}");
-        // Cancelled, and forgotten.
+        // The first DELETE cancels the job, the second forgets it.
         for process in &processes {
             let deleted = reqwest::Client::new().delete(process.url(&path)).send().await.unwrap();
             assert_eq!(deleted.status(), 204);
         }
     }
-    // A lease that was being written meanwhile goes with its time.
+    // A lease that was being written at that moment remains until it expires.
     let left: Vec<_> = folder.files();
     let is_of_job = |path: &std::path::PathBuf| {
         let path = path.to_string_lossy();
@@ -85,7 +85,7 @@ async fn a_key_is_of_one_request_and_one_owner() {
     let as_one = [("idempotency-key", "\"k-1\""), ("authorization", "Bearer one")];
     let (status, path) = ask(server.url(NORMALS), &request, &as_one).await;
     assert_eq!(status, 202);
-    // Another body, route or form of the answer is another request.
+    // Another body, route or answer format makes a different request.
     let mut other = request.clone();
     other["alpha"] = json!(0.25);
     let safetensors = [&as_one[..], &[("accept", "application/x-safetensors")]].concat();
@@ -99,10 +99,10 @@ async fn a_key_is_of_one_request_and_one_owner() {
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("Idempotency-Key"), "{detail}");
     }
-    // What only says where to send it is no part of it.
+    // Headers that only route the request are not part of it.
     let routed = [&as_one[..], &[("gramian-cloud", "none"), ("x-request-id", "again")]].concat();
     assert_eq!(ask(server.url(NORMALS), &request, &routed).await, (202, path.clone()));
-    // Another owner's key is another key, and a request without any is another job.
+    // An equal key of another owner is a different key. A request without a key is another job.
     let as_other = [("idempotency-key", "\"k-1\""), ("authorization", "Bearer other")];
     for headers in [&as_other[..], &as_one[1..]] {
         let (status, another) = ask(server.url(NORMALS), &request, headers).await;
@@ -124,7 +124,7 @@ async fn a_key_is_forgotten_with_its_job() {
         other["alpha"] = json!(0.25);
         let (status, second) = ask(server.url(NORMALS), &other, &headers).await;
         assert!(status == 202 && second != first, "{status}");
-        // Results that have been kept long enough take their keys with them.
+        // Expired results take their keys with them.
         let flags = [store, &["--job-result-seconds", "0.5"]].concat();
         let server = Server::with_flags(&flags).await;
         let headers = [("idempotency-key", "short")];
@@ -154,7 +154,7 @@ async fn keys_that_are_none_are_refused() {
     let longest = "k".repeat(255);
     let (status, _) = ask(server.url(NORMALS), &request, &[("idempotency-key", &longest)]).await;
     assert_eq!(status, 202);
-    // Requests that are answered at once are named by their content, and need no key.
+    // Requests answered at once are identified by their content, and need no key.
     let answer = server.client.post(server.url(NORMALS)).json(&request).header("idempotency-key", "a b");
     assert_eq!(server.send(answer).await.status, 200);
 }

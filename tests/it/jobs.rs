@@ -1,4 +1,4 @@
-//! Work that is asked for with `Prefer: respond-async`.
+//! Jobs: work requested with `Prefer: respond-async`.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,8 @@ use crate::process::Process;
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Answer, Server, fibonacci_sphere, receive};
 
-/// Asks for a job; answers with its path. The document knows no 202: which status there is depends on a header of the request.
+/// Asks for a job and returns its path. The answer is not checked against the document, which has no 202,
+/// since that status depends on a header of the request.
 pub async fn ask(url: String, body: &Value, headers: &[(&str, &str)]) -> String {
     let mut request = reqwest::Client::new().post(url).header("prefer", "wait=5, respond-async").json(body);
     for (name, value) in headers {
@@ -32,7 +33,7 @@ pub async fn delete(server: &Server, path: &str) -> u16 {
     server.send(server.client.delete(server.url(path))).await.status
 }
 
-/// Names of events with their data.
+/// Returns the events of a stream: names with their data.
 fn events(text: &str) -> Vec<(String, Value)> {
     let blocks = text.split("\n\n").filter(|block| block.starts_with("event: "));
     let parsed = blocks.map(|block| {
@@ -42,12 +43,12 @@ fn events(text: &str) -> Vec<(String, Value)> {
     parsed.collect()
 }
 
-/// The events of a text that may end within one.
+/// Returns the complete events of a text that may end within one.
 fn whole_events(text: &str) -> Vec<(String, Value)> {
     text.rfind("\n\n").map_or_else(Vec::new, |end| events(&text[..end]))
 }
 
-/// Without what depends on the moment.
+/// Returns an answer without what depends on the moment.
 fn numbers_of(mut answer: Value) -> Value {
     answer["diagnostics"]["relative_residual"] = Value::Null;
     answer
@@ -75,7 +76,7 @@ async fn a_job_is_answered_as_the_request_itself() {
             job["ended_at"].as_str() >= job["created_at"].as_str()
                 && job["expires_at"].as_str() > job["ended_at"].as_str()
         );
-        // Another cloud for the next one.
+        // Deleted, so that the next route computes again.
         let cloud = format!("/v1/clouds/{}", expected_cloud(&server).await);
         assert_eq!(delete(&server, &cloud).await, 204);
         assert_eq!(delete(&server, &path).await, 204);
@@ -119,7 +120,7 @@ async fn what_is_refused_fails_with_its_problem() {
     }
     let path = ask(server.url("/v1/normals"), &json!({}), &[("accept", "text/html")]).await;
     result(&server, &path).await.expect_problem(406, "not-acceptable");
-    // What is no job at all is refused at once; what takes no time is answered at once.
+    // A request that cannot be a job is refused at once. One that takes no time is answered at once.
     let prefer = |path: &str| server.client.post(server.url(path)).header("prefer", "respond-async");
     server.send(prefer("/v1/nothing").json(&json!({}))).await.expect_problem(404, "not-found");
     let cloud = json!({"points": fibonacci_sphere(5)});
@@ -147,10 +148,11 @@ async fn whoever_follows_is_told_how_far_it_is_and_when_it_is_done() {
         fractions.is_sorted() && fractions.iter().all(|fraction| (0.0..1.0).contains(fraction)),
         "{text}"
     );
-    // Who comes later is told the end.
+    // A later follower receives only the end.
     let text = server.get(&format!("{path}/events")).await.text;
     assert_eq!(crate::jobs::events(&text).len(), 1, "{text}");
-    // How long it still takes is told while it runs, however fast the machine: this one is deleted once that is said.
+    // The remaining time is sent while a job runs, however fast the machine. This job is deleted once it was
+    // sent.
     let path = ask(server.url("/v1/normals"), &slow_request(), &[]).await;
     let mut told = server.client.get(server.url(&format!("{path}/events"))).send().await.unwrap();
     let mut text = String::new();
@@ -178,7 +180,7 @@ async fn a_job_has_no_deadline_and_stops_when_it_is_deleted() {
     assert_eq!(delete(&server, &path).await, 204);
     assert_eq!(server.get(&path).await.expect_ok()["status"], "cancelled");
     result(&server, &path).await.expect_problem(404, "unknown-job");
-    // Its threads are free again: another one comes to its end, though that takes longer than requests may.
+    // Its threads are free again, so the next job ends, although it takes longer than requests may.
     let points = fibonacci_sphere(1500);
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     let request = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6});
@@ -232,7 +234,7 @@ async fn equal_jobs_at_once_share_one_factorization() {
 
 #[tokio::test]
 async fn without_a_store_results_take_no_more_memory_than_there_is_for_them() {
-    // A 32nd of what is left for requests: a few megabytes.
+    // Results may take a 32nd of the memory for requests: a few megabytes.
     let server = Server::with_flags(&["--memory-bytes", "268435456"]).await;
     let points = fibonacci_sphere(600);
     let kernel = json!({"family": "matern", "length_scale": 0.5});
@@ -240,7 +242,7 @@ async fn without_a_store_results_take_no_more_memory_than_there_is_for_them() {
     let path = ask(server.url("/v1/laplace-beltrami/matrix"), &request, &[]).await;
     let problem = result(&server, &path).await.expect_problem(413, "problem-too-large");
     assert!(problem["detail"].as_str().unwrap().contains("results"), "{problem}");
-    // What is forgotten leaves its memory to the next ones.
+    // Deleted results free their memory for the next ones.
     for _ in 0..20 {
         let path = ask(server.url("/v1/normals"), &request, &[]).await;
         result(&server, &path).await.expect_ok();
@@ -270,7 +272,7 @@ async fn get(process: &Process, path: &str) -> Value {
     serde_json::from_slice(&answer.bytes).unwrap()
 }
 
-/// A job that takes some seconds.
+/// Returns a request whose job takes some seconds.
 fn long_request() -> Value {
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     json!({"cloud": {"points": fibonacci_sphere(4000)}, "kernel": kernel, "alpha": 1e-6})
@@ -291,7 +293,7 @@ async fn a_job_survives_the_end_of_its_process() {
     process.child.kill().unwrap();
     process.child.wait().unwrap();
     let process = Process::start(&folder.flags());
-    // Nobody knows yet whether whoever had it is only slow.
+    // The new process cannot know yet whether the previous one is only slow.
     assert_eq!(get(&process, &path).await["status"], "running");
     let found = get(&process, &format!("{path}/result")).await;
     let answer = receive(reqwest::Client::new().post(process.url("/v1/normals")).json(&long_request())).await;
@@ -306,9 +308,9 @@ async fn a_job_goes_on_elsewhere_when_its_process_is_told_to_end() {
     let [one, two] = [Process::start(&folder.flags()), Process::start(&folder.flags())];
     let path = ask(one.url("/v1/normals"), &long_request(), &[]).await;
     wait_for(&one, &path, "running").await;
-    // The other one sees it as well, with how far it is.
+    // The other process sees the job as well, with its progress.
     wait_for(&two, &path, "running").await;
-    // Who waits for it is sent away as well.
+    // A client that waits for the result at the first process is turned away with 503.
     let waiting = reqwest::Client::new().get(one.url(&format!("{path}/result"))).send();
     let waiting = tokio::spawn(waiting);
     let is_there = async || {
@@ -353,7 +355,7 @@ async fn a_job_that_waits_is_begun_by_whoever_has_a_turn_and_once() {
     wait_for(&one, &slow, "running").await;
     let path = ask(one.url("/v1/normals"), &long_request(), &[]).await;
     let two = Process::start(&flags);
-    // Also where it waits, one learns that it goes on elsewhere.
+    // The first process, where the job waits, learns that the other one has begun it.
     wait_for(&one, &path, "running").await;
     get(&one, &format!("{path}/result")).await;
     assert_eq!(get(&one, &path).await["status"], "succeeded");
@@ -384,7 +386,7 @@ async fn a_request_does_not_wait_for_a_job() {
     while server.get(&path).await.expect_ok()["progress"]["stage"] != "factor" {
         tokio::task::yield_now().await;
     }
-    // As much work as makes others wait for it.
+    // Enough work to make other requests wait for it.
     let points = fibonacci_sphere(3200);
     let kernel = json!({"family": "matern", "length_scale": 0.3});
     let request = json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6});
@@ -395,7 +397,7 @@ async fn a_request_does_not_wait_for_a_job() {
 
 #[tokio::test]
 async fn jobs_of_one_key_leave_places_to_another() {
-    // Four may wait or run here; of each of two keys, two.
+    // Four jobs may wait or run here, two for each of two keys.
     let flags = ["--threads", "1", "--max-queue", "3", "--api-keys", "greedy,modest"];
     let server = Server::with_flags(&flags).await;
     let asking = |key: &'static str| {
@@ -405,8 +407,8 @@ async fn jobs_of_one_key_leave_places_to_another() {
     for (key, status) in [("greedy", 202), ("greedy", 202), ("greedy", 503), ("modest", 202)] {
         assert_eq!(asking(key).await.unwrap().status(), status, "{key}");
     }
-    // One of each runs, though there is one thread: no job of one keeps those of the other waiting for its end. What a fleet grows by counts
-    // the one that waits, which no lane knows yet.
+    // One job of each key runs, although there is one thread. So no key waits for the other key's job to end.
+    // The queue depth, by which a fleet scales, counts the waiting job, which no lane knows yet.
     let is_so = |metrics: &str| {
         ["queue_depth", "jobs{status=\"queued\"}"]
             .iter()
@@ -430,7 +432,7 @@ async fn as_many_may_follow_jobs_as_half_of_the_connections() {
         following.push(events);
     }
     assert_eq!(follow().await.unwrap().status(), 503);
-    // Who waits for a result has a connection as well.
+    // A client that waits for a result occupies a connection as well.
     result(&server, &path).await.expect_problem(503, "overloaded");
     drop(following);
     while follow().await.unwrap().status() == 503 {}

@@ -1,4 +1,4 @@
-//! What is kept of jobs: who pays for results while they are sent, how many there may be, and how they go.
+//! Stored jobs: memory of results while they are sent, limits on their number and size, and deletion.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -13,7 +13,7 @@ use crate::process::Process;
 use crate::routes::route_of;
 use crate::support::{Server, fibonacci_sphere, receive};
 
-/// A request for a matrix of n² numbers.
+/// Returns a request for a matrix of n² numbers.
 fn matrix(n: usize) -> Value {
     let kernel = json!({"family": "matern", "length_scale": 0.5});
     json!({"cloud": {"points": fibonacci_sphere(n)}, "kernel": kernel, "alpha": 1e-6})
@@ -29,7 +29,7 @@ fn get_unread(process: &Process, path: &str) -> TcpStream {
     stream
 }
 
-/// Answers of 64 streams that nobody reads, on a connection of HTTP/2.
+/// Requests a path on 64 streams of one HTTP/2 connection, and returns the unread bodies.
 async fn get_streams_unread(process: &Process, path: &str) -> Vec<h2::RecvStream> {
     let (client, _connection) = http_2(process.address().parse().unwrap()).await;
     let mut client = client.ready().await.unwrap();
@@ -62,7 +62,8 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     }
     let peak = process.peak_resident_bytes();
     assert!(peak <= BUDGET, "{peak} bytes at the peak, {BUDGET} allowed");
-    // What was not read is not lost: who reads gets all of it, also once the job is deleted.
+    // Unread results are not lost: a client that reads receives the whole result, even after the job was
+    // deleted.
     assert_eq!(
         receive(reqwest::Client::new().delete(process.url(&path[..path.len() - 7]))).await.status,
         204
@@ -70,12 +71,12 @@ async fn results_that_nobody_reads_are_within_the_budget() {
     let mut text = Vec::new();
     let mut first = streams.swap_remove(0);
     first.set_read_timeout(Some(std::time::Duration::from_secs(2))).unwrap();
-    // The connection stays open behind the answer.
+    // The connection stays open after the answer.
     first.read_to_end(&mut text).ok();
     assert!(text.ends_with(&answer.bytes), "{} bytes of {}", text.len(), answer.bytes.len());
 }
 
-/// The value of a metric.
+/// Returns the value of a metric.
 async fn metric(server: &Server, name: &str) -> f64 {
     let metrics = server.get("/metrics").await.text;
     let line = metrics.lines().find(|line| line.starts_with(&format!("{name} "))).unwrap();
@@ -188,13 +189,13 @@ async fn bytes_of_results_in_the_store_are_bounded_and_one_key_has_half() {
         statuses.push(result_with_key(&server, "greedy", &path).await);
         paths.push(path);
     }
-    // Of 16 MiB one key has eight, which three results of 2.5 MB fit into.
+    // One key may fill half of 16 MiB, which holds three results of 2.5 MB.
     assert_eq!(statuses, [200, 200, 200, 413]);
-    // Nobody loses what is kept, and another key has room.
+    // Stored results stay available, and another key has room.
     assert_eq!(result_with_key(&server, "greedy", &paths[0]).await, 200);
     let path = location(&ask_with_key(&server, "modest", MATRIX, &request).await);
     assert_eq!(result_with_key(&server, "modest", &path).await, 200);
-    // The bound is that of the store: another process knows it from the start.
+    // The bound is the store's: a new process counts the bytes already there.
     drop(server);
     let server = Server::with_flags(&flags.concat()).await;
     while metric(&server, "gramian_store_job_bytes").await < 9e6 {

@@ -1,4 +1,4 @@
-//! Keys in a file, their limits, and services without keys.
+//! API keys in a file, their limits, and services without keys.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use crate::limits::slow_request;
 use crate::process::{Process, gramian, logged};
 use crate::support::receive;
 
-/// A file of keys that goes with the test.
+/// A temporary file of keys, removed when dropped.
 struct KeysFile(PathBuf);
 
 impl KeysFile {
@@ -22,7 +22,7 @@ impl KeysFile {
         file
     }
 
-    /// As an operator should: there is always a whole file.
+    /// Replaces the file atomically, as an operator should, so that readers always see a whole file.
     fn write(&self, lines: &[&str]) {
         let next = self.0.with_extension("next");
         fs::write(&next, lines.concat()).unwrap();
@@ -40,7 +40,7 @@ impl Drop for KeysFile {
     }
 }
 
-/// A key, and its lines for the file, as the binary makes them.
+/// Returns a new key and its lines for the file, as the binary makes them.
 fn key(name: &str, more: &str) -> (String, String) {
     let made = gramian().args(["key", name]).output().unwrap();
     let told = String::from_utf8(made.stderr).unwrap();
@@ -68,7 +68,7 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     while list(&process, &new).await.status == 401 {
         tokio::task::yield_now().await;
     }
-    // Whoever has the old key or the new one sees the same clouds; nobody else does.
+    // Holders of the old or the new key see the same clouds, and nobody else does.
     for (key, n_clouds) in [(&old, 1), (&new, 1), (&other, 0)] {
         let clouds = list(&process, key).await.json().unwrap();
         assert_eq!(clouds["clouds"].as_array().unwrap().len(), n_clouds);
@@ -78,7 +78,7 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
         tokio::task::yield_now().await;
     }
     assert_eq!((list(&process, &other).await.status, list(&process, &new).await.status), (401, 200));
-    // What is no file of keys changes nothing.
+    // An invalid file changes nothing.
     file.write(&[&lines_of_old, "oops"]);
     while !process.lines.lock().unwrap().iter().any(|line| line.contains("keys stay as they were")) {
         tokio::task::yield_now().await;
@@ -93,7 +93,7 @@ async fn keys_of_a_file_are_replaced_without_a_restart() {
     assert!(!text.contains("oops"));
 }
 
-/// What a secret mounted in a container looks like: always of the same time.
+/// Replaces the file by one of equal length and modification time, as with a secret mounted in a container.
 #[tokio::test]
 async fn a_file_of_the_same_length_and_time_is_another_if_its_keys_are() {
     let ((old, lines_of_old), (new, lines_of_new)) = (key("lab", ""), key("lab", ""));

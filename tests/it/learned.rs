@@ -1,18 +1,20 @@
-//! What follows from the values when nothing is said of them: kernel, noise and mean, and error bars that cover.
+//! Learning without parameters: kernel, noise and mean from the values alone, and error bars that cover the
+//! truth.
 
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// x₃ on the unit sphere with noise of a deviation, in other units.
+/// Returns points and values: x₃ on the unit sphere plus noise of deviation `noise`, times `factor`, plus
+/// `offset`.
 fn measured(n: usize, noise: f64, factor: f64, offset: f64) -> (Vec<[f64; 3]>, Vec<f64>) {
     let (points, mut random) = (fibonacci_sphere(n), Random(n as u64));
     let values = points.iter().map(|x| offset + factor * (x[2] + noise * random.normal())).collect();
     (points, values)
 }
 
-/// Of errors within 1.96 deviations, the share.
+/// Returns the share of errors within 1.96 deviations.
 fn coverage(found: &[f64], deviations: &[f64], truth: &[f64]) -> f64 {
     let errors = found.iter().zip(truth).map(|(a, b)| (a - b).abs());
     let within = errors.zip(deviations).filter(|(error, deviation)| *error <= 1.96 * *deviation).count();
@@ -35,7 +37,8 @@ async fn measured_values_need_no_parameters_whatever_their_unit_and_offset() {
         let (means, variances) = (numbers(&answer["means"]), numbers(&answer["variances"]));
         let deviations: Vec<f64> = variances.iter().map(|variance| variance.sqrt()).collect();
         let error = root_mean_square(means.iter().zip(&truth).map(|(a, b)| (a - b) / factor));
-        // Some ten functions stand for a linear one here: √(10/400) of the noise.
+        // About ten functions are fitted in place of one linear function, so the error is √(10/400) of the
+        // noise.
         assert!(error < 0.05 * 0.3, "{factor} {offset}: {error}");
         assert!(coverage(&means, &deviations, &truth) > 0.85, "{factor} {offset}");
         let diagnostics = &answer["diagnostics"];
@@ -59,7 +62,7 @@ async fn what_was_learned_can_be_pinned() {
         body["alpha"] = learned["diagnostics"]["alpha"].clone();
         let pinned = server.post("/v1/posterior", &body).await;
         assert_eq!(pinned.header("cache-status"), "gramian; hit", "{mean}");
-        // To the last bit.
+        // Equal to the last bit.
         assert_eq!(pinned.expect_ok(), learned, "{mean}");
         assert_eq!(learned["diagnostics"].get("mean_coefficients").is_some(), mean != "zero");
     }
@@ -86,7 +89,7 @@ async fn one_factor_serves_kernels_of_every_variance() {
     assert_eq!(four["diagnostics"]["alpha"], 0.04);
     let of = |answer: &Value, member: &str| answer["diagnostics"][member].as_f64().unwrap();
     assert!((of(&one, "native_norm_squared") / of(&four, "native_norm_squared") - 4.0).abs() < 1e-12);
-    // ln N(Y; 0, 4C) = ln N(Y; 0, C) + ⅜ YᵀC⁻¹Y − ½ n ln 4, by hand from both.
+    // ln N(Y; 0, 4C) = ln N(Y; 0, C) + ⅜ YᵀC⁻¹Y − ½ n ln 4. The energy YᵀC⁻¹Y follows from both likelihoods.
     let of = |answer: &Value| answer["log_marginal_likelihood"].as_f64().unwrap();
     let energy = (of(&four) - of(&one) + 30.0 * 4f64.ln()) / 0.375;
     assert!(energy > 0.0);
@@ -115,7 +118,7 @@ async fn operators_of_measured_values_have_bars_that_cover() {
     let truth: Vec<f64> = points.iter().map(|x| -2.0 * x[2]).collect();
     let (found, bars) = (numbers(&answer["values"]), numbers(&answer["value_deviations"]));
     let error = root_mean_square(found.iter().zip(&truth).map(|(a, b)| a - b));
-    // Taken as exact, the noise made factors of it: the Laplacian of noise is 7σ/h².
+    // If the values were taken as exact, noise would exceed the signal: the Laplacian of noise is 7σ/h².
     assert!(error < 0.1, "{error}");
     assert!(coverage(&found, &bars, &truth) > 0.88);
     let answer = server.post("/v1/surface-gradient", &body).await.expect_ok();
@@ -125,7 +128,7 @@ async fn operators_of_measured_values_have_bars_that_cover() {
     assert!(coverage(&found, &bars, &truth) > 0.88);
     assert_eq!(answer["degenerate"], json!([]));
 
-    // A kernel that is far too narrow says so by its bars, and is flagged.
+    // A kernel that is far too narrow has wide bars, and all queries are flagged.
     body["kernel"] = json!({"family": "gauss", "length_scale": 0.05});
     body["alpha"] = json!(1e-4);
     body["geometry"] = json!({"surface": "local"});
@@ -155,7 +158,7 @@ async fn interpolants_have_deviations_of_all_that_is_asked_for() {
     {
         assert!((deviation * deviation - variance).abs() < 1e-12);
     }
-    // From the nearest points the same, since they are all of them.
+    // The local solver agrees, since its neighbourhoods hold all points.
     asked["include"] = json!(["deviations"]);
     asked["solver"] = json!("local");
     let local = server.post("/v1/interpolation", &asked).await.expect_ok();
@@ -215,10 +218,11 @@ async fn the_local_solver_learns_as_well() {
     let bars: Vec<f64> = numbers(&local["variances"]).iter().map(|variance| variance.sqrt()).collect();
     assert!(coverage(&numbers(&local["means"]), &bars, &truth) > 0.85);
     let mean = |answer: &Value| numbers(&answer["diagnostics"]["mean_coefficients"])[0];
-    // Of a sample and of all: both within what the variance of the process leaves of it.
+    // The local solver estimates the mean from a sample, the dense one from all points. They agree within the
+    // deviation of the process.
     let deviation = dense["diagnostics"]["kernel"]["variance"].as_f64().unwrap().sqrt();
     assert!((mean(&local) - mean(&dense)).abs() < deviation);
-    // With a kernel that is given the mean is found from a sample too.
+    // The mean is estimated from a sample also when the kernel is given.
     body["kernel"] = dense["diagnostics"]["kernel"].clone();
     body["alpha"] = dense["diagnostics"]["alpha"].clone();
     body["mean"] = json!("constant");

@@ -1,4 +1,4 @@
-//! A length scale for each axis of the points.
+//! Length scales for each axis of the points.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::common::random::Random;
 use crate::routes::ROUTES;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// Points of a cube, and the same divided by length scales.
+/// Returns random points of the unit cube divided by `length_scales`, and the points themselves.
 fn stretched_apart(n: usize, seed: u64, length_scales: [f64; 3]) -> [Vec<[f64; 3]>; 2] {
     let mut random = Random(seed);
     let points: Vec<[f64; 3]> = (0..n).map(|_| [(); 3].map(|()| random.uniform())).collect();
@@ -19,7 +19,7 @@ fn assert_close(found: &Value, expected: &[f64], what: &str) {
     assert_eq!(found.len(), expected.len(), "{what}");
     let scale = expected.iter().fold(0.0f64, |a, x| a.max(x.abs()));
     for (a, b) in found.iter().zip(expected) {
-        // Other roundings of coordinates, and a condition of some thousands.
+        // Coordinates are rounded differently, and the condition number is some thousands.
         assert!((a - b).abs() <= 1e-10 * scale, "{what}: {a} {b}");
     }
 }
@@ -143,7 +143,7 @@ async fn selection_finds_the_axes_that_do_not_matter() {
     let found = numbers(&all["kernel"]["length_scales"]);
     assert!(found[0] < 1.0 && found[2] > 5.0, "{found:?}");
     assert_eq!(all["gradient"].as_array().unwrap().len(), 3);
-    // The kernel that was found is one that is served, with the likelihood of the score.
+    // The selected kernel is accepted by other routes, and its likelihood is the score.
     let mut posterior = body.clone();
     posterior.as_object_mut().unwrap().remove("vary");
     posterior["kernel"] = all["kernel"].clone();
@@ -153,7 +153,7 @@ async fn selection_finds_the_axes_that_do_not_matter() {
         server.post("/v1/posterior", &posterior).await.expect_ok()["log_marginal_likelihood"].as_f64();
     let score = all["score"].as_f64().unwrap();
     assert!((likelihood.unwrap() - score).abs() < 1e-8 * score.abs());
-    // Axis by axis it is the same search, with a slope for each.
+    // The search axis by axis is the same, with a slope for each.
     body["vary"] = json!([
         {"parameter": "length_scales", "axis": 0, "min": 0.05, "max": 50.0},
         {"parameter": "length_scales", "axis": 1, "min": 0.05, "max": 50.0},
@@ -164,7 +164,7 @@ async fn selection_finds_the_axes_that_do_not_matter() {
     let each = server.post("/v1/model-selection", &body).await.expect_ok();
     assert!((each["score"].as_f64().unwrap() - score).abs() < 1e-6 * score.abs());
     assert_eq!(each["gradient"].as_array().unwrap().len(), 5);
-    // Without `vary`, what the start has is what is searched.
+    // Without `vary`, the parameters of the starting kernel are searched.
     body.as_object_mut().unwrap().remove("vary");
     body["kernel"] = all["kernel"].clone();
     let on = server.post("/v1/model-selection", &body).await.expect_ok();

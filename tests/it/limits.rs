@@ -1,4 +1,4 @@
-//! Limits of size, time, place and access: each has its problem, and the server goes on.
+//! Limits of size, time and queue: each has its problem, and the server keeps answering.
 
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -8,7 +8,7 @@ use crate::contract::{self, Received};
 use crate::routes::{ROUTES, route_of};
 use crate::support::{Server, fibonacci_sphere};
 
-/// A request that takes seconds on any machine.
+/// Returns a request that takes seconds on any machine.
 pub fn slow_request() -> Value {
     let points = fibonacci_sphere(12_000);
     json!({
@@ -30,7 +30,7 @@ async fn bodies_beyond_the_limit_are_refused_when_announced() {
         assert_eq!((&problem["limit"], &problem["required"]), (&json!(4000), &json!(4001)));
         server.post_text(route.path, fits).await.expect_ok();
     }
-    // More than sockets buffer: the client is still sending when the server knows.
+    // More than sockets buffer, so the client is still sending when the server refuses.
     let body = " ".repeat(20 << 20);
     let problem = server.post_text("/v1/clouds", body).await.expect_problem(413, "body-too-large");
     assert_eq!(problem["required"], 20 << 20);
@@ -113,7 +113,8 @@ async fn problems_beyond_the_limits_are_refused_with_limit_and_need() {
     refuses("/v1/clouds", json!({"points": fibonacci_sphere(21)}), "/points", 20, 21).await;
 }
 
-/// A row is counted, not kept: a batch of a million rows would otherwise take four times its body.
+/// Checks that rows beyond the limits are counted, not kept. A batch of a million rows would otherwise take
+/// four times its body.
 #[tokio::test]
 async fn lists_of_values_quantiles_and_sites_beyond_the_limits_are_refused() {
     let server = Server::with_flags(&["--max-points", "20"]).await;
@@ -160,14 +161,15 @@ async fn clouds_beyond_the_limit_of_the_dense_solver_are_registered_and_not_fact
     for route in &ROUTES {
         let mut body = route.with("/cloud", &points);
         if route.has_values {
-            // What the local solver has is not refused unless the dense one is asked for.
+            // Requests that the local solver can answer are refused only if they ask for the dense one.
             body["solver"] = json!("dense");
         }
         expect_refused(route.path, body.clone(), "/cloud/points").await;
         body["cloud"] = json!({"id": id});
         expect_refused(route.path, body, "/cloud/id").await;
         if route.has_geometry {
-            // The kernel of the values is no reason to factorize a surface that regressions serve.
+            // Asks for the dense solver, because local regressions would serve this surface, whatever the
+            // kernel of the values.
             let surface = json!({"cloud": {"id": id}, "solver": "dense"});
             expect_refused(route.path, route.with("/geometry", &surface), "/geometry/cloud/id").await;
         }
@@ -181,7 +183,7 @@ async fn clouds_beyond_the_limit_of_the_dense_solver_are_registered_and_not_fact
 #[tokio::test]
 async fn answers_beyond_the_limit_are_refused_before_they_are_computed() {
     let server = Server::with_flags(&["--max-response-bytes", "5000"]).await;
-    // 20 points and 20 queries: 25 bytes for each number.
+    // 20 points and 20 queries, with 25 bytes a number.
     for (path, member, value, required) in [
         ("/v1/laplace-beltrami/matrix", "alpha", json!(1e-8), 25 * 20 * 20),
         ("/v1/surface-gradient/matrix", "alpha", json!(1e-8), 25 * 3 * 20 * 20),
@@ -217,7 +219,7 @@ async fn an_answer_that_takes_too_long_is_given_up_and_others_go_on() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_full_queue_turns_requests_away_until_there_is_room() {
     for max_queue in [0, 1] {
-        // Late is not what is asked here, however busy the machine.
+        // The deadline is long, because lateness is not tested here, however busy the machine.
         let queue = max_queue.to_string();
         let flags = ["--threads", "1", "--max-queue", &queue, "--deadline-seconds", "600"];
         let server = Server::with_flags(&flags).await;
@@ -240,7 +242,7 @@ async fn a_full_queue_turns_requests_away_until_there_is_room() {
         for path in ["/health/live", "/version", "/v1/kernels", "/openapi.json"] {
             server.get(path).await.expect_ok();
         }
-        // Clients that leave give their places back.
+        // Clients that disconnect free their places.
         for request in slow {
             request.abort();
         }

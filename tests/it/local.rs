@@ -1,4 +1,4 @@
-//! Local regressions over sockets: surfaces, deviations, sparse operators, and what they refuse.
+//! Local regressions over HTTP: surfaces, deviations, sparse operators, and refusals.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// One curvature of 1 within so many of its deviations at every query.
+/// Checks that each mean curvature is 1 within `tolerance`, with a deviation between 0 and 0.1.
 fn check_unit_curvatures(answer: &Value, tolerance: f64) {
     let (found, deviations) =
         (numbers(&answer["mean_curvatures"]), numbers(&answer["mean_curvature_deviations"]));
@@ -24,7 +24,7 @@ async fn deviations_are_asked_for_by_name() {
     let points = fibonacci_sphere(500);
     let body = json!({"cloud": {"points": points}, "include": ["deviations"]});
     let answer = server.post("/v1/curvatures", &body).await.expect_ok();
-    // The spacing is 0.16; quadrics alone would be off by a per cent.
+    // The spacing is 0.16. Quadrics alone would be off by one per cent.
     check_unit_curvatures(&answer, 1e-2);
     assert_eq!(numbers(&answer["principal_curvature_deviations"]).len(), 1000);
     assert_eq!(numbers(&answer["gaussian_curvature_deviations"]).len(), 500);
@@ -60,7 +60,7 @@ async fn local_normals_point_outward_also_away_from_the_points() {
         assert!(cosine > 0.985, "{normal}");
     }
     assert_eq!(answer["degenerate"][0]["reason"], "far_from_cloud");
-    // 1 minus the height above the surface.
+    // The level is 1 minus the height above the surface.
     let levels = numbers(&answer["levels"]);
     assert!((levels[0] - 0.99).abs() < 1e-3 && (levels[2] - 1.01).abs() < 1e-3, "{levels:?}");
     let inward = json!({"orientation": "gradient"});
@@ -110,7 +110,7 @@ async fn sparse_matrices_agree_with_the_operators() {
     let applied = server.post("/v1/laplace-beltrami", &request).await.expect_ok();
     let deviations = numbers(&applied["value_deviations"]);
     let applied = numbers(&applied["values"]);
-    // The operator reaches π² + 2π, and six hundred points leave less than a hundredth of it.
+    // The operator reaches π² + 2π. With 600 points the deviations are below 1 % of that.
     let scale = PI * PI + 2.0 * PI;
     assert!(deviations.iter().all(|deviation| *deviation < 0.01 * scale), "{deviations:?}");
     for (row, expected) in applied.iter().enumerate() {
@@ -195,7 +195,7 @@ async fn what_local_regressions_lack_is_refused_by_name() {
 #[tokio::test]
 async fn surfaces_are_learned_where_it_is_said() {
     let server = Server::start().await;
-    // A sphere, and a rough one beside it.
+    // A smooth sphere, and a rough one beside it.
     let mut random = Random(4);
     let rough = fibonacci_sphere(1000).into_iter().map(|x| x.map(|c| c * (1.0 + 0.02 * random.normal())));
     let rough: Vec<_> = rough.map(|[x, y, z]| [x + 4.0, y, z]).collect();
@@ -225,7 +225,7 @@ async fn eight_equal_requests_make_one_surface() {
 async fn operators_of_noisy_values_have_bars_that_hold_whatever_the_solver() {
     let server = Server::start().await;
     let (points, mut random) = (fibonacci_sphere(2000), Random(7));
-    // Δz = −2z; noise of 2 % of the field.
+    // Δz = −2z, with noise of 2 % of the field.
     let values: Vec<f64> = points.iter().map(|x| x[2] + 0.012 * random.normal()).collect();
     let body = json!({
         "cloud": {"points": points}, "values": values, "solver": "local", "include": ["deviations"],
@@ -236,7 +236,7 @@ async fn operators_of_noisy_values_have_bars_that_hold_whatever_the_solver() {
     let off = |i: usize| (found[i] + 2.0 * points[i][2]).abs();
     let n_within = (0..2000).filter(|&i| off(i) <= 1.96 * bars[i]).count();
     assert!(n_within >= 1760, "{n_within} of 2000 within their bars");
-    // Stencils would be off by some hundred: they differentiate the noise.
+    // Stencils differentiate the noise, so they would be off by some hundred.
     assert!((0..2000).all(|i| off(i) < 0.5));
 }
 
@@ -275,7 +275,8 @@ async fn neighbourhoods_that_are_too_small_are_said_to_be() {
         let warnings = answer["diagnostics"]["warnings"].as_array().unwrap().clone();
         warnings.iter().any(|warning| warning["code"] == "neighbours_not_enough")
     };
-    // With noise as large as here, points beyond the nearest 128 still count; with little they screen all others.
+    // With noise this large, points beyond the nearest 128 still count. With little noise, the nearest screen
+    // all others.
     for (alpha, length_scale, expected) in [(1.0, 1.0, true), (1e-4, 0.1, false)] {
         assert_eq!(warned(alpha, length_scale).await, expected, "{alpha} {length_scale}");
     }

@@ -1,4 +1,4 @@
-//! What the process logs, and what it never does.
+//! The log: what the process logs, and what it must never log.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Command, Stdio};
@@ -91,7 +91,7 @@ async fn a_process_out_of_files_says_so_briefly_and_goes_on() {
     command.args(["-c", &format!("ulimit -n 60; exec {binary} --bind 127.0.0.1:0 --max-connections 1000")]);
     let process = Process::of(&mut command);
     let idle: Vec<_> = (0..200).map(|_| std::net::TcpStream::connect(process.address()).unwrap()).collect();
-    // Idle connections make room for it, one by one.
+    // Idle connections make room for this one.
     assert_eq!(get(&process, "/health/live").await.0, 200);
     drop(idle);
     assert_eq!(get(&process, "/health/ready").await.0, 200);
@@ -112,7 +112,7 @@ async fn nobody_waits_for_whoever_reads_the_log() {
     }
     let entry: Value = serde_json::from_str(&line).unwrap();
     let url = format!("http://{}/v1/kernels", entry["fields"]["address"].as_str().unwrap());
-    // Their lines are several times what a pipe holds, and more than wait.
+    // The lines exceed several times what a pipe holds, and also the queue of lines that may wait.
     let client = reqwest::Client::builder().timeout(Duration::from_secs(20)).build().unwrap();
     for _ in 0..6000 {
         assert_eq!(client.get(&url).send().await.unwrap().status(), 200);
@@ -121,7 +121,7 @@ async fn nobody_waits_for_whoever_reads_the_log() {
     let mut rest = String::new();
     log.read_to_string(&mut rest).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(0));
-    // What is there is whole lines, in their order.
+    // The lines that were written are whole, in their order.
     assert!(rest.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()));
     assert!(rest.contains("/v1/kernels"));
 }

@@ -1,6 +1,6 @@
-//! The service over real sockets.
+//! Tests of the service over real sockets.
 
-// These threads are no pool's.
+// The lint keeps locks and waits off the threads of pools. The threads of tests belong to no pool.
 #![allow(clippy::disallowed_methods)]
 
 #[path = "../../numerics/tests/common/mod.rs"]

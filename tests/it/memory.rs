@@ -1,4 +1,4 @@
-//! How much memory a request takes. `tests/parsing.rs` has what bodies take to the byte.
+//! Memory that requests take. `tests/parsing.rs` checks that of bodies to the byte.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 use crate::process::Process;
 use crate::support::{fibonacci_sphere, receive};
 
-/// Half a gigabyte, as flags.
+/// Memory budget in bytes, half a gigabyte, and the flags that set it.
 const BUDGET: usize = 512 << 20;
 const SMALL: [&str; 4] = ["--threads", "2", "--memory-bytes", "536870912"];
 
-/// What the process may have in all: the budget, and a tenth for what the allocator keeps.
+/// Limit of resident memory in bytes: the budget, plus a tenth for what the allocator keeps.
 const LIMIT: u64 = (BUDGET + BUDGET / 10) as u64;
 
-/// A request that the server reads as it is; its answer is left unread.
+/// Sends a request as raw bytes, and leaves its answer unread.
 fn send(process: &Process, path: &str, head: &str, body: &[u8]) -> TcpStream {
     let mut stream = TcpStream::connect(process.address()).unwrap();
     write!(stream, "POST {path} HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\n{head}\r\n\r\n")
@@ -37,15 +37,15 @@ async fn answers_that_nobody_reads_are_within_the_budget() {
     let registered = reqwest::Client::new().post(process.url("/v1/clouds")).json(&cloud["cloud"]);
     let id = receive(registered).await.json().unwrap()["cloud_id"].clone();
     let body = json!({"cloud": {"id": id}, "kernel": cloud["kernel"], "alpha": 1e-8}).to_string();
-    // Each has an answer of 18 MB, or 54: more than the budget together. Some are refused, or wait.
+    // Each answer takes 18 or 54 MB, together more than the budget. Some requests are refused, or wait.
     let mut streams = Vec::new();
     for k in 0..24 {
         let path = ["/v1/laplace-beltrami/matrix", "/v1/surface-gradient/matrix"][k % 2];
         let head = format!("Accept: application/x-safetensors\r\nContent-Length: {}", body.len());
         streams.push(send(&process, path, &head, body.as_bytes()));
     }
-    // The first bytes of an answer are there: it was computed, and now waits for its reader. Which one comes first is open, and
-    // who finds no memory until the deadline is told so.
+    // The first bytes show that the answer was computed and waits for its reader. Answers come in any order,
+    // and a request that finds no memory until its deadline is refused.
     let is_computed = |stream: &mut TcpStream| {
         let mut first = [0; 12];
         stream.read_exact(&mut first).unwrap();
@@ -65,13 +65,13 @@ async fn answers_that_nobody_reads_are_within_the_budget() {
 async fn bodies_that_never_end_are_within_the_budget() {
     let process = Process::start(&[&SMALL[..], &["--body-seconds", "60"]].concat());
     let piece = vec![b' '; 7 << 20];
-    // Twenty bodies of 8 MB, all but their last bytes: twice what the part for bodies has.
+    // Twenty bodies of 8 MB without their last bytes: twice the part of the budget for bodies.
     let streams: Vec<_> = (0..20).filter_map(|_| {
         let mut stream = TcpStream::connect(process.address()).unwrap();
         stream.set_write_timeout(Some(std::time::Duration::from_secs(5))).unwrap();
         let head = "POST /v1/normals HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\nContent-Length: 8000000\r\n\r\n";
         stream.write_all(head.as_bytes()).unwrap();
-        // One that was refused is closed while it is sent.
+        // A refused connection is closed while the body is sent.
         stream.write_all(&piece).ok().map(|()| stream)
     }).collect();
     assert!(!streams.is_empty());
@@ -101,7 +101,8 @@ async fn what_takes_more_than_the_budget_is_refused_before_it_is_begun() {
 
 #[tokio::test]
 async fn each_factor_and_the_fallback_have_their_memory() {
-    // 6,000 points fit once: 144 MB of some 220. Neither a second factor nor all of the matrix fits as well.
+    // 6,000 points fit once, with 144 MB of some 220. Beside them, neither a second factor nor the full
+    // matrix fits.
     let n = 6000;
     let process = Process::start(&SMALL);
     let post = async |body: &Value| {
@@ -119,9 +120,9 @@ async fn each_factor_and_the_fallback_have_their_memory() {
     two["values"] = json!(vec![1.0; n]);
     two["geometry"] = json!({"kernel": {"family": "matern", "length_scale": 0.4}});
     let two = receive(reqwest::Client::new().post(process.url("/v1/surface-gradient")).json(&two)).await;
-    // Of the first factor, which is there, nothing is required.
+    // The first factor is cached, so it requires nothing.
     assert!(expect_refused(two) >= 4 * (n * n) as u64);
-    // Pairs that the kernel cannot tell apart: what is refused is the fallback, once Cholesky has failed.
+    // Pairs of points that the kernel cannot tell apart: Cholesky fails, and the fallback is refused.
     let mut pairs = request(n / 2);
     let points = fibonacci_sphere(n / 2);
     let moved = points.iter().map(|x| [x[0] + 1e-10, x[1], x[2]]);
@@ -145,7 +146,7 @@ async fn packed_bodies_are_served_whoever_shares_a_small_budget() {
 
 #[tokio::test]
 async fn equal_requests_wait_for_one_factor_and_not_for_memory_for_their_own() {
-    // There is memory for one factor of 6,000 points, and that of others is kept.
+    // There is memory for one factor of 6,000 points, while another factor is cached.
     let process = Process::start(&SMALL);
     let post = |body: &Value| reqwest::Client::new().post(process.url("/v1/normals")).json(body);
     assert_eq!(receive(post(&request(5900))).await.status, 200);
@@ -171,10 +172,12 @@ fn posterior(n: usize) -> Value {
     request
 }
 
-/// Bytes that a cold request adds to the idle process at its peak. Whatever its size it takes 34 to 80 MB on two threads:
-/// packing buffers of matrix products, two lanes of threads that each have their own, and pages that the allocator has begun.
+/// Returns the bytes that a cold request adds to the idle process at its peak.
+///
+/// On two threads 34 to 80 MB of them do not depend on its size. These are packing buffers of matrix
+/// products, which each thread of both lanes has, and pages that the allocator has begun.
 async fn peak(path: &str, request: &Value) -> f64 {
-    // Every thread has buffers of its own.
+    // Every thread has its own buffers.
     let server = Process::start(&["--threads", "2"]);
     let idle = server.peak_resident_bytes();
     let answer = receive(reqwest::Client::new().post(server.url(path)).json(request)).await;
@@ -188,10 +191,11 @@ async fn a_cold_factorization_takes_half_its_matrix_and_little_more() {
     let matrix = |n: usize| 8.0 * (n * n) as f64;
     for (path, of) in [("/v1/curvatures", request as fn(usize) -> Value), ("/v1/posterior", posterior)] {
         let at_small = peak(path, &of(small)).await;
-        // Beside other tests a thread may begin pages that it otherwise shares: what is needed is the least of two.
+        // Beside other tests a thread may begin pages that it otherwise shares. So the smaller of two runs
+        // counts.
         let at_large = peak(path, &of(large)).await.min(peak(path, &of(large)).await);
-        // What is paid once drops out of the difference, which is the cost of the points alone: half the matrix, and 18 MB of
-        // surface for 4,000 points more.
+        // One-time costs cancel in the difference, which is the cost of the points: half the matrix, plus 18
+        // MB of surface for 4,000 more points.
         let (grown, limit) = (at_large - at_small, 0.6 * (matrix(large) - matrix(small)));
         assert!(grown <= limit, "{path}: {grown} more bytes from {small} to {large} points, {limit} allowed");
         let limit = 0.75 * matrix(large);
@@ -223,7 +227,7 @@ async fn a_refused_body_takes_little_more_than_itself() {
         let answer = receive(request.header("content-type", media_type).body(body)).await;
         assert_eq!(answer.status, status, "{}", answer.text());
         let peak = server.peak_resident_bytes() - idle;
-        // What is being read and grows, what the allocator keeps of it, and what any request takes are in it too.
+        // The limit includes the growing buffer, what the allocator keeps of it, and what any request takes.
         assert!(peak <= 5 * N_BYTES as u64, "{peak} bytes at the peak for {N_BYTES} of {media_type}");
     }
 }

@@ -1,4 +1,4 @@
-//! What the service says of itself in numbers.
+//! Metrics of the service.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::routes::route_of;
 use crate::support::Server;
 
-/// Samples by name and labels, as they are written.
+/// Returns the samples by name and labels, as they are written.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
     let answer = server.get("/metrics").await;
     assert_eq!(
@@ -59,7 +59,7 @@ async fn requests_are_counted_by_route_and_never_by_what_clients_send() {
     assert_eq!(of(r#"gramian_cache_entries{part="clouds"}"#), 1.0);
     assert_eq!(of(r#"gramian_cache_evictions_total{part="clouds"}"#), 0.0);
     assert!(of(r#"gramian_memory_used_bytes{part="cache"}"#) > 0.0);
-    // The request for the metrics is the one under way.
+    // The request for the metrics is itself in flight.
     assert_eq!((of("gramian_http_requests_in_flight"), of("gramian_compute_admitted")), (1.0, 0.0));
     assert_eq!((of("gramian_queue_depth"), of("gramian_store_up_to_date")), (0.0, 1.0));
     assert!(of("process_resident_memory_bytes") > 1e6 && of("process_open_fds") > 3.0);
@@ -74,7 +74,7 @@ async fn who_leaves_is_counted_as_well() {
     let request = server.client.post(server.url("/v1/interpolation")).json(&body).send();
     let mut request = Box::pin(request);
     let in_flight = "gramian_http_requests_in_flight";
-    // Polled until it has come; the answer takes longer than that.
+    // Polled until the request has arrived. Its answer takes longer.
     while samples(&server).await[in_flight] < 2.0 {
         assert!(futures_util::poll!(&mut request).is_pending());
     }
@@ -115,7 +115,7 @@ async fn every_answer_about_a_cloud_names_it() {
     let inline =
         server.post("/v1/interpolation", &ask(json!({"points": [[0.0, 1.0], [1.0, 0.0], [0.5, 0.7]]}))).await;
     assert_eq!((by_id.header("gramian-cloud"), inline.header("gramian-cloud")), (&*id, &*id));
-    // What a client sends for the proxies comes back with refusals as well, unless it is no id.
+    // Refusals also return the cloud that a client names for proxies, unless it is not an id.
     for (sent, expected) in [(&*id, Some(&*id)), ("<script>", None)] {
         let request = server.client.post(server.url("/v1/interpolation")).header("gramian-cloud", sent);
         let request = request.header("content-type", "application/json").body("{");

@@ -1,11 +1,11 @@
-//! Values that contradict kernel and noise are answered with a warning.
+//! Warnings of misfit: values that contradict kernel and noise.
 
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// x₃ on the unit sphere with noise of 1 %, and one value that is off by this much.
+/// Returns a request with x₃ on the unit sphere, noise of 1 %, and one value off by `shift`.
 fn measured(n: usize, shift: f64) -> Value {
     let (points, mut random) = (fibonacci_sphere(n), Random(5));
     let mut values: Vec<f64> = points.iter().map(|x| x[2] + 0.01 * random.normal()).collect();
@@ -20,7 +20,7 @@ fn with(body: &Value, more: Value) -> Value {
     body
 }
 
-/// The details of the warnings of misfit.
+/// Returns the details of the misfit warnings.
 fn misfits(answer: &Value) -> Vec<String> {
     let warnings = answer["diagnostics"]["warnings"].as_array().unwrap();
     let of_misfit = warnings.iter().filter(|warning| warning["code"] == "misfit");
@@ -57,7 +57,8 @@ async fn one_wrong_value_is_named_whichever_solver_answers() {
 async fn a_place_that_no_kernel_explains_is_named_whichever_solver_answers() {
     let server = Server::start().await;
     let points = fibonacci_sphere(1000);
-    // Noise of 1 %, cosines of large angles, and a step along a great circle, none of whose values is far out.
+    // Noise of 1 % from cosines of large angles, and a step along a great circle. No single value is an
+    // outlier.
     let noise = |i: usize| 0.01 * 2f64.sqrt() * (12.9898 * (i as f64 + 2.0).powi(2)).cos();
     let across = |x: &[f64; 3]| x[0] + 0.3 * x[1];
     for height in [0.0, 1.0] {
@@ -78,7 +79,7 @@ async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     let server = Server::start().await;
     let given = json!({"kernel": {"family": "gauss", "length_scale": 1.0}, "alpha": 1e-8});
     let body = with(&measured(300, 0.0), given);
-    // Values of noise a hundred times that of alpha.
+    // The noise of the values is a hundred times the deviation that alpha implies.
     let means = server.post("/v1/interpolation", &body).await.expect_ok();
     assert_eq!(misfits(&means), Vec::<String>::new());
     let answer = server.post("/v1/posterior", &with(&body, json!({"include": ["variance"]}))).await;
@@ -86,7 +87,7 @@ async fn a_given_kernel_is_told_where_deviations_are_asked_for() {
     let fitting = with(&body, json!({"alpha": 1e-4, "include": ["variance"]}));
     let answer = server.post("/v1/posterior", &fitting).await.expect_ok();
     assert_eq!(misfits(&answer), Vec::<String>::new());
-    // Lists together, of which one is contradicted.
+    // A batch of two lists, of which one is contradicted.
     let (wrong, right) = (&measured(300, 1.0)["values"], &body["values"]);
     let lists = with(&fitting, json!({"values": [right, wrong]}));
     let answer = server.post("/v1/posterior/batch", &lists).await.expect_ok();

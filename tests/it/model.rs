@@ -1,4 +1,5 @@
-//! Random operations on clouds, factors and jobs, with restarts between them, against a simple model of what is there.
+//! Random operations on clouds, factors and jobs, with restarts, against a simple model of the expected
+//! state.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,19 +17,19 @@ const N_CLOUDS: usize = 12;
 const N_KERNELS: usize = 3;
 const KEYS: [&str; 2] = ["one", "other"];
 
-/// Operations between two restarts, in the mean.
+/// Mean number of operations between two restarts.
 const BETWEEN_RESTARTS: f64 = 500.0;
 
-/// Which cloud of which key.
+/// Indices of a key and of one of its clouds.
 type Owned = (usize, usize);
 
-/// What there should be.
+/// The expected state of the service.
 #[derive(Default)]
 struct Model {
     clouds: BTreeSet<Owned>,
-    /// Paths of jobs with whose they are, the cloud and the kernel, and whether the cloud was there when they were asked for.
+    /// Jobs by path, each with its key, cloud and kernel.
     jobs: BTreeMap<String, (Owned, usize)>,
-    /// Values of a cloud and a kernel, as they were answered first.
+    /// Values by cloud and kernel, as first answered.
     values: BTreeMap<(usize, usize), Value>,
 }
 
@@ -41,7 +42,7 @@ struct World {
     n_done: BTreeMap<&'static str, usize>,
 }
 
-/// Points that no other cloud has.
+/// Returns points that no other cloud has.
 fn points(cloud: usize) -> Value {
     let shift = cloud as f64;
     json!(fibonacci_sphere(6 + cloud).iter().map(|x| [x[0] + shift, x[1], x[2]]).collect::<Vec<_>>())
@@ -164,7 +165,7 @@ impl World {
         self.did("interpolate points");
     }
 
-    /// The same request has the same answer, to the last bit.
+    /// Checks an answer with values: equal requests have equal answers, to the last bit.
     fn check_values(&mut self, cloud: usize, kernel: usize, answer: &Received) {
         let document = answer.json().unwrap();
         assert_eq!(answer.status, 200, "{document}");
@@ -181,7 +182,7 @@ impl World {
         let answer = asked.header("prefer", "respond-async").json(&request).send().await.unwrap();
         assert_eq!(answer.status(), 202);
         let path = answer.headers()["location"].to_str().unwrap().to_owned();
-        // Its points are registered when it has run: from here on nobody knows when, so they are registered now.
+        // A job registers its points when it runs. Waiting for its result makes sure that this has happened.
         let registered = self.ask(owned.0, Method::GET, &format!("{path}/result"), None).await;
         assert_eq!(registered.status, 200, "{}", String::from_utf8_lossy(&registered.bytes));
         self.model.clouds.insert(owned);
@@ -221,7 +222,7 @@ impl World {
         self.model.jobs.iter().nth(index).map(|(path, job)| (path.clone(), *job))
     }
 
-    /// In order, or in the middle of whatever it does.
+    /// Restarts the process, after an orderly end or a kill in the middle of its work.
     fn restart(&mut self) {
         match self.below(2) {
             0 => self.process.terminate(),

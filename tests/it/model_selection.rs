@@ -1,11 +1,11 @@
-//! What explains values best, over the wire.
+//! Model selection over HTTP.
 
 use serde_json::{Value, json};
 
 use crate::common::random::Random;
 use crate::support::{Server, fibonacci_sphere, numbers};
 
-/// A noisy field on the unit sphere about an offset.
+/// Returns a request with a noisy field on the unit sphere, plus an offset of 3.
 fn measured(n: usize, noise: f64) -> Value {
     let (points, mut random) = (fibonacci_sphere(n), Random(n as u64));
     let values: Vec<f64> =
@@ -19,11 +19,11 @@ async fn the_likeliest_kernel_is_found_and_used() {
     let mut body = measured(150, 0.1);
     let answer = server.post("/v1/model-selection", &body).await.expect_ok();
     let noise = answer["alpha"].as_f64().unwrap().sqrt();
-    // 150 values less some ten functions tell a deviation to 6 %.
+    // 150 values less about ten functions determine a deviation to 6 %.
     assert!((0.08..0.125).contains(&noise), "{noise}");
     assert_eq!(answer["converged"], true);
     assert_eq!(answer["gradient"].as_array().unwrap().len(), 3);
-    // The score is the likelihood that the posterior has, and no other noise has more.
+    // The score is the likelihood of the posterior, and no other noise has a higher one.
     body["kernel"] = answer["kernel"].clone();
     body["mean"] = json!("constant");
     body["include"] = json!(["log_marginal_likelihood"]);
@@ -145,7 +145,7 @@ async fn what_no_kernel_explains_has_an_answer_or_a_reason() {
         body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         body
     };
-    // Nothing to explain, and squares that are none.
+    // Constant values, also such whose squares underflow.
     for size in [0.0, 5.0, 1e-165] {
         for criterion in ["generalized_cross_validation", "marginal_likelihood", "leave_one_out"] {
             let kernel = json!({"family": "gauss", "length_scale": 1.0});
@@ -155,7 +155,7 @@ async fn what_no_kernel_explains_has_an_answer_or_a_reason() {
     }
     let constant = with(&|_| 5.0, json!({"criterion": "generalized_cross_validation"}));
     server.post("/v1/model-selection", &constant).await.expect_ok();
-    // Variances at the bounds of what kernels take, and beyond.
+    // Variances at the bounds that kernels accept, and beyond.
     for size in [3e69, 3e-69] {
         let body = with(&|i| size * (i as f64).sin(), json!({}));
         server.post("/v1/model-selection", &body).await.expect_ok();
@@ -191,7 +191,7 @@ async fn bounds_that_meet_are_no_slope_and_noise_is_found_from_a_start_without()
     let mut body = measured(100, 0.3);
     body["kernel"] = json!({"family": "matern", "nu": 4.5, "length_scale": 1.0});
     body["mean"] = json!("constant");
-    // The default α is 1e-10 with a kernel given.
+    // With a given kernel the default α is 1e-10.
     let answer = server.post("/v1/model-selection", &body).await.expect_ok();
     let noise = answer["alpha"].as_f64().unwrap().sqrt();
     assert!((0.22..0.38).contains(&noise), "{noise}");
@@ -223,7 +223,7 @@ async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
         let refused = server.post("/v1/model-selection", &body).await.expect_problem(422, "invalid-request");
         assert_eq!(refused["errors"][0]["pointer"], pointer);
     }
-    // Where nu varies matern is tried, whatever the start.
+    // When nu varies, Matérn is searched, whatever the starting kernel.
     let mut varied = body.clone();
     varied["kernel"] = json!({"family": "gauss", "length_scale": 2.0});
     varied["vary"] = json!([{"parameter": "nu", "min": 0.5, "max": 2.5}]);
@@ -234,7 +234,7 @@ async fn too_many_points_and_too_much_that_is_free_are_refused_beforehand() {
     assert_eq!((&refused["limit"], &refused["required"]), (&json!(5000), &json!(5001)));
 }
 
-/// Smooth values without noise want matrices that are singular to rounding.
+/// Selects kernels for smooth values without noise, whose best matrices are singular to rounding.
 #[tokio::test]
 async fn what_is_selected_is_served_when_it_is_sent_back() {
     let server = Server::start().await;

@@ -1,4 +1,4 @@
-//! The committed OpenAPI document.
+//! The committed OpenAPI documents.
 
 use std::path::Path;
 
@@ -84,7 +84,7 @@ fn everything_is_described() {
 fn requests_refuse_unknown_fields() {
     let document = document();
     for (name, schema) in document["components"]["schemas"].as_object().unwrap() {
-        // An estimate has the members of whichever request is meant; that request refuses the rest.
+        // An estimate has the members of the request that it is about, and that request refuses the rest.
         let is_open = name == "EstimateRequest";
         if !is_open && name.ends_with("Request")
             || ["CloudRef", "Kernel", "Geometry"].contains(&name.as_str())

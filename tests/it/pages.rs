@@ -1,4 +1,4 @@
-//! What the process says of itself: pages of problems, health, version, documents.
+//! Pages and probes of the process: problems, health, version, documents.
 
 use gramian::http::problem::slug::Slug;
 use serde_json::{Value, json};
@@ -16,7 +16,7 @@ async fn every_type_of_problem_has_a_page() {
         assert!(page.text.contains(slug.as_str()) && page.text.contains(slug.title()), "{}", page.text);
         assert!(page.text.contains(slug.status().as_str()));
     }
-    // The names of the contract that this version has; none may go or change.
+    // Slugs of the contract in this version. None may be removed or renamed.
     for slug in [
         "malformed-json invalid-request invalid-cloud duplicate-points dimension-mismatch length-mismatch",
         "kernel-not-smooth kernel-not-positive-definite not-positive-definite unsupported-by-solver unknown-cloud not-found",
@@ -75,7 +75,7 @@ async fn the_process_describes_itself() {
     }
 }
 
-/// The values of all `src` and `href` attributes of a page.
+/// Returns the values of all `src` and `href` attributes of a page.
 fn sources(page: &Answer) -> Vec<String> {
     let mut found = Vec::new();
     for attribute in ["src=", "href="] {

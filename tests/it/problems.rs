@@ -1,4 +1,4 @@
-//! Bodies that do not have the documented form: each gets its problem with a pointer, and the server answers on.
+//! Bodies without the documented form: each is refused with a pointer, and the server keeps answering.
 
 use serde_json::{Value, json};
 

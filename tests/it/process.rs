@@ -1,4 +1,4 @@
-//! The binary itself, as a process of its own.
+//! The binary, run as a separate process.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::support::{fibonacci_sphere, receive};
 
-/// The binary, serving on a port of its own; killed when dropped.
+/// A running binary on a free port, killed when dropped.
 pub struct Process {
     pub child: Child,
     address: String,
@@ -17,7 +17,7 @@ pub struct Process {
     reader: Option<JoinHandle<()>>,
 }
 
-/// The binary without the settings of whoever runs the tests.
+/// Returns the binary as a command, without the settings in the environment of the tests.
 pub fn gramian() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gramian"));
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("GRAMIAN_") || name == "RUST_LOG") {
@@ -56,12 +56,12 @@ impl Process {
         format!("http://{}{path}", self.address)
     }
 
-    /// Where it listens.
+    /// Returns the address on which the process listens.
     pub fn address(&self) -> &str {
         &self.address
     }
 
-    /// The most memory it ever had.
+    /// Returns the peak resident memory.
     pub fn peak_resident_bytes(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
         let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
@@ -69,7 +69,7 @@ impl Process {
         kibibytes << 10
     }
 
-    /// Waits until it has logged a line with this text.
+    /// Waits until the process has logged a line with this text.
     pub async fn has_logged(&self, text: &str) {
         while !self.lines.lock().unwrap().iter().any(|line| line.contains(text)) {
             tokio::task::yield_now().await;
@@ -81,7 +81,7 @@ impl Process {
         assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
     }
 
-    /// Waits for its end; answers with its status and everything it logged.
+    /// Waits for the end of the process, and returns its status and its whole log.
     pub fn finish(mut self) -> (ExitStatus, Vec<String>) {
         let status = self.child.wait().unwrap();
         self.reader.take().unwrap().join().unwrap();
@@ -96,7 +96,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // Both fail if it has ended, which is as well.
+        // Both fail if the process has already ended, which is fine.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -113,7 +113,7 @@ pub fn curvatures(n: usize) -> Value {
     json!({"cloud": {"points": points}, "kernel": kernel, "alpha": 1e-6, "queries": points[..1]})
 }
 
-/// The fields of the first log line that has this text.
+/// Returns the fields of the first log line with this text.
 pub fn logged(lines: &[String], text: &str) -> Value {
     let line =
         lines.iter().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text}: {lines:#?}"));

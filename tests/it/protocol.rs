@@ -1,4 +1,4 @@
-//! What HTTP itself asks for: paths, methods, media types, request ids.
+//! Basics of HTTP: paths, methods, media types, request ids.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -76,7 +76,7 @@ async fn answers_come_as_what_there_is_or_not_at_all() {
     }
 }
 
-/// The media types of an answer, as generated clients accept them.
+/// Returns the media types of an answer, as generated clients accept them.
 fn media_types(response: &Value) -> Vec<&str> {
     response["content"]
         .as_object()
@@ -133,7 +133,7 @@ async fn what_generated_clients_accept_is_acceptable() {
                 }
                 let answer = server.send(request).await;
                 assert!(answer.status < 300, "{name}: {method} {path} with {accept}: {}", answer.text);
-                // The next operation finds it again.
+                // The next operation needs the cloud again, which this one may have deleted.
                 register_a_cloud(&server).await;
             }
         }
@@ -163,7 +163,7 @@ async fn a_problem_is_acceptable_whatever_the_client_accepts() {
             assert_eq!(server.send(request).await.status, 404, "{method} {accept}");
         }
     }
-    // Where success would have a body, the client is told that it cannot have it.
+    // Where success would have a body, the client is told that it does not accept it.
     let both = "application/json, application/problem+json";
     for (accept, status, slug) in
         [("application/problem+json", 406, "not-acceptable"), (both, 404, "unknown-cloud")]

@@ -1,4 +1,4 @@
-//! Requests of the documented form that do not fit together: points, lengths, dimensions, names of clouds.
+//! Well-formed requests whose parts do not fit together: points, lengths, dimensions, cloud ids.
 
 use serde_json::json;
 
@@ -35,7 +35,7 @@ async fn one_point_has_values_and_a_degenerate_geometry() {
             }
             let answer = server.post(route.path, &request).await.expect_ok();
             if route.is_geometry() {
-                // The signature function has its maximum at the point: no normal there.
+                // The signature function has its maximum at the point, so there is no normal.
                 assert_eq!(answer["degenerate"][0]["query"], 0, "{}", route.path);
                 assert_eq!(answer["degenerate"][0]["reason"], "vanishing_gradient");
             } else {
@@ -68,7 +68,7 @@ async fn entries_that_are_not_one_per_point_are_refused() {
                 let body = route.with("/values", &json!(vec![1.0; length]));
                 route.refuses(&server, &body, 422, "length-mismatch", "/values").await;
             }
-            // Empty lists of what is optional count as absent.
+            // Empty lists of optional members count as absent.
             if length == 0 {
                 continue;
             }
@@ -99,7 +99,7 @@ async fn empty_normals_and_variances_count_as_absent() {
             request["geometry"] = json!({"noise_variances": [], "cloud": {"id": id, "normals": []}});
         }
         assert_eq!(server.post(route.path, &request).await.expect_ok(), plain, "{}", route.path);
-        // Rows without coordinates are no empty list.
+        // Rows without coordinates are not an empty list.
         let body = route.with("/cloud/normals", &json!([[], []]));
         route.refuses(&server, &body, 422, "invalid-cloud", "/cloud/normals").await;
     }

@@ -1,4 +1,4 @@
-//! The routes that compute, with a request that each of them answers.
+//! Routes that compute, each with a request that it answers.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::support::{Answer, Server, fibonacci_sphere};
 
 pub const N_POINTS: usize = 20;
 
-/// A route that computes, with what its request may have.
+/// A route that computes, with the optional parts of its request.
 pub struct Route {
     pub path: &'static str,
     pub has_values: bool,
@@ -29,12 +29,12 @@ pub const ROUTES: [Route; 8] = [
 ];
 
 impl Route {
-    /// Normals, curvatures and operators, of a surface all.
+    /// Returns whether the route is about a surface: normals, curvatures or operators.
     pub fn is_geometry(&self) -> bool {
         self.has_geometry || !self.has_values
     }
 
-    /// A request that the route answers.
+    /// Returns a request that the route answers.
     pub fn request(&self) -> Value {
         let mut request = json!({
             "cloud": {"points": fibonacci_sphere(N_POINTS)},
@@ -47,7 +47,7 @@ impl Route {
         request
     }
 
-    /// That request with one member set, or removed where `value` is `"absent"`.
+    /// Returns the request with one member set, or removed if `value` is `"absent"`.
     pub fn with(&self, pointer: &str, value: &Value) -> Value {
         let mut request = self.request();
         let (parent, name) = pointer.rsplit_once('/').unwrap();
@@ -62,7 +62,7 @@ impl Route {
         request
     }
 
-    /// Sends a body that must be refused for one field, then one that must not. Answers with the problem.
+    /// Sends a body that must be refused for one field, then a good one. Returns the problem.
     pub async fn refuses(&self, server: &Server, body: &Value, status: u16, slug: &str, at: &str) -> Value {
         let problem = self.refuses_text(server, &body.to_string(), status, slug).await;
         assert_eq!(problem["errors"][0]["pointer"], at, "{}: {problem}", self.path);
@@ -70,7 +70,7 @@ impl Route {
         problem
     }
 
-    /// The same for a body as it is, whatever the problem points to.
+    /// Sends a text that must be refused, then a good body. Returns the problem, which may point anywhere.
     pub async fn refuses_text(&self, server: &Server, body: &str, status: u16, slug: &str) -> Value {
         let shown = |answer: &Answer| format!("{} {:.300} -> {}", self.path, body, answer.text);
         let answer = server.post_text(self.path, body.to_owned()).await;
@@ -82,12 +82,12 @@ impl Route {
     }
 }
 
-/// The route of that path.
+/// Returns the route with this path.
 pub fn route_of(path: &str) -> &'static Route {
     ROUTES.iter().find(|route| route.path == path).unwrap()
 }
 
-/// n points of dimension d in the unit cube: multiples of square roots, without their integer parts.
+/// Returns `n` points of dimension `d` in the unit cube: fractional parts of multiples of square roots.
 pub fn lattice(n: usize, d: usize) -> Vec<Vec<f64>> {
     let coordinate = |i: usize, k: usize| (i as f64 * (k as f64 + 2.0).sqrt()).fract();
     (0..n).map(|i| (0..d).map(|k| coordinate(i + 1, k)).collect()).collect()

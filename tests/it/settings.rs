@@ -1,4 +1,4 @@
-//! Settings of the process: variables, flags, and what is refused.
+//! Settings of the process: variables, flags and refusals.
 
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
@@ -104,7 +104,7 @@ fn a_setting_that_makes_no_sense_ends_the_process_with_its_name() {
         ("CORS_ORIGINS", "a.example"),
     ];
     for (name, value) in never.into_iter().chain(counts).chain(seconds).chain(blank).chain(lists) {
-        // On a port of its own, should it start after all.
+        // On a free port, in case the process starts after all.
         let mut command = gramian();
         command.env("GRAMIAN_BIND", "127.0.0.1:0").env(format!("GRAMIAN_{name}"), value);
         let mut child = command.stderr(Stdio::piped()).spawn().unwrap();

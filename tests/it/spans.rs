@@ -1,4 +1,4 @@
-//! Spans, as a collector is sent them.
+//! Spans, as a collector receives them.
 
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -9,7 +9,7 @@ use crate::support::fibonacci_sphere;
 
 const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
 
-/// What a collector of spans is sent.
+/// Returns the request that a collector of spans receives.
 async fn collected(listener: TcpListener) -> Vec<u8> {
     let (mut socket, _) = listener.accept().await.unwrap();
     let mut bytes = Vec::new();
@@ -29,7 +29,7 @@ async fn collected(listener: TcpListener) -> Vec<u8> {
     bytes
 }
 
-/// A process whose spans come to the listener, all of them when it ends.
+/// Starts a process that sends its spans to the listener, all of them at its end.
 async fn traced() -> (Process, TcpListener) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let endpoint = format!("http://{}", listener.local_addr().unwrap());
@@ -38,7 +38,7 @@ async fn traced() -> (Process, TcpListener) {
     (Process::of(command.env("OTEL_BSP_SCHEDULE_DELAY", "3600000")), listener)
 }
 
-/// Ends the process; answers with the spans that it had, and its log.
+/// Ends the process, and returns the spans that it sent and its log.
 async fn ended(process: Process, listener: TcpListener) -> (Vec<u8>, Vec<String>) {
     let sent = tokio::spawn(collected(listener));
     process.terminate();
@@ -59,7 +59,7 @@ async fn requests_are_spans_in_the_traces_of_their_clients() {
     let request = reqwest::Client::new().get(process.url("/v1/kernels"));
     let request = request.header("traceparent", format!("00-{TRACE}-00f067aa0ba902b7-01"));
     assert_eq!(request.header("x-request-id", "traced-1").send().await.unwrap().status(), 200);
-    // What has not been sent is sent when the process ends.
+    // Unsent spans are sent when the process ends.
     let (sent, lines) = ended(process, listener).await;
     assert_eq!(logged(&lines, "GET /v1/kernels 200")["trace_id"], TRACE);
     for bytes in [&b"POST /v1/traces "[..], b"GET /v1/kernels", &trace_bytes(), b"traced-1"] {
@@ -67,7 +67,7 @@ async fn requests_are_spans_in_the_traces_of_their_clients() {
     }
 }
 
-/// Has a job done; answers with its id.
+/// Runs a job to its end, and returns its id.
 async fn job(process: &Process, headers: &[(&str, &str)]) -> String {
     let client = reqwest::Client::new();
     let mut request = client.post(process.url("/v1/normals")).header("prefer", "respond-async");
@@ -89,7 +89,7 @@ async fn work_on_a_job_is_a_span_in_the_trace_of_who_asked_for_it() {
     let (sent, lines) = ended(process, listener).await;
     assert_eq!(logged(&lines, &format!("job {id} 200"))["trace_id"], TRACE);
     assert_eq!(logged(&lines, "POST /v1/normals 202")["trace_id"], TRACE);
-    // The request's and the work's, each of which has a name and the id of its trace.
+    // One span of the request and one of the work, each with a name and the id of its trace.
     assert_eq!(count(&sent, &trace_bytes()), 2, "{sent:?}");
     assert_eq!(count(&sent, b"job /v1/normals"), 1);
     assert!(count(&sent, id.as_bytes()) > 0);

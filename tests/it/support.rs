@@ -1,4 +1,4 @@
-//! A server under test and a client for it.
+//! A server under test, and a client for it.
 
 use std::net::SocketAddr;
 
@@ -14,7 +14,7 @@ use tokio::sync::oneshot;
 use crate::common::clouds;
 use crate::contract::{self, Received};
 
-/// A server on a port of its own, in this process; it drains when dropped.
+/// A server in this process, on a free port. Drains when dropped.
 pub struct Server {
     pub address: SocketAddr,
     pub client: reqwest::Client,
@@ -44,13 +44,13 @@ impl Answer {
         self.headers.get(name).map_or("", |value| value.to_str().unwrap())
     }
 
-    /// The answer of a request that must have succeeded.
+    /// Returns the body of an answer that must be a success.
     pub fn expect_ok(self) -> Value {
         assert_eq!(self.status, 200, "{}", self.text);
         self.json()
     }
 
-    /// The document of a problem, checked for what every problem has.
+    /// Returns the document of a problem, checked for what every problem has.
     pub fn expect_problem(&self, status: u16, slug: &str) -> Value {
         let document = self.json();
         assert_eq!(
@@ -101,8 +101,8 @@ impl Server {
         self.send(self.client.post(self.url(path)).json(body)).await
     }
 
-    /// A body that begins and never ends: these are the further lines of the head, and the bytes that come. Answers with what
-    /// came before the server closed the connection.
+    /// Posts a body that begins and never ends. `head` holds further lines of the head, and `body` the bytes
+    /// that are sent. Returns the answer, read until the server closes the connection.
     pub async fn post_stalled(&self, path: &str, head: &str, body: &str) -> Received {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         let request = format!(
@@ -116,14 +116,14 @@ impl Server {
         answer
     }
 
-    /// A body as it is, announced as JSON.
+    /// Posts a body as it is, declared as JSON.
     pub async fn post_text(&self, path: &str, body: impl Into<reqwest::Body>) -> Answer {
         let request = self.client.post(self.url(path)).header("content-type", "application/json");
         self.send(request.body(body)).await
     }
 }
 
-/// Sends a request, reads its answer to the end, and checks that the document promises it.
+/// Sends a request, reads its answer to the end, and checks it against the OpenAPI document.
 pub async fn receive(request: reqwest::RequestBuilder) -> Received {
     let (client, request) = request.build_split();
     let request = request.unwrap();
@@ -135,12 +135,12 @@ pub async fn receive(request: reqwest::RequestBuilder) -> Received {
     received
 }
 
-/// n points on the unit sphere as JSON has them.
+/// Returns `n` points on the unit sphere.
 pub fn fibonacci_sphere(n: usize) -> Vec<[f64; 3]> {
     clouds::rows(&clouds::fibonacci_sphere(n))
 }
 
-/// All numbers of nested arrays, in order; nulls are passed over.
+/// Returns all numbers of nested arrays, in order. Skips nulls.
 pub fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(items) => items.iter().flat_map(numbers).collect(),
@@ -150,12 +150,12 @@ pub fn numbers(value: &Value) -> Vec<f64> {
     }
 }
 
-/// Whether tests of committed files write them instead of comparing with them.
+/// Returns whether tests of committed files overwrite them instead of comparing.
 pub fn overwrites() -> bool {
     std::env::var("EXPECTORATE").is_ok_and(|value| value == "overwrite")
 }
 
-/// The document of this build.
+/// Returns the OpenAPI document of this build.
 pub fn document() -> Value {
     serde_json::from_str(&gramian::http::openapi_json()).unwrap()
 }

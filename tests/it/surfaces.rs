@@ -1,4 +1,5 @@
-//! Surfaces that are hard for the signature function: which function serves, what is flagged, and which side is outward.
+//! Surfaces that are hard for the signature function: which function serves them, what is flagged, and which
+//! side is outward.
 
 use std::f64::consts::PI;
 
@@ -10,7 +11,7 @@ fn points_of(cloud: &[[f64; 3]], map: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
     cloud.iter().map(|x| x.iter().map(|&c| map(c)).collect()).collect()
 }
 
-/// The grid of 16×16 points of z = (x² − y²)/2 over [−½, ½]², whose mean curvature vanishes at the origin.
+/// Returns the 16×16 grid of z = (x² − y²)/2 over [−½, ½]², whose mean curvature vanishes at the origin.
 fn saddle() -> Vec<[f64; 3]> {
     let at = |i: usize| i as f64 / 15.0 - 0.5;
     let point = |i: usize| {
@@ -20,11 +21,12 @@ fn saddle() -> Vec<[f64; 3]> {
     (0..256).map(point).collect()
 }
 
-/// `n` points of the paper's closed curve `(sin t, sin³t + ½ cos t)`, and outward normals, not of length 1.
+/// Returns `n` points of the paper's closed curve `(sin t, sin³t + ½ cos t)`, and outward normals of any
+/// length.
 fn closed_curve(n: usize) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
     let point = |i: usize| {
         let (s, c) = (2.0 * PI * i as f64 / n as f64).sin_cos();
-        // Clockwise: outward is left of the tangent.
+        // The curve runs clockwise, so outward is left of the tangent.
         ([s, s.powi(3) + 0.5 * c], [0.5 * s - 3.0 * s * s * c, c])
     };
     (0..n).map(point).unzip()
@@ -34,20 +36,20 @@ fn half_sphere() -> Vec<[f64; 3]> {
     fibonacci_sphere(400).into_iter().filter(|x| x[2] > 0.0).collect()
 }
 
-/// Codes of the warnings of diagnostics.
+/// Returns the codes of the warnings.
 fn codes(diagnostics: &Value) -> Vec<&str> {
     let warnings = diagnostics["warnings"].as_array().unwrap();
     warnings.iter().map(|warning| warning["code"].as_str().unwrap()).collect()
 }
 
-/// The words of a warning that must be there.
+/// Returns the detail of a warning that must be there.
 fn detail<'a>(diagnostics: &'a Value, code: &str) -> &'a str {
     let mut warnings = diagnostics["warnings"].as_array().unwrap().iter();
     let found = warnings.find(|warning| warning["code"] == code);
     found.unwrap_or_else(|| panic!("no {code}: {diagnostics}"))["detail"].as_str().unwrap()
 }
 
-/// Queries with a reason, all of which must be this one.
+/// Returns the flagged queries, all of which must have this reason.
 fn flagged(answer: &Value, reason: &str) -> Vec<u64> {
     let entry = |entry: &Value| {
         assert_eq!(entry["reason"], reason, "{entry}");
@@ -56,7 +58,7 @@ fn flagged(answer: &Value, reason: &str) -> Vec<u64> {
     answer["degenerate"].as_array().unwrap().iter().map(entry).collect()
 }
 
-/// Cosines of the normals with vectors of any length; no normal may be null.
+/// Returns the cosines between the normals and vectors of any length. No normal may be null.
 fn cosines<const D: usize>(answer: &Value, truth: &[[f64; D]]) -> Vec<f64> {
     let found = numbers(&answer["normals"]);
     assert_eq!(found.len(), D * truth.len());
@@ -108,7 +110,7 @@ async fn a_saddle_without_mean_curvature_is_served_by_the_offset_model() {
 #[tokio::test]
 async fn operators_live_on_the_surface_that_was_chosen() {
     let server = Server::start().await;
-    // Δx² at the origin of the saddle is 2: the tangent plane is horizontal there, and the mean curvature 0.
+    // Δx² is 2 at the origin of the saddle, where the tangent plane is horizontal and the mean curvature 0.
     let values: Vec<f64> = saddle().iter().map(|x| x[0] * x[0]).collect();
     let mut body = json!({
         "cloud": {"points": saddle()},
@@ -160,13 +162,13 @@ async fn outward_is_the_side_of_the_clients_normals() {
             let normals = server.post("/v1/normals", &body).await.expect_ok();
             assert_all_near(&cosines(&normals, &sphere), outward, 1e-3);
         }
-        // The gradient of the signature function points inward, whatever the client's normals do.
+        // The gradient of the signature function points inward, regardless of the client's normals.
         let body = json!({"cloud": cloud, "orientation": "gradient"});
         let answer = server.post("/v1/curvatures", &body).await.expect_ok();
         assert_all_near(&cosines(&answer, &sphere), -1.0, 1e-4);
         assert_all_near(&numbers(&answer["mean_curvatures"]), -1.0, 0.03);
     }
-    // And so for a cloud that is registered with its normals.
+    // Also for a cloud that is registered with its normals.
     let registered = server.post("/v1/clouds", &json!({"points": sphere, "normals": normals})).await.json();
     let body = json!({"cloud": {"id": registered["cloud_id"]}, "queries": [[0.0, 0.6, 0.8]]});
     let answer = server.post("/v1/normals", &body).await.expect_ok();
@@ -219,7 +221,7 @@ async fn flipped_signs_are_repaired_and_reported() {
     let along = cosines(&json!({"normals": normals}), &truth);
     assert_eq!(along.iter().filter(|&&cosine| cosine > 0.0).count(), n_flipped);
 
-    // A kernel as wide as the curve has nothing to repair.
+    // With a kernel as wide as the curve there is nothing to repair.
     body["kernel"]["length_scale"] = json!(0.5);
     let wide = server.post("/v1/normals", &body).await.expect_ok();
     assert!(!codes(&wide["diagnostics"]).contains(&"orientation_repaired"));
@@ -235,11 +237,11 @@ async fn curvatures_that_see_the_cusp_of_the_kernel_are_served_and_flagged() {
     let rough = server.post("/v1/curvatures", &body).await.expect_ok();
     assert_eq!(flagged(&rough, "kernel_too_rough"), (0..300).collect::<Vec<u64>>());
     assert_eq!(numbers(&rough["principal_curvatures"]).len(), 600);
-    // Wrong by factors: the flag is deserved.
+    // Wrong by factors, so the flag is justified.
     assert!(numbers(&rough["mean_curvatures"]).iter().all(|&mean| mean > 2.0));
     assert!(detail(&rough["diagnostics"], "kernel_too_rough").contains("epsilon"));
 
-    // Normals do not see it, and a rounder kernel has no cusp to see.
+    // The cusp does not affect normals, and a rounder kernel has none.
     let normals = server.post("/v1/normals", &body).await.expect_ok();
     assert_eq!((&normals["degenerate"], codes(&normals["diagnostics"]).len()), (&json!([]), 0));
     body["kernel"]["epsilon"] = json!(0.25);
@@ -248,7 +250,7 @@ async fn curvatures_that_see_the_cusp_of_the_kernel_are_served_and_flagged() {
     assert!(!codes(&smooth["diagnostics"]).contains(&"kernel_too_rough"));
     assert_all_near(&numbers(&smooth["mean_curvatures"]), 1.0, 0.01);
 
-    // The remedy is one for the kernel in question.
+    // The remedy suits the kernel in question.
     body["kernel"] = json!({"family": "matern", "nu": 0.5});
     body["queries"] = json!([[0.0, 0.606, 0.808]]);
     let rough = server.post("/v1/curvatures", &body).await.expect_ok();
@@ -287,7 +289,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
     let narrow = server.post("/v1/curvatures", &body).await.expect_ok();
     assert_eq!(flagged(&narrow, "under_resolved"), everything);
     assert_eq!(numbers(&narrow["principal_curvatures"]).len(), 80);
-    // Off by a fifth at least: the flag is deserved.
+    // Off by at least a fifth, so the flag is justified.
     assert!(numbers(&narrow["mean_curvatures"]).iter().all(|&mean| mean > 1.2));
     assert!(detail(&narrow["diagnostics"], "disagrees_with_neighbours").contains("40 of 40"));
 
@@ -312,7 +314,7 @@ async fn curvatures_that_the_neighbours_do_not_confirm_are_served_and_flagged() 
     }
     assert_eq!(server.post("/v1/normals", &body).await.expect_ok()["degenerate"], json!([]));
 
-    // What quadrics leave of a sphere of 40 points is too much to confirm anything by.
+    // With 40 points, quadrics fit a sphere too badly to confirm anything, so here are 100.
     body["cloud"]["points"] = json!(fibonacci_sphere(100));
     body["kernel"]["length_scale"] = json!(4.0);
     let wide = server.post("/v1/curvatures", &body).await.expect_ok();
@@ -340,7 +342,8 @@ async fn a_scan_has_normals_without_any_parameter() {
     assert!(quantile(0.5) <= 2.5, "median {}", quantile(0.5));
     assert!(quantile(0.95) <= 10.0, "95 % {}", quantile(0.95));
     assert!(quantile(1.0) < 90.0, "flipped {}", quantile(1.0));
-    // Ears, feet and folds, which regressions of 30 points do not know to 0.4 rad: a tenth.
+    // A tenth is flagged: ears, feet and folds, where regressions of 30 points do not know the normal to 0.4
+    // rad.
     assert!(8 * flagged(&exact, "under_resolved").len() <= points.len());
     assert_eq!(codes(&exact["diagnostics"]), ["disagrees_with_neighbours"]);
     assert_eq!(exact["diagnostics"]["kernel"]["family"], "laplace");
@@ -381,7 +384,7 @@ async fn merged_points_average_their_normals() {
         let answer = server.post("/v1/curvatures", &body).await.expect_ok();
         assert_eq!(answer["diagnostics"]["n_merged_duplicates"], 3);
         assert!(detail(&answer["diagnostics"], "duplicates_merged").contains('3'));
-        // Inward, as the client says.
+        // Inward, like the client's normals.
         assert_all_near(&cosines(&answer, &points), -1.0, 1e-3);
         assert_all_near(&numbers(&answer["mean_curvatures"]), -1.0, 0.03);
         assert_eq!(answer["normals"][3], answer["normals"][100]);
@@ -389,8 +392,8 @@ async fn merged_points_average_their_normals() {
     }
 }
 
-/// Far from the cloud a narrow kernel underflows: ∇u loses its digits before it vanishes, and with them its
-/// direction.
+/// Checks queries far from the cloud, where a narrow kernel underflows. ∇u loses its digits before it
+/// vanishes, and with them its direction.
 #[tokio::test]
 async fn gradients_below_the_least_normal_number_are_no_normals() {
     let server = Server::start().await;

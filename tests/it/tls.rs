@@ -1,4 +1,4 @@
-//! TLS, and certificates that change.
+//! TLS, and renewal of certificates.
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use crate::durable::Folder;
 use crate::process::{Process, gramian};
 
-/// A certificate for localhost with its key, as files.
+/// A certificate for localhost and its key, as files.
 struct Files {
     folder: Folder,
 }
@@ -27,7 +27,7 @@ impl Files {
         (files, certificate)
     }
 
-    /// Writes a new certificate over the one before.
+    /// Writes a new certificate and key over the previous ones.
     fn renew(&self) -> CertificateDer<'static> {
         let CertifiedKey { cert, signing_key } =
             generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
@@ -51,7 +51,7 @@ fn start(files: &Files) -> Process {
     Process::start(&flags.each_ref().map(String::as_str))
 }
 
-/// Shakes hands with whoever has this certificate.
+/// Completes a TLS handshake with a server that has this certificate.
 async fn connect(
     process: &Process,
     certificate: &CertificateDer<'static>,
@@ -69,7 +69,7 @@ async fn get(stream: &mut TlsStream<TcpStream>, path: &str) -> String {
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     stream.write_all(request.as_bytes()).await.unwrap();
     let mut answer = String::new();
-    // Whoever does not end with close_notify has been cut off.
+    // Fails if the server ends the connection without close_notify.
     stream.read_to_string(&mut answer).await.unwrap();
     answer
 }
@@ -87,7 +87,7 @@ async fn requests_are_answered_over_tls_and_nothing_else() {
     let request = axum::http::Request::get("https://localhost/health/live").body(()).unwrap();
     let (response, _) = client.send_request(request, true).unwrap();
     assert_eq!(response.await.unwrap().status(), 200);
-    // Whoever speaks in plain is not answered, and keeps nobody out.
+    // A client without TLS receives no answer, and does not block others.
     let mut plain = TcpStream::connect(process.address()).await.unwrap();
     plain.write_all(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
     let mut answer = Vec::new();
@@ -107,7 +107,7 @@ async fn a_renewed_certificate_is_taken_up_without_a_restart() {
     }
     assert!(connect(&process, &first, b"http/1.1").await.is_err());
     assert!(get(&mut under_way, "/health/live").await.starts_with("HTTP/1.1 200"));
-    // Half of a pair changes nothing.
+    // One invalid file of the pair changes nothing.
     fs::write(files.path("key"), "no key").unwrap();
     while !process.lines.lock().unwrap().iter().any(|line| line.contains("the certificate stays as it was")) {
         tokio::task::yield_now().await;
@@ -125,7 +125,7 @@ async fn the_probe_asks_over_tls_whatever_the_files_have() {
         command.output().unwrap()
     };
     assert!(probe(&files).status.success());
-    // The server goes on with what it has read.
+    // The server continues with the certificate that it has read.
     fs::write(files.path("certificate"), "half a certifi").unwrap();
     assert!(probe(&files).status.success());
     let in_plain = gramian().args(["--bind", process.address(), "health"]).output().unwrap();

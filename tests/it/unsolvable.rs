@@ -1,4 +1,4 @@
-//! Requests that fit together and have no answer all the same: coinciding points, kinks, matrices beyond float64.
+//! Consistent requests without an answer: coinciding points, kinks, matrices beyond float64.
 
 use serde_json::{Value, json};
 
@@ -141,8 +141,8 @@ async fn extreme_numbers_are_answered_or_refused_but_are_no_internal_error() {
     }
 }
 
-/// Answers about values, at every magnitude up to the end of float64: whatever has no number is a refusal
-/// with its remedy, alone and in lists.
+/// Sends values of every magnitude up to the end of float64, alone and in batches. If an answer has no
+/// number, the request must be refused with its remedy.
 #[tokio::test]
 async fn what_has_no_number_is_refused_and_is_never_null() {
     let server = Server::start().await;

@@ -1,4 +1,4 @@
-//! Values by the local solver: from the points nearest to each query.
+//! Values by the local solver, from the points nearest to each query.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::support::{Server, fibonacci_sphere, numbers};
 
 const ROUTES: [&str; 2] = ["/v1/interpolation", "/v1/posterior"];
 
-/// 200 points, more than a neighbourhood has, with values and queries.
+/// Returns a request with 200 points, more than a neighbourhood has, with values and queries.
 fn request(solver: &str) -> Value {
     let points = fibonacci_sphere(200);
     json!({
@@ -171,7 +171,7 @@ async fn duplicates_and_noise_are_taken_as_by_the_dense_solver() {
     assert_close(&local["values"], &dense["values"], 2e-2);
     assert_eq!(local["diagnostics"]["n_merged_duplicates"], 1);
     assert_eq!(local["diagnostics"]["warnings"][0]["code"], "duplicates_merged");
-    // With noise they are two observations, and noise may be the points' own.
+    // With noise, coinciding points are two observations. Noise may differ from point to point.
     let variances: Vec<f64> = (0..200).map(|i| 1e-3 + 1e-2 * f64::from(i % 3)).collect();
     for path in ROUTES {
         let noisy = |solver: &str| {

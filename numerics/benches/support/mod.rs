@@ -1,4 +1,4 @@
-//! What the benchmarks share: rounds and clouds.
+//! Rounds, clouds and stopwatches shared by the benchmarks.
 
 #![allow(dead_code, reason = "each benchmark takes what it needs")]
 #![allow(clippy::disallowed_methods, reason = "nothing waits for a stopwatch")]
@@ -13,17 +13,17 @@ use std::time::{Duration, Instant};
 use gramian_numerics::observer::{Observer, Stage};
 use gramian_numerics::points::cloud::Cloud;
 
-/// Rounds of a benchmark that runs by itself.
+/// Rounds of a benchmark without `--lockstep`.
 pub const ROUNDS: usize = 7;
 
-/// The parts of a round in the order of their measurement, each with its time.
+/// Parts of a round in the order of their measurement, each with its time.
 pub type Times = Vec<(&'static str, Duration)>;
 
 /// The least time of each part, in seconds.
 pub struct Bests(Vec<(&'static str, f64)>);
 
 impl Bests {
-    /// The best time of a part that was measured.
+    /// The best time of a measured part.
     pub fn seconds(&self, part: &str) -> f64 {
         self.0.iter().find(|entry| entry.0 == part).unwrap().1
     }
@@ -36,11 +36,11 @@ impl Bests {
     }
 }
 
-/// Runs [`ROUNDS`] rounds and answers with the best times.
+/// Runs [`ROUNDS`] rounds and returns the best times.
 ///
-/// With the argument `--lockstep` it runs a round for each line on standard input instead, prints it as lines
-/// `part<TAB>seconds<TAB>s` and an empty line, and answers `None` at the end: so that another process can measure a reference
-/// in turn, with warm memory on both sides.
+/// With the argument `--lockstep` it runs a round for each line on standard input instead. It prints each
+/// round as lines `part<TAB>seconds<TAB>s` and an empty line, and returns `None` at the end. Another process
+/// can then measure a reference in turn, with warm memory on both sides.
 pub fn measure(mut round: impl FnMut() -> Times) -> Option<Bests> {
     if !std::env::args().any(|argument| argument == "--lockstep") {
         let mut bests = Bests(Vec::new());
@@ -76,7 +76,7 @@ pub fn size_argument(default: usize) -> usize {
     std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(default)
 }
 
-/// What a piece of work answers, and its time.
+/// Runs a piece of work and returns its result and its time.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let began = Instant::now();
     let result = work();
@@ -88,9 +88,10 @@ pub fn scattered(n: usize, d: usize, seed: u64) -> Cloud {
     Cloud::new(random(n * d, seed), d).unwrap()
 }
 
-/// n numbers from 0 to 1 with 53 random bits, 17 digits most of them.
+/// n numbers in [0, 1) with 53 random bits.
 ///
-/// Not those of the tests: the counts of benches/instructions.tsv belong to these.
+/// The generator of the tests is not used, since the counts in
+/// benches/instructions.tsv depend on these numbers.
 pub fn random(n: usize, seed: u64) -> Vec<f64> {
     let mut state = seed;
     let mut next = || {
@@ -100,7 +101,7 @@ pub fn random(n: usize, seed: u64) -> Vec<f64> {
     (0..n).map(|_| next()).collect()
 }
 
-/// Time spent in each stage.
+/// An observer that notes when each stage begins.
 #[derive(Default)]
 pub struct Stopwatch(Mutex<Vec<(Stage, Instant)>>);
 
@@ -115,7 +116,7 @@ impl Observer for Stopwatch {
 }
 
 impl Stopwatch {
-    /// What a stage took; `end` is that of the last one.
+    /// Time from the beginning of a stage to that of the next, or to `end` for the last stage.
     pub fn time(&self, stage: Stage, end: Instant) -> Duration {
         let entries = self.0.lock().unwrap();
         let at = entries.iter().position(|entry| entry.0 == stage).unwrap();

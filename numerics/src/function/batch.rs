@@ -1,4 +1,4 @@
-//! Many functions on one cloud, that differ in their values alone.
+//! Batches of functions on one cloud that differ only in their values.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub struct Batch {
     pub solutions: Vec<Arc<Solution>>,
 }
 
-/// k functions at m queries.
+/// Jets of k functions at m queries.
 #[derive(Debug, Clone, Default)]
 pub struct BatchJets {
     /// `[k, m]`, unit V.
@@ -33,7 +33,7 @@ impl Batch {
     /// Fits k lists of values `[k, n]`, each with a mean of its own.
     ///
     /// # Errors
-    /// Those of [`Solution::of_each`].
+    /// Returns the errors of [`Solution::of_each`].
     pub fn fit(
         solver: Arc<Solver>,
         values: &[f64],
@@ -44,7 +44,7 @@ impl Batch {
         Ok(Self { solver, solutions: solutions.into_iter().map(Arc::new).collect() })
     }
 
-    /// The functions by themselves.
+    /// Iterates over the functions, each as an interpolant of its own.
     pub fn interpolants(&self) -> impl Iterator<Item = Interpolant> {
         let with = |solution: &Arc<Solution>| Interpolant {
             solver: self.solver.clone(),
@@ -53,10 +53,10 @@ impl Batch {
         self.solutions.iter().map(with)
     }
 
-    /// Evaluates all of them at queries `[m, d]`.
+    /// Evaluates all functions at queries `[m, d]`.
     ///
     /// # Errors
-    /// Those of [`Interpolant::at`].
+    /// Returns the errors of [`Interpolant::at`].
     pub fn at(
         &self,
         queries: &Cloud,
@@ -102,7 +102,7 @@ mod tests {
     use crate::sums::regularization::Regularization;
     use crate::testing::{all_families, fibonacci_sphere};
 
-    /// Three lists: of their own offset, zero, and large.
+    /// Three lists of n values: around 1000, all zero, and of magnitude 1e6.
     fn lists(n: usize) -> Vec<f64> {
         let list = |offset: f64, factor: f64| {
             (0..n).map(move |i| offset + factor * (0.37 * i as f64).sin()).collect::<Vec<f64>>()
@@ -126,7 +126,7 @@ mod tests {
                 for (at, list) in values.chunks_exact(n).enumerate() {
                     let alone = Interpolant::fit_with_mean(solver.clone(), list, mean, &Unobserved).unwrap();
                     let jets = alone.at(&queries, JetOrder::Value, &Unobserved).unwrap();
-                    // Sums of 300 terms in another order, and solves that differ in their last bits.
+                    // Sums of 300 terms run in another order, and solves differ in their last bits.
                     let size = list.iter().fold(0.0f64, |a, v| a.max(v.abs()));
                     let allowed = 1e-9 * size;
                     for (query, value) in jets.values().iter().enumerate() {

@@ -8,7 +8,7 @@ use crate::error::NumericsError;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-/// Standard deviations of a jet at m queries given the values.
+/// Posterior standard deviations of a jet at m queries.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JetDeviations {
     /// `[m]`, unit V.
@@ -17,17 +17,21 @@ pub struct JetDeviations {
     pub gradients: Vec<f64>,
     /// `[m, d, d]`, unit V/L²; empty unless asked for.
     pub hessians: Vec<f64>,
-    /// Queries, ascending, where rounding made a variance negative: the deviation is 0.
+    /// Queries, ascending, where rounding made a variance negative. Its deviation is 0.
     pub clamped: Vec<usize>,
 }
 
 impl JetDeviations {
-    /// Up to the derivatives of an order, 0 to 2; kernel and noise are `factor` times those of the solver.
+    /// Computes the deviations of the value and of derivatives up to `order`, 0 to 2.
+    ///
+    /// Kernel and noise are `factor` times those of the solver.
     ///
     /// # Errors
-    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, so that their variance is infinite;
-    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor; [`NumericsError::DimensionMismatch`],
-    /// [`NumericsError::KernelNotSmooth`], [`NumericsError::Cancelled`].
+    /// - [`NumericsError::DerivativesVary`] if the process has no such derivatives: their variance is
+    ///   infinite.
+    /// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
+    /// - [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`],
+    ///   [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub fn of(
         interpolant: &Interpolant,
         factor: f64,
@@ -53,7 +57,7 @@ impl JetDeviations {
         Ok(Self { clamped, ..Self::of_packed(&all, d, order) })
     }
 
-    /// From value, derivatives and upper triangle of the Hessian, query by query, as far as the order goes.
+    /// Unpacks deviations in the order of [`functionals`], each query in [`width`] numbers.
     pub(super) fn of_packed(found: &[f64], d: usize, order: usize) -> Self {
         let mut of = Self::default();
         for jet in found.chunks_exact(width(d, order)) {
@@ -68,7 +72,7 @@ impl JetDeviations {
         of
     }
 
-    /// For a kernel and noise that are `factor` times as great.
+    /// Returns the deviations for a kernel and noise that are `factor` times as large.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         let root = factor.sqrt();
@@ -79,12 +83,16 @@ impl JetDeviations {
     }
 }
 
-/// Functionals of a query: its value, derivatives, and the upper triangle of the Hessian, as far as the order goes.
+/// Functionals per query: the value, the d first derivatives, and the upper triangle of the Hessian.
+///
+/// Lower orders end earlier.
 fn width(d: usize, order: usize) -> usize {
     [1, 1 + d, 1 + d + d * (d + 1) / 2][order.min(2)]
 }
 
-/// These, query by query.
+/// Returns the functionals of each query: value, first derivatives, upper triangle of the Hessian.
+///
+/// The triangle is read row by row. Lower orders end earlier.
 fn functionals(queries: Range<usize>, d: usize, order: usize) -> Vec<JetFunctional> {
     let mut functionals = Vec::with_capacity(queries.len() * width(d, order));
     for query in queries {
@@ -104,7 +112,7 @@ fn functionals(queries: Range<usize>, d: usize, order: usize) -> Vec<JetFunction
     functionals
 }
 
-/// Where an entry of a symmetric matrix stands in its upper triangle, row by row.
+/// Returns the index of entry (a, b) of a symmetric matrix in its upper triangle, stored row by row.
 fn upper(a: usize, b: usize, d: usize) -> usize {
     let (row, column) = (a.min(b), a.max(b));
     row * d - row * (row + 1) / 2 + column

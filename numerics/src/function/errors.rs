@@ -1,7 +1,8 @@
-//! How far off linear functionals of a fitted function are, if the values come from another process than its kernel's.
+//! Errors of functionals of a fitted function, if the values come from another process than its kernel's.
 //!
-//! What is served is linear in the values, `F̂ = wᵀY` with `w = (K + N)⁻¹Fk(X)`. Had the function the covariance k̂ about the mean m̂ and the
-//! values the noise N̂, it would be off by `Fu − wᵀY`, whose mean square is
+//! The estimate is linear in the values: `F̂ = wᵀY` with `w = (K + N)⁻¹Fk(X)`. Suppose that the true function
+//! has covariance k̂ about the mean m̂, and that the values have the noise N̂. Then the error is `Fu − wᵀY`,
+//! with the mean square
 //! `FF′k̂ − 2wᵀFk̂(X) + wᵀ(K̂ + N̂)w + (Fm̂ − wᵀm̂(X))²`.
 
 use faer::MatMut;
@@ -19,17 +20,21 @@ use crate::solver::trend::Trend;
 use crate::sums::many::values_of_each;
 use crate::sums::regularization::Regularization;
 
-/// What values come from: covariance, variance of the noise, which where each point has its own is the least, and mean.
+/// The process that values come from: covariance, noise and mean.
 ///
-/// Covariance and noise are `factor` times those that are named, so that values of any size have numbers.
+/// The actual covariance and noise are `factor` times `kernel` and `noise`. This keeps the latter within
+/// float64 for values of any size.
 pub(crate) struct Process<'a> {
     pub(crate) kernel: &'a Kernel,
+    /// Variance of the noise. Where each point has its own, the least one.
     pub(crate) noise: f64,
     pub(crate) factor: f64,
     pub(crate) trend: Option<&'a Trend>,
 }
 
-/// Root mean square errors of functionals of a function, `[functionals]`, whose values come from a process that has their derivatives.
+/// Returns the root mean square errors of functionals of a fitted function, `[functionals]`, under a process.
+///
+/// The process must have the derivatives that the functionals use.
 ///
 /// # Errors
 /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -42,7 +47,7 @@ pub(crate) fn errors_under(
 ) -> Result<Vec<f64>, NumericsError> {
     let mut found = Vec::with_capacity(functionals.len());
     for block in functionals.chunks(JUDGED_AT_ONCE) {
-        // Of a size whose square has a number.
+        // Normalised so that squares do not overflow.
         let sizes: Vec<f64> = block.iter().map(|functional| functional.size(process.kernel)).collect();
         let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
         let errors = errors_of_block(process, interpolant, queries, &block, observer)?;
@@ -51,7 +56,7 @@ pub(crate) fn errors_under(
     Ok(found)
 }
 
-/// The same of as many as are held at once.
+/// Returns the root mean square errors of one block of functionals.
 fn errors_of_block(
     process: &Process<'_>,
     interpolant: &Interpolant,
@@ -84,14 +89,16 @@ fn errors_of_block(
             (Some(trend), Some(means)) => functional.of_mean(trend, queries) - dot(means, own),
             _ => 0.0,
         };
-        // Rounding may make it negative; what is no number stays none.
+        // Rounding may make the spread negative. NaN propagates.
         let spread = if spread < 0.0 { 0.0 } else { spread };
         (process.factor * (spread + of_noise) + bias * bias).sqrt()
     };
     Ok((0..functionals.len()).into_par_iter().map(error).collect())
 }
 
-/// w of each functional, `[functionals, n]`: what it weighs the values with, those that the mean is found from included.
+/// Returns w of each functional, its weights on the values: `[functionals, n]`.
+///
+/// If the function has a mean, w includes the estimate of its coefficients from the values.
 fn weights_on_values(
     interpolant: &Interpolant,
     queries: &Cloud,
@@ -141,7 +148,7 @@ mod tests {
         (queries, [of(0), of(1)].concat())
     }
 
-    /// Kriging is unbiased whatever the mean is, so that errors are its deviations, and those do not depend on the coefficients.
+    /// Kriging is unbiased whatever the coefficients of the mean are, so its errors are its deviations.
     #[test]
     fn under_its_own_process_errors_are_the_deviations() {
         let (queries, functionals) = functionals();
@@ -158,7 +165,7 @@ mod tests {
                 let of = (&*u.solver, &*u.solution, 1.0);
                 let expected = deviations(of, &queries, &functionals, &Unobserved).unwrap().found;
                 for ((a, b), functional) in found.iter().zip(&expected).zip(&functionals) {
-                    // Terms of the size of what is not known beforehand cancel to rounding.
+                    // Terms as large as the prior variance cancel, up to rounding.
                     let prior = functional.prior_variance(&kernel);
                     assert!((a * a - b * b).abs() <= 1e-11 * prior, "{family:?}, {mean:?}: {a} {b}");
                 }
@@ -179,7 +186,7 @@ mod tests {
         let untold = errors(100.0 * ALPHA, None);
         let about = errors(ALPHA, with_mean.solution.trend.as_ref());
         assert!(told.iter().zip(&untold).all(|(a, b)| b > a));
-        // The value far from all points goes to 0 instead of the mean, which is about 3.
+        // Far from all points u tends to 0 instead of the mean, which is about 3.
         assert!(about[0] > told[0], "{about:?} {told:?}");
     }
 }

@@ -1,7 +1,8 @@
-//! How sure linear functionals of a function's jet are: its value, derivatives, and operators at a query.
+//! Standard deviations of linear functionals of a jet: value, derivatives, and operators at a query.
 //!
-//! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, `F` of k(·, x_j) is its covariance with the value at x_j,
-//! and its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value (Rasmussen and Williams 2006, sec. 9.4).
+//! A functional is `Fu = c u + g·∇u + A : D²u`. For a process with covariance k, its covariance with the
+//! value at x_j is F applied to k(·, x_j). Its posterior variance is `FF'k − |L⁻¹Fk(X)|²`, as for a value
+//! (Rasmussen and Williams 2006, sec. 9.4).
 
 use faer::{ColRef, MatMut};
 use pulp::{Simd, WithSimd};
@@ -20,32 +21,33 @@ use crate::solver::{Solution, Solver};
 use crate::sums::jets::check_smooth_at;
 use crate::sums::nodes::Nodes;
 
-/// Functionals whose columns are held at once.
+/// Functionals whose columns `L⁻¹Fk(X)` are held at once.
 pub(crate) const FUNCTIONALS_PER_BLOCK: usize = 512;
 
-/// `c u + g·∇u + A : D²u` at a query.
+/// The functional `c u + g·∇u + A : D²u` at a query.
 #[derive(Debug, Clone)]
 pub(crate) struct JetFunctional {
     pub(crate) query: usize,
+    /// c.
     pub(crate) of_value: f64,
     /// g, `[d]`.
     pub(crate) of_gradient: Small,
-    /// A, symmetric `[d, d]`; empty for none.
+    /// A, symmetric `[d, d]`, or empty if it is 0.
     pub(crate) of_hessian: Small,
 }
 
 impl JetFunctional {
-    /// The value.
+    /// Returns the value as a functional.
     pub(crate) fn value(query: usize, dimension: usize) -> Self {
         Self { query, of_value: 1.0, of_gradient: zeros(dimension), of_hessian: Small::new() }
     }
 
-    /// The derivative along a vector.
+    /// Returns the derivative along a vector `[d]`.
     pub(crate) fn derivative(query: usize, along: &[f64]) -> Self {
         Self { query, of_value: 0.0, of_gradient: Small::from_slice(along), of_hessian: Small::new() }
     }
 
-    /// An entry of the Hessian.
+    /// Returns entry (a, b) of the Hessian as a functional.
     pub(crate) fn second_derivative(query: usize, dimension: usize, (a, b): (usize, usize)) -> Self {
         let mut of_hessian = zeros(dimension * dimension);
         of_hessian[a * dimension + b] += 0.5;
@@ -53,8 +55,10 @@ impl JetFunctional {
         Self { query, of_value: 0.0, of_gradient: zeros(dimension), of_hessian }
     }
 
-    /// The same of a function of the coordinates in units of the length scale, as the kernel stretches them: gradients get the factors of their
-    /// axes, Hessians those of both.
+    /// Returns the functional for coordinates in units of ℓ, stretched by the kernel.
+    ///
+    /// Axis a has the factor `f_a = s_a/ℓ`, with s_a the kernel's stretch. The result has `f_a g_a` and
+    /// `f_a f_b A_ab`.
     fn in_length_scales(&self, kernel: &Kernel) -> Self {
         let (mut found, d) = (self.clone(), self.of_gradient.len());
         let factor = |axis: usize| kernel.stretch(axis) / kernel.length_scale();
@@ -64,14 +68,16 @@ impl JetFunctional {
         found
     }
 
-    /// How large it is in units of the length scale, where the squares of what it finds may have no number; 1 for nothing.
+    /// Returns the largest coefficient in magnitude, in units of ℓ, or 1 if all are 0.
+    ///
+    /// Squares of a functional divided by its size do not overflow.
     pub(super) fn size(&self, kernel: &Kernel) -> f64 {
         let Self { of_value, of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
         let largest = of_gradient.iter().chain(&of_hessian).fold(of_value.abs(), |a, b| a.max(b.abs()));
         if largest > 0.0 { largest } else { 1.0 }
     }
 
-    /// That part of it.
+    /// Returns the functional divided by `size`.
     pub(super) fn over(&self, size: f64) -> Self {
         let mut found = self.clone();
         found.of_value /= size;
@@ -79,13 +85,15 @@ impl JetFunctional {
         found
     }
 
-    /// Of a mean.
+    /// Returns the functional applied to a mean.
     pub(super) fn of_mean(&self, trend: &Trend, queries: &Cloud) -> f64 {
         let value = if self.of_value == 0.0 { 0.0 } else { trend.at(queries.point(self.query)) };
         self.of_value * value + dot(&self.of_gradient, &trend.gradient())
     }
 
-    /// Of each function of a mean, at the query's place: they are linear.
+    /// Returns the functional applied to each function of a mean at the query's position x, `[p]`.
+    ///
+    /// These functions are linear, so A does not matter.
     pub(super) fn on_mean(&self, basis: &Basis, x: &[f64]) -> Vec<f64> {
         let mut functions = vec![0.0; basis.n_functions()];
         basis.at(x, &mut functions);
@@ -94,8 +102,10 @@ impl JetFunctional {
         functions
     }
 
-    /// Its coefficients on derivatives in units of the length scale: on those of first order, then on those of second, an upper triangle with entries
-    /// across counted for both of their places; on the value it has none.
+    /// Returns the coefficients on derivatives in units of ℓ. The coefficient c of the value is left out.
+    ///
+    /// First `[d]` for the gradient, then the upper triangle of the Hessian. Entries off the diagonal count
+    /// twice, once for each of their places.
     pub(super) fn coefficients(&self, kernel: &Kernel) -> Small {
         let Self { of_gradient, of_hessian, .. } = self.in_length_scales(kernel);
         let (mut coefficients, d) = (of_gradient, self.of_gradient.len());
@@ -117,8 +127,9 @@ impl JetFunctional {
         !self.of_hessian.is_empty()
     }
 
-    /// `sᵀAs` as a sum of products: the entries of A that are not 0, those across counted for both of their
-    /// places.
+    /// Returns `sᵀAs` as a sum of products, one for each nonzero entry of the upper triangle of A.
+    ///
+    /// Entries off the diagonal count twice, once for each of their places.
     fn form(&self) -> Vec<FormTerm> {
         let d = self.of_gradient.len();
         let entry = |a: usize, b: usize| self.of_hessian[a * d + b];
@@ -132,8 +143,11 @@ impl JetFunctional {
         self.of_hessian.iter().step_by(self.of_gradient.len() + 1).sum()
     }
 
-    /// `FF'k`: variances of jets are `vφ(0)` for the value, `−2vφ′(0)/ℓ²` for a derivative, `4vφ″(0)/ℓ⁴` times 3 for a second one and times
-    /// 1 for one across; value and second derivatives have the covariance `2vφ′(0)/ℓ²`.
+    /// Returns the prior variance `FF'k`.
+    ///
+    /// The variance of the value is `vφ(0)`, that of a first derivative `−2vφ′(0)/ℓ²`. The variance of a
+    /// second derivative is `12vφ″(0)/ℓ⁴` along one axis and `4vφ″(0)/ℓ⁴` for a mixed one. The value and a
+    /// second derivative along an axis have the covariance `2vφ′(0)/ℓ²`.
     pub(crate) fn prior_variance(&self, kernel: &Kernel) -> f64 {
         let Self { of_value, of_gradient, of_hessian, .. } = &self.in_length_scales(kernel);
         let [value, slope, bend] = kernel.profile_at_zero();
@@ -148,7 +162,7 @@ impl JetFunctional {
     }
 }
 
-/// `factor · s_a s_b`.
+/// The term `factor · s_a s_b` of a quadratic form.
 #[derive(Debug, Clone, Copy)]
 struct FormTerm {
     a: usize,
@@ -156,7 +170,7 @@ struct FormTerm {
     factor: f64,
 }
 
-/// Whether the process has the derivatives of some functionals at a point: their variance is finite.
+/// Returns whether the kernel's process has derivatives up to `order`, i.e. their variance is finite.
 pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
     match order {
         0 => true,
@@ -169,15 +183,20 @@ pub(crate) fn has_variance(kernel: &Kernel, order: usize) -> bool {
 pub(crate) struct Deviations {
     /// `[functionals]`
     pub(crate) found: Vec<f64>,
-    /// Functionals whose variance rounding made negative: their deviation is 0.
+    /// Functionals whose variance rounding made negative. Their deviation is 0.
     pub(crate) clamped: Vec<usize>,
 }
 
-/// Standard deviations of functionals given values at the points, for a kernel and noise that are `factor` times those of the solver.
+/// Returns the posterior standard deviations of functionals given the values at the points.
+///
+/// Kernel and noise are `factor` times those of the solver.
 ///
 /// # Errors
-/// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] at points of the cloud; [`NumericsError::NotPositiveDefinite`]
-/// without a Cholesky factor; [`NumericsError::Overflow`] where one has no number; [`NumericsError::Cancelled`].
+/// - [`NumericsError::DimensionMismatch`].
+/// - [`NumericsError::KernelNotSmooth`] for derivatives at points of the cloud.
+/// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
+/// - [`NumericsError::Overflow`] if a deviation is not finite.
+/// - [`NumericsError::Cancelled`].
 pub(crate) fn deviations(
     (solver, solution, factor): (&Solver, &Solution, f64),
     queries: &Cloud,
@@ -195,7 +214,7 @@ pub(crate) fn deviations(
     let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
     for block in functionals.chunks(FUNCTIONALS_PER_BLOCK) {
         observer.checkpoint()?;
-        // Of a size whose square has a number.
+        // Normalised so that squares do not overflow.
         let sizes: Vec<f64> = block.iter().map(|functional| functional.size(kernel)).collect();
         let block: Vec<JetFunctional> = block.iter().zip(&sizes).map(|(of, &size)| of.over(size)).collect();
         observer.enter(Stage::Evaluate);
@@ -211,7 +230,7 @@ pub(crate) fn deviations(
                 mean.product(&h, &h)
             });
             let variance = functional.prior_variance(kernel) - explained;
-            // What is no number stays none.
+            // NaN propagates.
             ((if variance < 0.0 { 0.0 } else { variance }) + unexplained.unwrap_or(0.0), variance < 0.0)
         };
         let variances = columns.par_chunks_exact(n).zip(&block).map(variance).collect::<Vec<_>>();
@@ -240,7 +259,9 @@ impl<'a> Covariant<'a> {
         Self { nodes: Nodes::of(cloud), kernel }
     }
 
-    /// `F k(·, x_j)` for all j, a column `[n]` for each functional; whether the kernel has the derivatives is for the caller to know.
+    /// Fills one column `[n]` per functional with `F k(·, x_j)` for all j.
+    ///
+    /// The caller ensures that the kernel has the derivatives.
     pub(crate) fn fill(&self, functionals: &[JetFunctional], queries: &Cloud, columns: &mut [f64]) {
         let Self { nodes, kernel } = self;
         columns.par_chunks_exact_mut(nodes.n_points()).zip(functionals).for_each(|(column, functional)| {
@@ -251,12 +272,15 @@ impl<'a> Covariant<'a> {
     }
 }
 
-/// `F k(·, x_j)` for all j: with s = (x − x_j)/ℓ, `v[cφ + 2φ′(g·s + tr A) + 4φ″ sᵀAs]`, s, g and A in units of ℓ, as the kernel stretches them.
+/// A pass that computes `F k(·, x_j)` for all j.
+///
+/// With s = (x − x_j)/ℓ it is `v[cφ + 2φ′(g·s + tr A) + 4φ″ sᵀAs]`. Here s, g and A are in units of ℓ,
+/// stretched by the kernel.
 struct Covariances<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
     functional: &'a JetFunctional,
-    /// Few terms for one entry of a Hessian, whatever the dimension.
+    /// The nonzero terms of `sᵀAs`: few for one entry of a Hessian, whatever the dimension.
     form: &'a [FormTerm],
     x: &'a [f64],
     column: &'a mut [f64],
@@ -287,7 +311,7 @@ impl WithSimd for Covariances<'_> {
     }
 }
 
-/// A block of a column.
+/// The pairs of one block of a column.
 struct CovariancePairs<'a, 'b, S> {
     simd: S,
     of: &'a Covariances<'b>,
@@ -327,7 +351,7 @@ impl<S: Simd> Pairs<S> for CovariancePairs<'_, '_, S> {
         let first = 2.0 * kernel.variance();
         let of_slopes = first * slope * (along + self.trace);
         let of_bends = (2.0 * first) * bend * form;
-        // φ″ may be as great as float64 has it where D is 0.
+        // At D = 0, φ″ may be as large as float64 allows.
         let jets = of_slopes + of_bends;
         let of_value = kernel.variance() * functional.of_value;
         value.mul_add(Pack::splat(self.simd, of_value), jets).store(self.out, at);

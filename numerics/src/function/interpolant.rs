@@ -1,4 +1,4 @@
-//! A function on space: the expansion whose weights solve the fit of some values.
+//! Functions on space: expansions whose weights solve the fit of some values.
 
 use std::sync::Arc;
 
@@ -9,7 +9,9 @@ use crate::solver::trend::Mean;
 use crate::solver::{Solution, Solver};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
 
-/// `u(x) = m(x) + Σ_j λ_j k(x, z_j)` over the centres of its solver, m its mean if it has one: interpolates the values at α = 0, regresses them at α > 0.
+/// A fitted function `u(x) = m(x) + Σ_j λ_j k(x, z_j)`: z_j are its solver's centres, m is its mean, if any.
+///
+/// It interpolates the values at α = 0 and regresses them at α > 0.
 #[derive(Clone)]
 pub struct Interpolant {
     pub solver: Arc<Solver>,
@@ -17,19 +19,19 @@ pub struct Interpolant {
 }
 
 impl Interpolant {
-    /// Fits values `[n]`, unit V.
+    /// Fits a function without a mean to values `[n]`, unit V.
     ///
     /// # Errors
-    /// Those of [`Solution::of`].
+    /// Returns the errors of [`Solution::of`].
     pub fn fit(solver: Arc<Solver>, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
         let solution = Arc::new(Solution::of(&solver, values, observer)?);
         Ok(Self { solver, solution })
     }
 
-    /// Fits values `[n]`, unit V, by a function with a mean.
+    /// Fits a function with a mean to values `[n]`, unit V.
     ///
     /// # Errors
-    /// Those of [`Solution::with_mean`].
+    /// Returns the errors of [`Solution::with_mean`].
     pub fn fit_with_mean(
         solver: Arc<Solver>,
         values: &[f64],
@@ -40,22 +42,25 @@ impl Interpolant {
         Ok(Self { solver, solution })
     }
 
-    /// Fits the constant 1: the paper's signature function u_X, whose level 1 is the surface (with α > 0, the level that is
-    /// the mean of u over the cloud). On closed clouds u > 1 inside while ℓ is not small against the features
-    /// (errata.md, 2 and 13).
+    /// Fits the constant 1, which gives the paper's signature function u_X.
+    ///
+    /// Its level 1 is the surface. With α > 0 the surface is the level equal to the mean of u over the cloud.
+    /// On closed clouds, u > 1 inside as long as ℓ is not small against the features (errata.md, 2 and 13).
     ///
     /// # Errors
-    /// Those of [`Solution::of`].
+    /// Returns the errors of [`Solution::of`].
     pub fn signature(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let ones = vec![1.0; solver.n_points()];
         Self::fit(solver, &ones, observer)
     }
 
-    /// Evaluates at queries `[m, d]`.
+    /// Evaluates the function and its derivatives up to `order` at queries `[m, d]`.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`]; [`NumericsError::KernelNotSmooth`] if derivatives are asked of a kernel with a
-    /// kink at a point of the cloud; [`NumericsError::Overflow`]; [`NumericsError::Cancelled`].
+    /// - [`NumericsError::DimensionMismatch`].
+    /// - [`NumericsError::KernelNotSmooth`] if derivatives are asked for at a point of the cloud and the
+    ///   kernel has a kink there.
+    /// - [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub fn at(
         &self,
         queries: &Cloud,

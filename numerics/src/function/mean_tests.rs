@@ -1,4 +1,4 @@
-//! A function with a mean against the equations of universal kriging, and functionals against differences.
+//! Tests of functions with a mean against universal kriging, and of functionals against differences.
 
 use std::sync::Arc;
 
@@ -36,7 +36,9 @@ fn matern(x: &[f64], y: &[f64]) -> f64 {
     2.0 * (1.0 + s + s * s / 3.0) * (-s).exp()
 }
 
-/// The saddle point system of universal kriging (Chilès and Delfiner 2012, eq. 3.20): mean and variance at a query.
+/// Returns mean and variance at a query from the saddle point system of universal kriging.
+///
+/// Source: Chilès and Delfiner 2012, eq. 3.20.
 fn kriged(values: &[f64], mean: Mean, query: &[f64]) -> [f64; 2] {
     let (n, p) = (values.len(), mean.n_functions(3));
     let cloud = fibonacci_sphere(n);
@@ -88,7 +90,7 @@ fn the_mean_is_found_whatever_the_offset_and_reported_in_coordinates() {
     let u = interpolant(Family::Gauss, &plane, Mean::Linear);
     let found = u.solution.trend.as_ref().unwrap().of_coordinates();
     let expected = [1e6, 2.0, 0.0, -0.5];
-    // Digits of values of a million.
+    // Rounding of values of size 1e6.
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
     let far = Cloud::new(vec![10.0, 20.0, -30.0], 3).unwrap();
     let jets = u.at(&far, JetOrder::Hessian, &Unobserved).unwrap();
@@ -140,7 +142,8 @@ fn deviations_of_derivatives_are_those_of_differences() {
             (slope[1 + 2 * axis], slope[2 + 2 * axis]) = (0.5 / h, -0.5 / h);
             (bend[0], bend[1 + 2 * axis], bend[2 + 2 * axis]) = (-2.0 / h / h, 1.0 / h / h, 1.0 / h / h);
             let (slope, bend) = (form(&slope), form(&bend));
-            // The step squared for derivatives that exist three times, the step itself where φ has but four.
+            // The error is of order h² where derivatives exist three times, and of order h where φ has only
+            // four.
             assert!((bars.gradients[axis] / slope - 1.0).abs() < 1e-4, "{family:?}");
             assert!(
                 (bars.hessians[4 * axis] / bend - 1.0).abs() < 5e-3,

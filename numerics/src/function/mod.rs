@@ -1,4 +1,4 @@
-//! What a solved system says as a function on space: its values, and how sure they are.
+//! Functions on space from a solved system: their values, derivatives and uncertainty.
 
 pub mod batch;
 pub mod deviations;

@@ -1,4 +1,4 @@
-//! Cholesky factorization with complete pivoting of a matrix that is there.
+//! Cholesky factorization with complete pivoting, for a matrix whose entries are all in memory.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -9,13 +9,14 @@ use crate::error::NumericsError;
 use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 
-/// Columns between two updates of the rest, and two looks at the observer.
+/// Columns per block. After each block the rest is updated and cancellation is checked.
 const COLUMNS_PER_BLOCK: usize = 64;
 
 /// The order and the number of the pivots of `PAPᵀ ≈ LLᵀ`.
 ///
-/// Blocks of columns are factorized one pivot after the other, and the rest is updated once for each block, as in LAPACK's `dpstrf` (Hammarling,
-/// Higham and Lucas 2007). faer has this factorization as well, but no way to stop it.
+/// Within a block, columns are factorized one pivot after the other. The rest is updated once per block, as
+/// in LAPACK's `dpstrf` (Hammarling, Higham and Lucas 2007). faer has this factorization too, but cannot be
+/// cancelled.
 pub(super) struct PivotedRoot {
     /// The row of A in each row of L, pivots first.
     pub(super) order: Vec<usize>,
@@ -23,8 +24,10 @@ pub(super) struct PivotedRoot {
 }
 
 impl PivotedRoot {
-    /// Overwrites the lower triangle of a symmetric matrix `[m, m]` by L, whose first `rank` columns count: up to where every
-    /// remaining diagonal entry is at most `tolerance`.
+    /// Overwrites the lower triangle of a symmetric matrix `[m, m]` by L.
+    ///
+    /// The factorization ends when every remaining diagonal entry is at most `tolerance`. Only the first
+    /// `rank` columns of L are valid.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -60,7 +63,7 @@ impl PivotedRoot {
     }
 }
 
-/// Swaps two rows of a symmetric matrix with their columns, in its lower triangle; a ≤ b.
+/// Swaps rows and columns a ≤ b of a symmetric matrix, in its lower triangle.
 fn swap(mut matrix: MatMut<'_, f64>, a: usize, b: usize) {
     let m = matrix.nrows();
     let mut exchange = |p: [usize; 2], q: [usize; 2]| {
@@ -77,7 +80,9 @@ fn swap(mut matrix: MatMut<'_, f64>, a: usize, b: usize) {
     (b + 1..m).for_each(|row| exchange([row, a], [row, b]));
 }
 
-/// Makes a column of L from one of A, which the columns before `first` have updated, and with its diagonal entry.
+/// Overwrites a column of the matrix by that of L, whose diagonal entry is `diagonal`.
+///
+/// The columns of L before `first` have already been subtracted from it, those from `first` on have not.
 fn make_column(mut matrix: MatMut<'_, f64>, first: usize, column: usize, diagonal: f64) {
     let (n_below, n_before) = (matrix.nrows() - column - 1, column - first);
     matrix[(column, column)] = diagonal;
@@ -90,7 +95,7 @@ fn make_column(mut matrix: MatMut<'_, f64>, first: usize, column: usize, diagona
     (0..n_below).for_each(|k| below[(k, 0)] /= diagonal);
 }
 
-/// Takes the columns from `first` to `end` from the rest of the lower triangle.
+/// Subtracts the part of the columns `first..end` of L from the rest of the lower triangle.
 fn update(matrix: MatMut<'_, f64>, first: usize, end: usize) {
     let n_rest = matrix.nrows() - end;
     let (left, right) = matrix.split_at_col_mut(end);
@@ -114,7 +119,7 @@ mod tests {
     use crate::observer::Unobserved;
     use crate::testing::Random;
 
-    /// `GGᵀ` of a random matrix `[m, rank]`.
+    /// Returns `GGᵀ` of a random matrix G, `[m, rank]`.
     fn product(m: usize, rank: usize, random: &mut Random) -> Vec<f64> {
         let g: Vec<f64> = (0..m * rank).map(|_| random.normal()).collect();
         let entry = |i: usize, j: usize| (0..rank).map(|k| g[i * rank + k] * g[j * rank + k]).sum();
@@ -134,7 +139,7 @@ mod tests {
                 for j in 0..=i {
                     let sum: f64 = (0..rank).map(|k| l(i, k) * l(j, k)).sum();
                     let expected = matrix[found.order[j] * m + found.order[i]];
-                    // Entries are some `rank` at most, and each sum has as many terms.
+                    // Entries are about `rank` at most, and each sum has `rank` terms.
                     assert!((sum - expected).abs() < 1e-10, "{m} {rank} {i} {j}: {sum} {expected}");
                 }
             }

@@ -1,6 +1,7 @@
-//! The Gaussian process behind the interpolant: variances, covariance, likelihood (Rasmussen and Williams 2006, ch. 2).
+//! The Gaussian process behind the interpolant: variances, covariance and likelihood.
 //!
-//! Where the function has a mean, its coefficients are as uncertain as the values leave them.
+//! Source: Rasmussen and Williams 2006, ch. 2. If the function has a mean, variances and covariances include
+//! the uncertainty of its coefficients given the values.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColRef, MatMut, MatRef};
@@ -17,51 +18,54 @@ use crate::sums::gram::{fill_cross_gram, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
-/// Queries whose columns `L⁻¹k(X, q)` are held at once: bounds the memory to n × 512 numbers and keeps solves in
-/// matrix products.
+/// Queries whose columns `L⁻¹k(X, q)` are held at once.
+///
+/// Blocks bound the memory to n × 512 numbers, and are wide enough for solves to run as matrix products.
 const QUERIES_PER_BLOCK: usize = 512;
 
-/// Variances of the latent function with the queries where rounding was clamped.
+/// Posterior variances of the latent function, and the queries whose variance was clamped to 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variances {
-    /// `k₀ − |L⁻¹k(X, q)|² ≥ 0`, `[m]`, unit V².
+    /// `k₀ − |L⁻¹k(X, q)|² ≥ 0`, `[m]`, unit V². With a mean, its part is added.
     pub latent: Vec<f64>,
-    /// Queries whose variance came out negative within rounding and is served as 0.
+    /// Queries where `k₀ − |L⁻¹k(X, q)|²` was negative within rounding and was set to 0.
     pub clamped: Vec<usize>,
 }
 
 impl Variances {
-    /// Those of a process of so many times the variance.
+    /// Returns the variances under a process whose variance is `factor` times as large.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.latent.iter_mut().for_each(|variance| *variance *= factor);
         self
     }
 }
 
-/// Covariance of the latent function with the queries where rounding was clamped.
+/// Posterior covariance of the latent function, and the queries whose variance was clamped to 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
     /// Symmetric `[m, m]`, unit V².
     pub latent: Vec<f64>,
-    /// Queries whose variance, on the diagonal, came out negative within rounding and is served as 0.
+    /// Queries whose variance, on the diagonal, was negative within rounding and was set to 0.
     pub clamped: Vec<usize>,
 }
 
 impl Covariance {
-    /// That of a process of so many times the variance.
+    /// Returns the covariance under a process whose variance is `factor` times as large.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.latent.iter_mut().for_each(|entry| *entry *= factor);
         self
     }
 }
 
-/// Posterior variance of the latent function (no noise added) at queries `[m, d]`.
+/// Returns the posterior variance of the latent function (no noise added) at queries `[m, d]`.
 ///
-/// A negative result is clamped only within `τ(q) = 4ε(k₀ + ‖K + αI‖₁|w|²)`, w = (K+αI)⁻¹k(X, q), and reported.
+/// A negative result is set to 0 and reported, but only if it is at least −τ(q), with
+/// `τ(q) = 4ε(k₀ + ‖K + αI‖₁|w|²)` and `w = (K + αI)⁻¹k(X, q)`.
 ///
 /// # Errors
-/// [`NumericsError::DimensionMismatch`]; [`NumericsError::NotPositiveDefinite`] without a Cholesky factor or with a variance
-/// below −τ; [`NumericsError::Cancelled`].
+/// - [`NumericsError::DimensionMismatch`].
+/// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, or if a variance is below −τ.
+/// - [`NumericsError::Cancelled`].
 pub fn variances(
     solver: &Solver,
     queries: &Cloud,
@@ -70,10 +74,10 @@ pub fn variances(
     variances_with_mean(solver, None, queries, observer)
 }
 
-/// [`variances`] of a function with a mean.
+/// Returns the [`variances`] of a function with a mean.
 ///
 /// # Errors
-/// Those of [`variances`].
+/// Returns the errors of [`variances`], and [`NumericsError::MeanNotDetermined`].
 pub fn variances_with_mean(
     solver: &Solver,
     trend: Option<&Trend>,
@@ -112,11 +116,12 @@ pub fn variances_with_mean(
     Ok(variances)
 }
 
-/// Posterior covariance of the latent function, `k(Q, Q) − VᵀV` with V = L⁻¹k(X, Q). Its diagonal is clamped as
-/// [`variances`] are.
+/// Returns the posterior covariance of the latent function, `k(Q, Q) − VᵀV` with V = L⁻¹k(X, Q).
+///
+/// Its diagonal is clamped as [`variances`] are.
 ///
 /// # Errors
-/// Those of [`variances`].
+/// Returns the errors of [`variances`].
 pub fn covariance(
     solver: &Solver,
     queries: &Cloud,
@@ -125,10 +130,10 @@ pub fn covariance(
     covariance_with_mean(solver, None, queries, observer)
 }
 
-/// [`covariance`] of a function with a mean.
+/// Returns the [`covariance`] of a function with a mean.
 ///
 /// # Errors
-/// Those of [`variances`].
+/// Returns the errors of [`variances`], and [`NumericsError::MeanNotDetermined`].
 pub fn covariance_with_mean(
     solver: &Solver,
     trend: Option<&Trend>,
@@ -177,7 +182,7 @@ pub fn covariance_with_mean(
     Ok(Covariance { latent: covariance, clamped })
 }
 
-/// Adds the mean's part to the lower triangle.
+/// Adds the mean's part to the lower triangle of the covariance. `v` is `L⁻¹k(X, Q)`, `[n, m]`.
 fn add_mean(covariance: &mut [f64], mean: &MeanVariance<'_>, queries: &Cloud, v: MatRef<'_, f64>) {
     let m = queries.n_points();
     let at = |query: usize| {
@@ -190,8 +195,10 @@ fn add_mean(covariance: &mut [f64], mean: &MeanVariance<'_>, queries: &Cloud, v:
     });
 }
 
-/// `−½ YᵀΛ/f − ½ ln det(f(K + αI)) − ½ n ln 2π`, with kernel and noise f times as large as the solver has them (Rasmussen and Williams 2006,
-/// eq. 2.30). Where the function has a mean, it is that of the values given this mean.
+/// Returns the log marginal likelihood `−½ YᵀΛ/f − ½ ln det(f(K + αI)) − ½ n ln 2π`.
+///
+/// Kernel and noise are f = `factor` times those of the solver (Rasmussen and Williams 2006, eq. 2.30). If
+/// the function has a mean, this is the likelihood of the values given that mean.
 ///
 /// # Errors
 /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
@@ -204,7 +211,7 @@ pub fn log_marginal_likelihood(
     Ok(-0.5 * (solution.energy / factor + solver.log_determinant()? + normalization))
 }
 
-/// `columns ← L⁻¹ k(X, Q)`, one column per query.
+/// Computes `columns ← L⁻¹ k(X, Q)`, one column per query.
 fn whitened_cross_gram(
     solver: &Solver,
     nodes: &Nodes,
@@ -219,6 +226,7 @@ fn whitened_cross_gram(
     solver.whiten_in_place(MatMut::from_column_major_slice_mut(columns, n, m), observer)
 }
 
+/// Checks that a negative variance is at least −τ(q), the tolerance of [`variances`].
 fn check_is_rounding(
     solver: &Solver,
     nodes: &Nodes,

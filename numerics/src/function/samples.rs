@@ -1,4 +1,4 @@
-//! Joint draws from a posterior.
+//! Joint draws from a posterior covariance.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef};
@@ -10,25 +10,27 @@ use crate::machine::parallelism::parallelism;
 use crate::machine::random::Random;
 use crate::observer::{Observer, Stage};
 
-/// Variances below this multiple of ε, the queries and the prior variance are rounding of the covariance.
+/// Multiple of `ε m k₀` up to which remaining variances are rounding: m queries, prior variance k₀.
 const ROUNDING: f64 = 64.0;
 
-/// Draws that are made at once.
+/// Draws computed at once.
 const DRAWS_PER_BLOCK: usize = 256;
 
-/// `C ≈ LLᵀ` of a covariance `[m, m]`, which has whatever rank float64 leaves it.
+/// A root L of a covariance `C ≈ LLᵀ`, `[m, m]`, with the rank that it has in float64.
 pub struct Root {
-    /// `[r, m]` row by row: r independent directions.
+    /// The r independent directions, `[r, m]` row by row.
     directions: Vec<f64>,
     n_queries: usize,
 }
 
 impl Root {
-    /// Factorizes a covariance by Cholesky with complete pivoting (Higham 2002, sec. 10.3), up to where what is left is rounding: variances of
-    /// `64 ε m k₀`, k₀ the prior variance in the unit of the covariance.
+    /// Factorizes a covariance by Cholesky with complete pivoting (Higham 2002, sec. 10.3).
+    ///
+    /// The factorization ends when the remaining variances are rounding, i.e. at most `64 ε m k₀`. k₀ is the
+    /// prior variance in the unit of the covariance.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`], [`NumericsError::WeightsOverflow`] of numbers that are not finite.
+    /// [`NumericsError::Cancelled`]. [`NumericsError::WeightsOverflow`] if an entry is not finite.
     pub fn of(
         covariance: &Covariance,
         prior_variance: f64,
@@ -38,7 +40,7 @@ impl Root {
         observer.checkpoint()?;
         let m = covariance.latent.len().isqrt();
         let rounding = ROUNDING * f64::EPSILON * m as f64 * prior_variance;
-        // Where nothing varies there is nothing to factorize; what is no number goes on.
+        // If no variance is above rounding, there is nothing to factorize. NaN goes on to the next check.
         if covariance.latent.iter().step_by(m + 1).all(|variance| *variance <= rounding) {
             return Ok(Self { directions: Vec::new(), n_queries: m });
         }
@@ -54,7 +56,9 @@ impl Root {
         Ok(Self { directions, n_queries: m })
     }
 
-    /// Draws `[count, m]` about means `[m]`. What a draw is depends on the seed, the list and its place in it, not on how many others there are.
+    /// Draws `[count, m]` about means `[m]`.
+    ///
+    /// A draw depends on the seed, the list and its index in the list, but not on `count`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -100,7 +104,7 @@ mod tests {
 
     #[test]
     fn draws_have_the_mean_and_the_covariance_of_the_posterior() {
-        // Queries at points of the cloud, between them, twice the same, and far away.
+        // Queries at points of the cloud, between them, a repeated one, and a distant one.
         let mut queries = fibonacci_sphere(12).coordinates().to_vec();
         queries.extend([0.0, 0.6, 0.8, 0.0, 0.6, 0.8, 50.0, 0.0, 0.0]);
         queries.extend_from_slice(&fibonacci_sphere(40).coordinates()[..9]);
@@ -122,7 +126,7 @@ mod tests {
                 for j in 0..=i {
                     let sum: f64 = (0..count).map(|draw| at(draw, i) * at(draw, j)).sum();
                     let variances = covariance.latent[i * (m + 1)] * covariance.latent[j * (m + 1)];
-                    // Five standard errors of a product, and what the factorization leaves.
+                    // Five standard errors of a product, plus what the factorization leaves out.
                     let allowed = 5.0 * (2.0 * variances / count as f64).sqrt() + 1e-12;
                     let off = (sum / count as f64 - covariance.latent[i * m + j]).abs();
                     assert!(off <= allowed, "{family:?} {i} {j}: {off} > {allowed}");

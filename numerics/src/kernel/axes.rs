@@ -1,17 +1,17 @@
-//! A length scale for each axis.
+//! Length scales that differ from axis to axis.
 
 use crate::machine::heap::vec_bytes;
 
-/// ℓ_c with the factors by which coordinates are stretched.
+/// The length scales ℓ_c, `[d]`, unit L, and the factors by which coordinates are stretched.
 #[derive(Debug, PartialEq)]
 pub(super) struct Axes {
     length_scales: Vec<f64>,
-    /// The shortest over each.
+    /// ℓ/ℓ_c with ℓ the shortest length scale, `[d]`, at most 1.
     factors: Vec<f64>,
 }
 
 impl Axes {
-    /// Length scales that are checked, and the shortest of them.
+    /// Takes length scales that are checked already, and the shortest of them.
     pub(super) fn new(length_scales: &[f64], shortest: f64) -> Self {
         let factors = length_scales.iter().map(|length_scale| shortest / length_scale).collect();
         Self { length_scales: length_scales.to_vec(), factors }

@@ -1,4 +1,6 @@
-//! Gauss: φ(q) = exp(−q), so k = variance · exp(−|x − y|²/ℓ²), without a factor ½ (errata.md, "Settled").
+//! Gauss kernel: φ(q) = exp(−q), so k = variance · exp(−|x − y|²/ℓ²).
+//!
+//! There is no factor ½ in the exponent (errata.md, "Settled").
 
 use pulp::Simd;
 
@@ -24,7 +26,8 @@ impl Facts for Gauss {
         analytic_length_scale(scales)
     }
 
-    /// Four h₄: with the three nearest distances that surfaces want, the Laplacian of smooth values is off by a tenth, with these by 1e-8.
+    /// Default ℓ for values, min(4 h₄, 2R). With it, the Laplacian of smooth values is off by 1e-8. With 3h,
+    /// the default for surfaces, it is off by a tenth.
     fn length_scale_of_values(&self, scales: &Scales) -> f64 {
         (4.0 * scales.spacing).min(2.0 * scales.radius)
     }

@@ -1,4 +1,4 @@
-//! Inverse multiquadric: φ(q) = (1 + q)^{−½}.
+//! Inverse multiquadric kernel: φ(q) = (1 + q)^{−½}.
 
 use pulp::Simd;
 
@@ -25,7 +25,7 @@ impl Facts for InverseMultiquadric {
         analytic_length_scale(scales)
     }
 
-    /// Five h₄, as for Gauss.
+    /// Default ℓ for values, min(5 h₄, 2R). Like for Gauss, it is wider than for surfaces.
     fn length_scale_of_values(&self, scales: &Scales) -> f64 {
         (5.0 * scales.spacing).min(2.0 * scales.radius)
     }

@@ -1,5 +1,7 @@
-//! Regularised Laplace: φ(q) = exp(−t), t = √(q + epsilon). Analytic if epsilon > 0, a kink at 0 if epsilon = 0. Not
-//! normalised: φ(0) = e^{−√epsilon} (errata.md, "Settled").
+//! Regularised Laplace kernel: φ(q) = exp(−t), t = √(q + epsilon).
+//!
+//! It is analytic if epsilon > 0 and has a kink at 0 if epsilon = 0. It is not normalised:
+//! φ(0) = e^{−√epsilon} (errata.md, "Settled").
 
 use pulp::Simd;
 

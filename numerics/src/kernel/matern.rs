@@ -1,7 +1,9 @@
-//! Half-integer Matérn, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q), with θ_p the reverse Bessel polynomials.
+//! Half-integer Matérn kernels, ν = p + ½: φ = e^{−s} θ_p(s)/θ_p(0), s = √(2ν q).
 //!
-//! Since s^ν K_ν(s) = √(π/2) e^{−s} θ_p(s) and (s^ν K_ν)′ = −s · s^{ν−1}K_{ν−1}, a derivative in q only lowers the index:
-//! d/dq [e^{−s} θ_p] = −ν e^{−s} θ_{p−1} (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and Williams 2006, eq. 4.16).
+//! The θ_p are the reverse Bessel polynomials. A derivative in q only lowers the index:
+//! d/dq [e^{−s} θ_p] = −ν e^{−s} θ_{p−1}. This follows from s^ν K_ν(s) = √(π/2) e^{−s} θ_p(s) and
+//! (s^ν K_ν)′ = −s · s^{ν−1}K_{ν−1} (Abramowitz and Stegun 1964, 9.6.28; Rasmussen and Williams 2006,
+//! eq. 4.16).
 
 use pulp::Simd;
 
@@ -12,10 +14,10 @@ use crate::machine::exp::exp_minus;
 use crate::machine::registers::Pack;
 use crate::points::sampling::Scales;
 
-/// The greatest order p, ν = p + ½.
+/// The greatest order p of a Matérn kernel, ν = p + ½.
 pub const MAX_MATERN_ORDER: u8 = 8;
 
-/// Where e^{−s} is 0 in float64, and no power of s that meets it overflows.
+/// Bound on s: e^{−s} is 0 in float64 there, and no power of s that multiplies it overflows.
 const FAR: f64 = 1e3;
 
 pub(super) struct Matern {
@@ -26,7 +28,7 @@ impl Profiles for Matern {
     #[inline(always)]
     fn run<S: Simd>(self, pairs: impl Pairs<S>) {
         match self.order {
-            // s = r: the same formula, and one loop less to compile.
+            // Here s = r, so the formula is that of Laplace. Sharing it leaves one loop less to compile.
             0 => Laplace { epsilon: 0.0 }.run(pairs),
             1 => OfOrder::<1>.run(pairs),
             2 => OfOrder::<2>.run(pairs),
@@ -61,7 +63,7 @@ impl Facts for Matern {
     }
 }
 
-/// ν = P + ½ for the orders that are used most, P of 1 or 2.
+/// The profile of ν = P + ½, compiled for P = 1 and P = 2, the orders that are used most.
 struct OfOrder<const P: u8>;
 
 impl<const P: u8> Profile for OfOrder<P> {
@@ -71,7 +73,7 @@ impl<const P: u8> Profile for OfOrder<P> {
     }
 }
 
-/// ν = order + ½ for any order: its loop is not unrolled.
+/// The profile of ν = order + ½ for any order. Its loop is not unrolled.
 struct OfAnyOrder {
     order: u8,
 }
@@ -83,14 +85,14 @@ impl Profile for OfAnyOrder {
     }
 }
 
-/// φ, φ′, φ″ for an order of 1 or more.
+/// Returns φ, φ′, φ″ for an order of 1 or more.
 #[inline(always)]
 fn profile<S: Simd>(q: Pack<S>, order: u8) -> [Pack<S>; 3] {
     let nu = f64::from(order) + 0.5;
     let (s, inverse) = distance_and_inverse(2.0 * nu * q, FAR * FAR);
     let (s_squared, one) = (s * s, Pack::splat(q.simd(), 1.0));
-    // θ_{p−2}, θ_{p−1}, θ_p from p = 1 on, with θ_{−1} = 1/s, which only order 1 meets; raised one by one by
-    // θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
+    // `lowest`, `lower` and `theta` are θ_{p−2}, θ_{p−1} and θ_p, starting at p = 1. There θ_{−1} = 1/s,
+    // which only order 1 uses. Each turn raises p by 1: θ_{p+1} = (2p + 1) θ_p + s² θ_{p−1}.
     let (mut lowest, mut lower, mut theta) = (if order == 1 { inverse } else { one }, one, 1.0 + s);
     let mut at_zero = 1.0;
     for p in 1..order {

@@ -1,11 +1,15 @@
-//! Radial positive definite kernels, `k(x, y) = variance · φ(q)` with `q = |x − y|²/ℓ²`, or `Σ_c (x_c − y_c)²/ℓ_c²` with a length scale
-//! for each axis.
+//! Radial positive definite kernels, `k(x, y) = variance · φ(q)` with `q = |x − y|²/ℓ²`.
 //!
-//! A family is its profile φ and two derivatives in q, because with D = x − y
-//! `∇k = 2·variance·φ′·D/ℓ²` and `D²k = variance·(4φ″·DDᵀ/ℓ⁴ + 2φ′·I/ℓ²)` need nothing else. To add one: a file with its
-//! formula and facts, and one line in `family.rs`.
+//! With a length scale for each axis, `q = Σ_c (x_c − y_c)²/ℓ_c²`.
+//!
+//! A family is its profile φ and the derivatives φ′ and φ″ in q. Nothing else is needed, because with
+//! `D = x − y` the derivatives of k are `∇k = 2·variance·φ′·D/ℓ²` and
+//! `D²k = variance·(4φ″·DDᵀ/ℓ⁴ + 2φ′·I/ℓ²)`.
+//!
+//! To add a family, write a file with its formula and facts, and one line in `family.rs`.
 
 mod axes;
+pub mod defaults;
 mod facts;
 mod family;
 mod gauss;
@@ -29,13 +33,14 @@ pub use matern::MAX_MATERN_ORDER;
 pub(crate) use profile::{HUGE, Pairs, distance_and_inverse};
 pub use wendland::WendlandSmoothness;
 
-/// What `2|φ′|√q = ℓ|∇k|/variance` never exceeds, in any family: Wendland's of smoothness 6 comes to 2.8.
+/// Upper bound of `2|φ′|√q = ℓ|∇k|/variance` in any family. Wendland's of smoothness 6 reaches 2.8.
 pub(crate) const MAX_SLOPE: f64 = 4.0;
 
-/// A family with its length scale ℓ (unit L), or one for each axis, and variance (unit V²), all checked.
+/// A family with its length scale ℓ (unit L), or one for each axis, and its variance (unit V²), all checked.
 ///
-/// With a length scale for each axis, the kernel is that of the shortest one in stretched coordinates, `u_c = s_c x_c` with
-/// `s_c = ℓ/ℓ_c ≤ 1`: whatever is summed up over pairs sees differences of these, and derivatives are turned back by the chain rule.
+/// With a length scale ℓ_c for each axis, ℓ is the shortest of them. The kernel is that of ℓ in stretched
+/// coordinates, `u_c = s_c x_c` with `s_c = ℓ/ℓ_c ≤ 1`. Sums over pairs use differences of u, and the chain
+/// rule turns derivatives back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     family: Family,
@@ -46,9 +51,12 @@ pub struct Kernel {
 }
 
 impl Kernel {
+    /// Returns the kernel with one length scale for all axes.
+    ///
     /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`] for a length scale or variance that is not positive, or so small or large
-    /// that its square or inverse square leaves float64; a negative epsilon; an order above [`MAX_MATERN_ORDER`].
+    /// [`NumericsError::InvalidKernelParameter`] for a length scale or variance outside 1e-140 to 1e140,
+    /// since its square and inverse square must stay inside float64; an epsilon outside 0 to 1e5; an order
+    /// above [`MAX_MATERN_ORDER`].
     pub fn new(family: Family, length_scale: f64, variance: f64) -> Result<Self, NumericsError> {
         let refuse =
             |parameter, requirement| Err(NumericsError::InvalidKernelParameter { parameter, requirement });
@@ -65,10 +73,11 @@ impl Kernel {
         Ok(Self { family, length_scale, variance, inverse_square_length, axes: None })
     }
 
-    /// With a length scale for each axis, `[d]`.
+    /// Returns the kernel with a length scale for each axis, `[d]`.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidLengthScale`] with the axis; those of [`Kernel::new`]; [`NumericsError::InvalidKernelParameter`] for none at all.
+    /// [`NumericsError::InvalidLengthScale`] with the axis; [`NumericsError::InvalidKernelParameter`] for an
+    /// empty slice; those of [`Kernel::new`].
     pub fn of_axes(family: Family, length_scales: &[f64], variance: f64) -> Result<Self, NumericsError> {
         if let Some(axis) =
             length_scales.iter().position(|length_scale| !LENGTH_SCALES.contains(length_scale))
@@ -80,10 +89,10 @@ impl Kernel {
         Ok(Self { axes: Some(Arc::new(Axes::new(length_scales, shortest))), ..kernel })
     }
 
-    /// With another variance.
+    /// Returns this kernel with another variance.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`] for one that kernels do not take.
+    /// [`NumericsError::InvalidKernelParameter`] for a variance outside 1e-140 to 1e140.
     pub fn with_variance(&self, variance: f64) -> Result<Self, NumericsError> {
         let Self { variance, .. } = Self::new(self.family, self.length_scale, variance)?;
         Ok(Self { variance, ..self.clone() })
@@ -93,12 +102,12 @@ impl Kernel {
         self.family
     }
 
-    /// ℓ, unit L; the shortest where each axis has its own.
+    /// ℓ, unit L. The shortest one, if each axis has its own.
     pub fn length_scale(&self) -> f64 {
         self.length_scale
     }
 
-    /// ℓ_c of each axis, `[d]`, unit L, if each has its own.
+    /// ℓ_c of each axis, `[d]`, unit L, or `None` if all axes share one.
     pub fn length_scales(&self) -> Option<&[f64]> {
         self.axes.as_ref().map(|axes| axes.length_scales())
     }
@@ -108,7 +117,7 @@ impl Kernel {
         self.variance
     }
 
-    /// The same correlations with variance 1.
+    /// Returns this kernel with variance 1, i.e. with the same correlations.
     pub fn of_variance_one(self) -> Self {
         Self { variance: 1.0, ..self }
     }
@@ -118,19 +127,21 @@ impl Kernel {
         self.variance * self.family.at_zero()
     }
 
-    /// Whether the kernel has a kink at 0, hence no gradient at the points of the cloud.
+    /// Returns whether the kernel has a kink at 0, hence no gradient at the points of the cloud.
     pub fn has_kink(&self) -> bool {
         self.family.has_kink()
     }
 
-    /// Whether the process with this covariance has second derivatives: φ″ is finite at 0.
+    /// Returns whether the process with this covariance has second derivatives: φ″ is finite at 0.
     pub fn has_second_derivatives(&self) -> bool {
         self.family.has_second_derivatives()
     }
 
+    /// Checks that the kernel can be used in a dimension.
+    ///
     /// # Errors
-    /// [`NumericsError::KernelNotPositiveDefinite`] in a dimension where the family is not; [`NumericsError::InvalidKernelParameter`] where the
-    /// axes with a length scale are others.
+    /// [`NumericsError::KernelNotPositiveDefinite`] if the family is not positive definite there;
+    /// [`NumericsError::InvalidKernelParameter`] if the number of length scales is not the dimension.
     pub fn check_dimension(&self, dimension: usize) -> Result<(), NumericsError> {
         if self.length_scales().is_some_and(|axes| axes.len() != dimension) {
             return Err(AXES_MISMATCH);
@@ -148,24 +159,25 @@ impl Kernel {
         self.inverse_square_length
     }
 
-    /// s_c = ℓ/ℓ_c, by which differences along an axis are multiplied; 1 where all axes are alike.
+    /// s_c = ℓ/ℓ_c, the factor of differences along an axis. It is 1 if all axes share one length scale.
     #[inline]
     pub(crate) fn stretch(&self, axis: usize) -> f64 {
         self.factors().map_or(1.0, |factors| factors[axis])
     }
 
-    /// The same for all axes, `[d]`, where they are not alike.
+    /// The factors s_c of all axes, `[d]`, or `None` if all axes share one length scale.
     #[inline(always)]
     pub(crate) fn factors(&self) -> Option<&[f64]> {
         self.axes.as_ref().map(|axes| axes.factors())
     }
 
-    /// Whether each axis has a length scale of its own.
+    /// Returns whether each axis has a length scale of its own.
     pub fn is_stretched(&self) -> bool {
         self.axes.is_some()
     }
 
-    /// Points in coordinates in which all axes are alike; `None` where they are.
+    /// Returns the cloud in the coordinates `u_c = s_c x_c`, in which all axes are alike, or `None` if they
+    /// already are.
     pub fn stretched_cloud(&self, cloud: &Cloud) -> Option<Cloud> {
         self.factors().map(|factors| cloud.stretched(factors))
     }
@@ -175,31 +187,35 @@ impl Kernel {
         self.axes.as_ref().map_or(0, |axes| block_bytes(arc_payload::<Axes>()) + axes.n_bytes())
     }
 
-    /// φ, φ′ and φ″ at 0, for families that have them there.
+    /// Returns φ, φ′ and φ″ at 0, for families that have them there.
     pub(crate) fn profile_at_zero(&self) -> [f64; 3] {
         self.family.profile_at_zero()
     }
 
-    /// Runs over the pairs of a block with φ, φ′ and φ″. Derivatives that the loop body does not use are never computed.
+    /// Runs a loop body over the pairs of a block, with φ, φ′ and φ″ of each. Derivatives that the body does
+    /// not use are never computed.
     #[inline(always)]
     pub(crate) fn profiles<S: Simd>(&self, pairs: impl Pairs<S>) {
         self.family.profiles(pairs);
     }
 }
 
-/// Their squares and inverse squares are well inside float64.
+/// The range of length scales, unit L. Their squares and inverse squares are well inside float64.
 const LENGTH_SCALES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
-/// What is asked of them.
+/// The requirement on length scales, for error messages.
 const LENGTH_SCALE: &str = "must be positive, between 1e-140 and 1e140";
 
-/// What is wrong with as many length scales as there are.
+/// The error for length scales that do not match the coordinates of the points in number.
 const AXES_MISMATCH: NumericsError = NumericsError::InvalidKernelParameter {
     parameter: "length_scales",
     requirement: "must be one for each coordinate of the points",
 };
 
-/// 1/x², rounded once: all entries of a Gram matrix share this error, and share it where their own average out.
+/// Returns 1/x², rounded once.
+///
+/// All entries of a Gram matrix share the error of this number, so it does not average out like their own
+/// errors.
 fn inverse_square(x: f64) -> f64 {
     let square = x * x;
     let of_square = x.mul_add(x, -square);

@@ -1,17 +1,19 @@
-//! A profile φ and its derivatives, and loops that are compiled with one.
+//! The profile φ of a family with its derivatives, and the loops over pairs that are compiled for it.
 
 use pulp::Simd;
 
 use crate::machine::registers::Pack;
 
-/// A positive number so small that no scaled distance of distinct points comes near it. Profiles whose derivatives are
-/// unbounded at 0 divide by at least this, so that they stay finite and D = 0 annihilates them there.
+/// A positive number so small that no scaled distance of distinct points comes near it.
+///
+/// Profiles with unbounded derivatives at 0 divide by at least this number. So they stay finite, and D = 0
+/// annihilates them there.
 pub(super) const TINY: f64 = 1e-100;
 
-/// Squared scaled distance beyond which profiles do not change any more in a way that shows.
+/// Squared scaled distance beyond which profiles no longer change noticeably.
 pub(crate) const HUGE: f64 = 1e300;
 
-/// √q and 1/√q for q up to a bound of at most [`HUGE`], the root at least [`TINY`].
+/// Returns √q and 1/√q, with q cut off at `at_most`, at most [`HUGE`], and the root at least [`TINY`].
 #[inline(always)]
 pub(crate) fn distance_and_inverse<S: Simd, const N: usize>(
     q: Pack<S, N>,
@@ -20,13 +22,13 @@ pub(crate) fn distance_and_inverse<S: Simd, const N: usize>(
     q.at_least(TINY * TINY).at_most(at_most).sqrt_and_inverse()
 }
 
-/// A formula.
+/// The formula of a profile.
 pub(super) trait Profile {
     /// φ, φ′, φ″ at q, branch-free.
     fn at<S: Simd>(&self, q: Pack<S>) -> [Pack<S>; 3];
 }
 
-/// What a family runs over pairs: its formula, or the one of its formulas that its parameter asks for.
+/// The loop of a family over pairs. It uses the family's formula, or the one that the parameter selects.
 pub(super) trait Profiles {
     fn run<S: Simd>(self, pairs: impl Pairs<S>);
 }
@@ -40,20 +42,20 @@ impl<P: Profile> Profiles for P {
 
 /// The body of a loop over the pairs of one query and a block of points.
 ///
-/// Two methods of a trait and not two closures, because only a method can be made to inline: what is not compiled into
-/// the function that has the instruction set falls back to a call per instruction.
+/// It is two methods of a trait and not two closures, because only a method can be made to inline. Code that
+/// is not compiled into the function that has the instruction set falls back to one call per instruction.
 pub(crate) trait Pairs<S: Simd> {
-    /// What [`Pairs::take`] wants to know of the pairs beside their profile.
+    /// Data about a pack of pairs that [`Pairs::take`] needs besides their profile.
     type Others;
 
-    /// q of pack `at`.
+    /// Returns q of pack `at`, and the data for [`Pairs::take`].
     fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others);
 
-    /// Takes φ, φ′, φ″ at that q.
+    /// Takes φ, φ′, φ″ of pack `at`, and what [`Pairs::pack`] returned with its q.
     fn take(&mut self, at: usize, others: Self::Others, profile: [Pack<S>; 3]);
 }
 
-/// A loop, compiled with one profile.
+/// Runs a loop over the packs of a block, compiled for one profile.
 #[inline(always)]
 fn each<S: Simd>(mut pairs: impl Pairs<S>, profile: impl Profile) {
     for at in 0..Pack::<S>::PER_BLOCK {

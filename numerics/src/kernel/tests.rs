@@ -1,4 +1,4 @@
-//! One contract over all kernels, then each family's closed form in exact arithmetic of its own.
+//! A contract that all kernels share, and closed forms of families.
 
 use pulp::WithSimd;
 
@@ -7,7 +7,7 @@ use crate::machine::instruction_set::InstructionSet;
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::testing::all_families;
 
-/// φ, φ′, φ″ of a kernel at every point of a block, as the loops get them.
+/// Computes φ, φ′, φ″ of a kernel at one q, for every point of a block, by way of the kernel loops.
 struct Profiles<'a>(&'a Kernel, f64);
 
 impl WithSimd for Profiles<'_> {
@@ -43,7 +43,7 @@ impl<S: Simd> Pairs<S> for Constant<'_, S> {
     }
 }
 
-/// The profile on the best instruction set, after a look whether all others agree with it.
+/// Returns φ, φ′, φ″ on the best instruction set, and checks that all other sets agree.
 fn profile(family: Family, q: f64) -> [f64; 3] {
     let kernel = Kernel::new(family, 1.0, 1.0).unwrap();
     let [best, others @ ..] = &InstructionSet::available()[..] else { unreachable!("one is always there") };
@@ -51,7 +51,7 @@ fn profile(family: Family, q: f64) -> [f64; 3] {
     for set in others {
         for (a, b) in best.iter().zip(set.dispatch(Profiles(&kernel, q))) {
             for (a, b) in a.0.iter().zip(b.0) {
-                // A few roundings, some of them fused on one side only.
+                // Results differ by a few roundings, some of them fused on one side only.
                 let close = (a - b).abs() <= 1e-14 * b.abs();
                 assert!(close, "{family:?} at {q}: {a} at best, {b} on {}", set.name());
             }
@@ -73,7 +73,8 @@ fn the_profile_starts_at_k_0() {
 fn derivatives_agree_with_central_differences() {
     for family in all_families() {
         for q in [0.03, 0.2, 0.47, 0.9, 1.7, 5.0] {
-            // Step h: truncation h²φ‴/6 and rounding ε/h balance near 1e-5; both stay under 1e-8 for these profiles.
+            // With step h, the truncation h²φ‴/6 and the rounding ε/h balance near 1e-5. Both stay under 1e-8
+            // here.
             let h = 1e-5 * q;
             let (below, here, above) = (profile(family, q - h), profile(family, q), profile(family, q + h));
             for order in 0..2 {
@@ -152,7 +153,7 @@ fn far_away_every_profile_vanishes_and_stays_finite() {
 
 #[test]
 fn the_inverse_square_of_the_length_is_rounded_once() {
-    // Squares of integers below 2²⁶ are exact, so that x²·y against 1 shows the error of y = 1/x² exactly.
+    // Squares of integers below 2²⁶ are exact, so x²·y − 1 shows the error of y = 1/x² exactly.
     for x in (3..100_000u32).step_by(7).map(f64::from) {
         let y = Kernel::new(Family::Gauss, x, 1.0).unwrap().inverse_square_length();
         let error = (x * x).mul_add(y, -1.0).abs();

@@ -1,7 +1,7 @@
 //! Wendland's compactly supported functions φ_{3,1}, φ_{3,2}, φ_{3,3}, normalised to φ(0) = 1, support r < 1.
 //!
-//! Positive definite for d ≤ 3 (Wendland 1995, "Piecewise polynomial, positive definite and compactly supported radial
-//! functions of minimal degree"). With r = √q, d/dq = (1/2r) d/dr.
+//! They are positive definite for d ≤ 3 (Wendland 1995, "Piecewise polynomial, positive definite and
+//! compactly supported radial functions of minimal degree"). With r = √q, d/dq = (1/2r) d/dr.
 
 use pulp::Simd;
 
@@ -13,7 +13,7 @@ use crate::points::sampling::Scales;
 /// The greatest dimension in which φ_{3,k} is positive definite (Wendland 1995).
 const MAX_DIMENSION: usize = 3;
 
-/// How often a Wendland function is differentiable.
+/// Smoothness of a Wendland function: the number of its continuous derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WendlandSmoothness {
     C2,
@@ -45,7 +45,7 @@ impl Facts for Wendland {
         self.smoothness != WendlandSmoothness::C2
     }
 
-    /// The support must reach well past the neighbours.
+    /// Default ℓ, min(10 h₄, 4R). It is the radius of the support, which must reach well past the neighbours.
     fn default_length_scale(&self, scales: &Scales) -> f64 {
         (SMOOTH_SPACINGS * scales.spacing).min(4.0 * scales.radius)
     }
@@ -60,7 +60,8 @@ impl Facts for Wendland {
     }
 }
 
-/// r and 1 − r, cut off at the end of the support so that no power of r overflows beyond it; and 1/r.
+/// Returns r, 1 − r and 1/r, with r cut off at 1, the end of the support. So no power of r overflows beyond
+/// it.
 #[inline(always)]
 fn cut_off<S: Simd>(q: Pack<S>) -> (Pack<S>, Pack<S>, Pack<S>) {
     let (r, inverse) = distance_and_inverse(q, 1.0);

@@ -1,4 +1,4 @@
-//! What a profile is at a distance of 0.
+//! The profile of a family at distance 0.
 
 use pulp::{Simd, WithSimd};
 
@@ -8,13 +8,13 @@ use crate::machine::instruction_set::Portable;
 use crate::machine::registers::{Block, Pack};
 
 impl Family {
-    /// φ, φ′ and φ″ at 0, for families that have them there.
+    /// Returns φ, φ′ and φ″ at 0, for families that have them there.
     pub(crate) fn profile_at_zero(self) -> [f64; 3] {
         Portable {}.vectorize(AtZero(self))
     }
 }
 
-/// One block of pairs at a distance of 0.
+/// Evaluates the profile of a family over one block of pairs at distance 0.
 struct AtZero(Family);
 
 impl WithSimd for AtZero {

@@ -1,16 +1,17 @@
-//! Eigenvalues of the small symmetric matrices that shape operators are.
+//! Eigenvalues and eigenvectors of small symmetric matrices, such as shape operators.
 
 use smallvec::SmallVec;
 
 use super::small::{Small, zeros};
 
-/// Sweeps after which Jacobi has converged to rounding for any matrix of the sizes met here.
+/// Limit on the sweeps: by then Jacobi has converged to rounding for any matrix of the sizes met here.
 const MAX_SWEEPS: usize = 30;
 
-/// Eigenvalues in ascending order with orthonormal eigenvectors as rows, `[k, k]`: row i belongs to `values[i]`.
+/// Returns the eigenvalues in ascending order, and orthonormal eigenvectors as rows, `[k, k]`.
 ///
-/// Cyclic Jacobi rotations (Golub and Van Loan 2013, sec. 8.5), accurate to rounding relative to the norm of the matrix,
-/// given row-major `[k, k]`. Reads the upper triangle.
+/// Row i of the eigenvectors belongs to `values[i]`. The matrix is row-major `[k, k]`, and only its upper
+/// triangle is read. Cyclic Jacobi rotations (Golub and Van Loan 2013, sec. 8.5) are accurate to rounding
+/// relative to the norm of the matrix.
 pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Small, Small) {
     let mut a = Small::from_slice(matrix);
     let mut v = zeros(k * k);
@@ -32,14 +33,15 @@ pub(crate) fn symmetric_eigen(matrix: &[f64], k: usize) -> (Small, Small) {
     (values, order.iter().flat_map(|&i| &v[i * k..][..k]).copied().collect())
 }
 
-/// Annihilates `a[p][q]`; answers whether it was worth it.
+/// Rotates the axes p and q so that `a[p][q]` becomes 0. Returns false, without rotating, if that entry is
+/// mere rounding.
 fn rotate(a: &mut [f64], v: &mut [f64], k: usize, p: usize, q: usize) -> bool {
     let (app, aqq, apq) = (a[p * k + p], a[q * k + q], a[p * k + q]);
     if apq.abs() <= 0.25 * f64::EPSILON * app.abs().sqrt() * aqq.abs().sqrt() || apq == 0.0 {
         return false;
     }
     let theta = (aqq - app) / (2.0 * apq);
-    // Where θ² leaves float64, the angle is 0.
+    // If θ² overflows, t and with it the angle are 0.
     let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     let c = 1.0 / (t * t + 1.0).sqrt();
     let s = t * c;
@@ -59,7 +61,7 @@ fn rotate(a: &mut [f64], v: &mut [f64], k: usize, p: usize, q: usize) -> bool {
     true
 }
 
-/// Where the upper triangle keeps the entry (i, j).
+/// Index of the entry (i, j) in the upper triangle of a row-major matrix `[k, k]`.
 fn index(k: usize, i: usize, j: usize) -> usize {
     i.min(j) * k + i.max(j)
 }
@@ -80,7 +82,7 @@ mod tests {
             for (value, vector) in values.iter().zip(vectors.chunks(k)) {
                 for i in 0..k {
                     let image: f64 = (0..k).map(|j| matrix[i * k + j] * vector[j]).sum();
-                    // Rounding is a small multiple of ε times the norm, at most 18 here.
+                    // The error is a small multiple of ε times the norm, which is at most 18 here.
                     prop_assert!((image - value * vector[i]).abs() < 1e-13);
                 }
             }
@@ -95,7 +97,7 @@ mod tests {
 
     #[test]
     fn sizes_whose_squares_are_out_of_range_change_nothing() {
-        // √3 and −√3 times the size.
+        // The eigenvalues are √3 and −√3 times the size.
         for size in [1e-200, 1e200] {
             let (values, _) = symmetric_eigen(&[size, std::f64::consts::SQRT_2 * size, 0.0, -size], 2);
             assert!((values[0] / size + 3f64.sqrt()).abs() < 1e-15, "{values:?}");

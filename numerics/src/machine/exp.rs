@@ -4,9 +4,11 @@ use pulp::Simd;
 
 use super::registers::Pack;
 
-/// The degrees 11 … 0 of the polynomial that approximates `e^{−u}` for |u| ≤ ½ ln 2 with the least relative error, the
-/// first two coefficients held at 1 and −1 (Remez exchange in 60 digits, then rounded to f64): relative error 1.1e-17, a
-/// tenth of an ulp. Degree 10 would have 2.9e-16.
+/// Coefficients of degrees 11 … 0 of a polynomial for `e^{−u}`, |u| ≤ ½ ln 2.
+///
+/// It has the least relative error with the coefficients of degrees 0 and 1 held at 1 and −1. They were
+/// computed by a Remez exchange in 60 digits, then rounded to f64. The relative error is 1.1e-17, a tenth of
+/// an ulp. Degree 10 would have 2.9e-16.
 const COEFFICIENTS: [f64; 12] = [
     -2.500_007_161_484_145_5e-8,
     2.763_023_390_223_09e-7,
@@ -22,19 +24,24 @@ const COEFFICIENTS: [f64; 12] = [
     1.0,
 ];
 
-/// Beyond this `e^{−t}` is below half of the smallest subnormal.
+/// Argument t beyond which `e^{−t}` is below half of the smallest subnormal.
 const VANISHES: f64 = 746.0;
 
-/// `e^{−t}` for t ≥ 0, within 1 ulp where fused (2 elsewhere), through the subnormals down to 0. Infinity gives 0.
+/// Returns `e^{−t}` for t ≥ 0, within 1 ulp with fused multiply-add and 2 ulp without, through the subnormals
+/// down to 0. Infinity gives 0.
 ///
-/// `t = u − k ln 2` with |u| ≤ ½ ln 2 and ln 2 in two parts, the first with enough trailing zeros for `k·hi` to be exact
-/// (Cody and Waite 1980), then a polynomial, then k added to the exponent. Branch-free: the scale 2⁶⁴ and back keeps the
-/// exponent field above 0, and the multiplication that takes it back rounds a subnormal result correctly.
+/// The argument is reduced to `u = t − k ln 2` with |u| ≤ ½ ln 2. There ln 2 is split into two parts, and the
+/// first has enough trailing zeros for `k·hi` to be exact (Cody and Waite 1980). A polynomial gives `e^{−u}`,
+/// then k is added to its exponent.
+///
+/// The code is branch-free. A scale of 2⁶⁴ keeps the exponent field above 0, and the multiplication that
+/// undoes the scale rounds a subnormal result correctly.
 #[inline(always)]
 pub(crate) fn exp_minus<S: Simd, const N: usize>(t: Pack<S, N>) -> Pack<S, N> {
     const LN_2_HI: f64 = 6.931_471_803_691_238e-1;
     const LN_2_LO: f64 = 1.908_214_929_270_587_7e-10;
-    /// Adding 1.5·2⁵² rounds to the nearest integer and leaves that integer in the low bits; here that of k + 64.
+    /// Adding 1.5·2⁵² rounds to the nearest integer and leaves that integer in the low bits. Here it is
+    /// k + 64, to include the scale 2⁶⁴.
     const ROUND: f64 = 6_755_399_441_055_744.0 + 64.0;
     /// 2⁻⁶⁴.
     const UNSCALE: f64 = 5.421_010_862_427_522e-20;
@@ -50,7 +57,8 @@ pub(crate) fn exp_minus<S: Simd, const N: usize>(t: Pack<S, N>) -> Pack<S, N> {
     for &coefficient in &COEFFICIENTS[1..] {
         p = p.mul_add(u, splat(coefficient));
     }
-    // Beyond the range a factor 0 rather than an underflow, for which some processors take a hundred cycles.
+    // Beyond the range, multiplying by 0 avoids an underflow, for which some processors take a hundred
+    // cycles.
     p.scale_by_power_of_two(shifted) * bounded.select_below(VANISHES, UNSCALE, 0.0)
 }
 
@@ -82,15 +90,17 @@ mod tests {
         }
     }
 
-    /// The error of `found` as `e^{−t}`, in ulp of the exact value (of the subnormals where that is one).
+    /// Returns the error of `found` as `e^{−t}`, in ulp of the exact value (of the subnormals if it
+    /// is one).
     ///
-    /// The exact value is `2^{−k} s`, s the Taylor series of `e^{−u}` in pairs of f64 (Dekker 1971; 30 terms at |u| ≤ 0.35
-    /// leave 1e-46), `u = t − k ln 2` from ln 2 to 86 bits. So s is right to 1e-22, a millionth of an ulp.
+    /// The exact value is `2^{−k} s`, with s the Taylor series of `e^{−u}` in pairs of f64 (Dekker 1971). At
+    /// |u| ≤ 0.35, its 30 terms leave an error of 1e-46. `u = t − k ln 2` takes ln 2 to 86 bits. So s is
+    /// accurate to 1e-22, a millionth of an ulp.
     fn error_in_ulp(t: f64, found: f64) -> f64 {
         let k = (t / std::f64::consts::LN_2).round();
         let product = k * 1.908_214_929_270_587_7e-10;
         let product_error = k.mul_add(1.908_214_929_270_587_7e-10, -product);
-        // Exact: the factor has 33 bits, and the two numbers are within a factor of 2 of each other.
+        // This is exact: the factor has 33 bits, and the two numbers are within a factor of 2 of each other.
         let high = t - k * 6.931_471_803_691_238e-1;
         let u = two_sum(high, -product);
         let u = (u.0, u.1 - product_error);
@@ -118,10 +128,10 @@ mod tests {
         two_sum(product, a.0.mul_add(b.0, -product) + (a.0 * b.1 + a.1 * b.0))
     }
 
-    /// Every binade from the smallest subnormal to the end, the ties of the reduction, and the steps into the subnormals
-    /// and to 0.
+    /// Returns arguments in every binade from the smallest subnormal to the end of the range. Added are the
+    /// ties of the reduction, and the steps into the subnormals and to 0.
     fn arguments() -> Vec<f64> {
-        // A Weyl sequence: equidistributed, and no two scaled ones share their trailing bits.
+        // A Weyl sequence is equidistributed, and no two of its scaled numbers share their trailing bits.
         let uniform = |i: i32| (f64::from(i) * 0.618_033_988_749_894_9).fract();
         let mut arguments: Vec<f64> = (0..300_000).map(|i| VANISHES * uniform(i)).collect();
         for exponent in -1074..=9 {
@@ -140,8 +150,8 @@ mod tests {
 
     #[test]
     fn the_exponential_is_within_two_ulp_over_its_range_on_every_instruction_set() {
-        // Rounding in Horner's last two steps, in u and, unfused, in the products before: under 1.5 ulp; the polynomial
-        // itself adds 0.1.
+        // Under 1.5 ulp come from rounding: in Horner's last two steps, in u and, unfused, in the products
+        // before. The polynomial itself adds 0.1 ulp.
         let arguments = arguments();
         for set in InstructionSet::available() {
             let mut worst = 0.0f64;

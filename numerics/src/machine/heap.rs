@@ -1,16 +1,19 @@
-//! Bytes that blocks take on the heap, what the allocator rounds up included.
+//! Memory that blocks take on the heap, in bytes, including what the allocator rounds up.
 
-/// Blocks up to here share a page of the allocator with others of their size class.
+/// Size in bytes up to which blocks share a page of the allocator with others of their size class.
 const LARGEST_CLASS: usize = 512 << 10;
 
-/// Beyond, blocks take whole slices of this size.
+/// Size in bytes of a slice. Larger blocks take whole slices.
 const SLICE: usize = 64 << 10;
 
-/// Bytes that a block of so many bytes takes: mimalloc (3.3) has four size classes to a doubling, on pages of 64 KiB,
-/// 512 KiB or 4 MiB whose rest stays empty, and whole slices beyond. Slices are handed out from runs of 64, which leave about
-/// one unused for each block. With transparent huge pages all of that is resident.
+/// Returns the bytes of memory that a heap block of `n_bytes` takes.
 ///
-/// Other allocators round by as much, somewhere else.
+/// The rule is that of mimalloc (3.3). It has four size classes to a doubling, on pages of 64 KiB, 512 KiB or
+/// 4 MiB. The rest of a page that fits no block stays empty. Larger blocks take whole slices. Slices are
+/// handed out from runs of 64, which leave about one slice unused for each block. With transparent huge pages
+/// all of that is resident.
+///
+/// Other allocators round by similar amounts, at other sizes.
 pub fn block_bytes(n_bytes: usize) -> usize {
     match n_bytes {
         0 => 0,
@@ -28,12 +31,12 @@ pub fn block_bytes(n_bytes: usize) -> usize {
     }
 }
 
-/// Bytes of the block behind a vector.
+/// Returns the bytes of memory that the heap block of a vector takes.
 pub fn vec_bytes<T>(vec: &Vec<T>) -> usize {
     block_bytes(vec.capacity() * size_of::<T>())
 }
 
-/// Bytes of the block behind an `Arc<T>`: the value and two counters.
+/// Returns the bytes that an `Arc<T>` asks the heap for: the value and two counters.
 pub const fn arc_payload<T>() -> usize {
     size_of::<T>() + 2 * size_of::<usize>()
 }

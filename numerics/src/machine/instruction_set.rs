@@ -1,25 +1,26 @@
-//! Which instructions the kernel loops use, chosen at run time.
+//! The instruction set of the kernel loops, chosen at run time.
 //!
-//! Everything here is safe code: [`pulp`] compiles a loop that is generic over [`pulp::Simd`] for AVX-512, for AVX2 with
-//! FMA, for NEON and for the portable baseline.
+//! Everything here is safe code: [`pulp`] compiles a loop that is generic over [`pulp::Simd`] for AVX-512,
+//! for AVX2 with FMA, for NEON and for the portable baseline.
 
 use pulp::{Simd, WithSimd};
 
-/// What the kernel loops are compiled for.
+/// An instruction set that the kernel loops are compiled for and this machine has.
 #[derive(Debug, Clone, Copy)]
 pub struct InstructionSet(pulp::Arch);
 
-/// The portable baseline: two lanes, for which every 64-bit processor has registers. 1.2 to 1.7 times as fast as single
-/// numbers where sums of Hessians prevail.
+/// The portable baseline: registers of two lanes, which every 64-bit processor has.
+///
+/// It is 1.2 to 1.7 times as fast as single numbers where sums of Hessians prevail.
 pub(crate) type Portable = pulp::Scalar128b;
 
 impl InstructionSet {
-    /// The best one of this machine.
+    /// Returns the best instruction set of this machine.
     pub fn best() -> Self {
         Self(pulp::Arch::new())
     }
 
-    /// All that this machine has, the best first, the portable one last.
+    /// Returns all instruction sets of this machine, the best first and the portable one last.
     pub fn available() -> Vec<Self> {
         let mut sets = vec![Self::best()];
         #[cfg(target_arch = "x86_64")]
@@ -32,12 +33,12 @@ impl InstructionSet {
         sets
     }
 
-    /// Numbers in a register.
+    /// Returns the number of f64 in a register.
     pub(crate) fn n_lanes(self) -> usize {
         self.dispatch(Lanes)
     }
 
-    /// As `GET /version` says it.
+    /// Returns the name that `GET /version` shows.
     pub fn name(self) -> &'static str {
         match self.0 {
             pulp::Arch::Scalar => "portable",

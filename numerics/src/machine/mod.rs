@@ -1,4 +1,4 @@
-//! What the machine offers: registers, memory, and the small vectors and matrices that fit into them.
+//! Machine resources: registers, memory and threads, with small vectors and matrices, random numbers and Φ.
 
 pub mod heap;
 pub mod instruction_set;

@@ -1,32 +1,36 @@
-//! The normal distribution.
+//! The standard normal distribution: its cumulative distribution function Φ and the inverse.
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
-/// Steps of Halley's method: each triples the digits.
+/// Limit on the steps of Halley's method. Each step triples the number of correct digits.
 const MAX_STEPS: usize = 20;
 
-/// `Φ(x)`, the probability of a standard normal number up to x.
+/// Returns `Φ(x)`, the probability that a standard normal number is at most x.
 pub fn cumulative(x: f64) -> f64 {
     0.5 * libm::erfc(-x * FRAC_1_SQRT_2)
 }
 
-/// `Φ⁻¹(p)` for p in (0, 1); NaN elsewhere. By Halley's method on `ln Φ`, which is concave, in the lower half.
+/// Returns `Φ⁻¹(p)` for p in (0, 1), and NaN elsewhere.
+///
+/// In the lower half, Halley's method solves `ln Φ(x) = ln p`, where `ln Φ` is concave. The upper half
+/// follows by symmetry.
 pub fn quantile(p: f64) -> f64 {
     if !(p > 0.0 && p < 1.0) {
         return f64::NAN;
     }
     if p > 0.5 {
-        // 1 − p is exact there.
+        // For p > ½ this difference is exact.
         return -quantile(1.0 - p);
     }
     let target = p.ln();
-    // Good to a tenth in the tail, from Φ(x) ≈ exp(−x²/2)/(|x|√2π); the slope at 0 near the median.
+    // The start is good to a tenth in the tail, from Φ(x) ≈ exp(−x²/2)/(|x|√2π). Near the median it takes the
+    // slope at 0.
     let mut x = if p > 0.1 { (p - 0.5) * TAU.sqrt() } else { -(-2.0 * target - (-2.0 * target).ln()).sqrt() };
     for _ in 0..MAX_STEPS {
         let below = cumulative(x);
         let hazard = (-0.5 * x * x).exp() / (TAU.sqrt() * below);
         let off = below.ln() - target;
-        // f = ln Φ − ln p, f′ = h, f″ = −h(x + h).
+        // With f = ln Φ − ln p and the hazard h: f′ = h, f″ = −h(x + h).
         let newton = off / hazard;
         let step = newton / (1.0 + 0.5 * newton * (x + hazard));
         x -= step;
@@ -64,7 +68,7 @@ mod tests {
         for k in 1..400 {
             let x = -8.0 + 0.04 * f64::from(k);
             let p = cumulative(x);
-            // Above the median p has few digits of 1 − p.
+            // Above the median, p holds few digits of 1 − p.
             let digits = f64::EPSILON * (2.0 + p / ((-0.5 * x * x).exp() / TAU.sqrt()));
             assert!((quantile(p) - x).abs() <= 4.0 * digits * f64::max(1.0, x.abs()), "{x}: {}", quantile(p));
         }

@@ -1,8 +1,8 @@
-//! The n² numbers of a factorization: asked for in huge pages, and kept for the next one.
+//! Buffers for the n² numbers of a factorization, mapped in huge pages and kept for the next factorization.
 //!
-//! WHY. The operating system hands out fresh memory page by page at its first touch. With pages of 4 KiB that takes, for the
-//! 128 MB of 4,000 points, a third of the factorization's own time or more; with huge pages some 10 ms; and memory that
-//! was used before takes nothing. So a buffer that is given back is kept.
+//! WHY. The operating system hands out fresh memory page by page, at the first touch. For the 128 MB of 4,000
+//! points this takes a third of the factorization's own time or more with pages of 4 KiB. With huge pages it
+//! takes some 10 ms, and with memory that was used before nothing. So a buffer that is given back is kept.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,13 +12,16 @@ use memmap2::MmapMut;
 use super::heap::vec_bytes;
 use crate::error::NumericsError;
 
-/// Buffers from this size on are mapped: below it the allocator recycles memory by itself, and no huge page is filled.
+/// Size in bytes from which buffers are mapped. The allocator recycles smaller ones by itself, and they would
+/// fill no huge page.
 const MAPPED_BYTES: usize = 4 << 20;
 
-/// A kept buffer serves whatever fills it but for one part in this many, so that what a factor weighs is what it takes.
+/// Divisor that limits the waste of reuse: a kept buffer serves a request if it is at most 1/32 larger.
+///
+/// So the memory that a factor takes is close to its own size.
 const SLACK: usize = 32;
 
-/// Keeps the last large buffer that was given back, up to a size, for whoever asks next.
+/// A store for the last large buffer that was given back, up to a size limit. The next taker reuses it.
 #[derive(Debug, Default)]
 pub struct SpareBuffer {
     kept: Mutex<Option<MmapMut>>,
@@ -26,12 +29,13 @@ pub struct SpareBuffer {
 }
 
 impl SpareBuffer {
-    /// Keeps buffers of at most so many bytes; 0 keeps none.
+    /// Returns an empty store that keeps a buffer of at most `max_bytes`. A limit of 0 keeps none.
     pub fn up_to(max_bytes: usize) -> Arc<Self> {
         Arc::new(Self { kept: Mutex::new(None), max_bytes })
     }
 
-    /// A buffer of `n_numbers` numbers that nobody has given a meaning: zeros, or what an earlier user left.
+    /// Returns a buffer of `n_numbers` numbers with unspecified contents: zeros, or the numbers of an earlier
+    /// user.
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
@@ -40,7 +44,7 @@ impl SpareBuffer {
         if n_bytes < MAPPED_BYTES {
             return Ok(Buffer { pages: Pages::Heap(vec![0.0; n_numbers]), n_numbers, home: None });
         }
-        // What does not fit is unmapped here, before the new buffer is mapped.
+        // A kept buffer that does not fit is unmapped here, before the new one is mapped.
         let kept = self.kept().take();
         let fits = |map: &MmapMut| (n_bytes..=n_bytes + n_bytes / SLACK).contains(&map.len());
         let map = match kept.filter(fits) {
@@ -50,7 +54,7 @@ impl SpareBuffer {
         Ok(Buffer { pages: Pages::Mapped(map), n_numbers, home: Some(self.clone()) })
     }
 
-    /// Bytes that are kept.
+    /// Returns the size in bytes of the kept buffer, or 0.
     pub fn n_bytes(&self) -> usize {
         self.kept().as_ref().map_or(0, |map| map.len())
     }
@@ -69,13 +73,13 @@ impl SpareBuffer {
 
 fn map_huge(n_bytes: usize) -> Result<MmapMut, NumericsError> {
     let map = MmapMut::map_anon(n_bytes).map_err(|_| NumericsError::OutOfMemory { n_bytes })?;
-    // Only a hint: systems without huge pages refuse it, and small ones do.
+    // This is only a hint, so a refusal (a system without huge pages) does no harm.
     #[cfg(target_os = "linux")]
     let _ = map.advise(memmap2::Advice::HugePage);
     Ok(map)
 }
 
-/// Numbers in one piece. A large buffer goes back to where it came from.
+/// A contiguous buffer of f64. When dropped, a mapped one goes back to its [`SpareBuffer`].
 pub(crate) struct Buffer {
     pages: Pages,
     n_numbers: usize,
@@ -85,12 +89,12 @@ pub(crate) struct Buffer {
 enum Pages {
     Heap(Vec<f64>),
     Mapped(MmapMut),
-    /// Given back.
+    /// No memory: the destructor has moved it out.
     Gone,
 }
 
 impl Buffer {
-    /// Bytes that it takes, whether or not they are used.
+    /// Returns the bytes of memory that the buffer takes, used or not.
     pub(crate) fn n_bytes(&self) -> usize {
         match &self.pages {
             Pages::Heap(numbers) => vec_bytes(numbers),
@@ -99,7 +103,7 @@ impl Buffer {
         }
     }
 
-    /// Returns the memory to the operating system instead of keeping it.
+    /// Returns the memory to the operating system instead of giving it back to the [`SpareBuffer`].
     pub(crate) fn discard(mut self) {
         self.home = None;
     }
@@ -111,7 +115,7 @@ impl Deref for Buffer {
     fn deref(&self) -> &[f64] {
         match &self.pages {
             Pages::Heap(numbers) => numbers,
-            // Mappings begin at a page, so they are aligned for numbers.
+            // Mappings begin at a page boundary, so they are aligned for f64.
             Pages::Mapped(map) => bytemuck::cast_slice(&map[..self.n_numbers * size_of::<f64>()]),
             Pages::Gone => &[],
         }
@@ -159,7 +163,7 @@ mod tests {
         let second = spare.take(LARGE - LARGE / 64).unwrap();
         assert_eq!(address(&second), at);
         assert!(second.iter().all(|&x| x == 7.0));
-        // While one is out, another is fresh.
+        // While the kept buffer is in use, another taker gets a fresh one.
         assert_ne!(address(&spare.take(LARGE).unwrap()), at);
     }
 

@@ -1,14 +1,14 @@
-//! Random numbers that a seed determines, whatever the machine and the number of threads.
+//! Random numbers that depend on the seed alone, not on the machine or the number of threads.
 
 use std::f64::consts::TAU;
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
+/// The random number generator SplitMix64 (Steele, Lea and Flood 2014).
 pub(crate) struct Random(u64);
 
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Random {
-    /// One of many streams of a seed.
+    /// Starts the stream number `stream` of a seed.
     pub(crate) fn of(seed: u64, stream: u64) -> Self {
         Self(mixed(seed.wrapping_add(STEP)) ^ mixed(stream.wrapping_mul(STEP)))
     }
@@ -18,7 +18,7 @@ impl Random {
         mixed(self.0)
     }
 
-    /// Uniform in [0, 1), a multiple of 2⁻⁵³.
+    /// Returns a number uniform in [0, 1), a multiple of 2⁻⁵³.
     fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -57,7 +57,8 @@ mod tests {
         assert_eq!(a, draw(7, 0));
         let n = a.len() as f64;
         let mean = |of: &dyn Fn(usize) -> f64| (0..a.len()).map(of).sum::<f64>() / n;
-        // Four standard errors: 1/√n of a mean, √(2/n) and √(96/n) of the second and fourth moment.
+        // The bounds are four standard errors: 1/√n of a mean, √(2/n) and √(96/n) of the second and fourth
+        // moment.
         assert!(mean(&|i| a[i]).abs() < 4.0 / n.sqrt());
         assert!((mean(&|i| a[i] * a[i]) - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
         assert!((mean(&|i| a[i].powi(4)) - 3.0).abs() < 4.0 * (96.0 / n).sqrt());

@@ -1,11 +1,13 @@
-//! Registers of f64 with the arithmetic of formulas.
+//! SIMD registers of f64 with the operators of arithmetic.
 //!
-//! A formula is written once, over [`Pack`]s, for every instruction set. A pack is a few registers side by side: the
-//! instructions of one do not wait for those of another, which hides the latency of long dependent chains such as the
-//! polynomial of the exponential. Every function between [`super::instruction_set::InstructionSet::dispatch`] and
-//! here is `#[inline(always)]`, and loop bodies and profiles are methods of traits, not closures or functions passed as
-//! values: what is not compiled into the dispatched function itself falls back to one call per instruction, 50 times
-//! slower.
+//! A formula is written once, over [`Pack`]s, for every instruction set. A pack is a few registers side by
+//! side. Instructions on one register do not wait for those on another. This hides the latency of long
+//! dependent chains, such as the polynomial of the exponential.
+//!
+//! Every function between [`super::instruction_set::InstructionSet::dispatch`] and here is
+//! `#[inline(always)]`. Loop bodies and profiles are methods of traits, not closures or functions passed as
+//! values. Otherwise they would not be compiled into the dispatched function itself. Code outside it falls
+//! back to one call per instruction, 50 times slower.
 
 use std::any::{Any, TypeId};
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -14,15 +16,19 @@ use pulp::Simd;
 
 use super::instruction_set::Portable;
 
-/// Points per block: a multiple of every pack. The temporaries of a pass over 128 pairs at d = 3 are 6 KiB of L1 cache;
-/// blocks of 64 sum Hessians 20 % slower, of 256 no more than 3 % faster.
+/// Points per block: a multiple of every pack.
+///
+/// The temporaries of a pass over 128 pairs at d = 3 are 6 KiB of L1 cache. Blocks of 64 sum Hessians 20 %
+/// slower, blocks of 256 no more than 3 % faster.
 pub(crate) const BLOCK: usize = 128;
 
-/// Registers per pack where a profile is computed. By `cargo bench --bench kernels` 8 are 10 to 20 % faster than 4 and up to
-/// 40 % faster than 2, with 32 registers (AVX-512) and with 16 (AVX2): what does not fit waits in the L1 cache.
+/// Registers per pack where a profile is computed.
+///
+/// By `cargo bench --bench kernels`, 8 are 10 to 20 % faster than 4 and up to 40 % faster than 2. This holds
+/// with 32 registers (AVX-512) and with 16 (AVX2): packs that do not fit wait in the L1 cache.
 pub(crate) const IN_FLIGHT: usize = 8;
 
-/// One number per point of a block, on the boundary of a cache line, so that no load straddles two.
+/// The numbers of a block, one per point. They start at a cache line, so that no load straddles two.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct Block(pub(crate) [f64; BLOCK]);
@@ -31,7 +37,7 @@ impl Block {
     pub(crate) const ZERO: Self = Self([0.0; BLOCK]);
 }
 
-/// `N` registers, i.e. `N · S::F64_LANES` numbers.
+/// A pack of `N` registers, i.e. `N · S::F64_LANES` numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct Pack<S: Simd, const N: usize = IN_FLIGHT> {
     simd: S,
@@ -52,7 +58,7 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self.simd
     }
 
-    /// The numbers of a block from `at · N · S::F64_LANES` on.
+    /// Loads pack number `at` of a block: its numbers from `at · N · S::F64_LANES` on.
     #[inline(always)]
     pub(crate) fn load(simd: S, block: &Block, at: usize) -> Self {
         let (registers, _) = S::as_simd_f64s(&block.0);
@@ -65,7 +71,7 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         registers.as_chunks_mut().0[at] = self.registers;
     }
 
-    /// The numbers of a list of registers from `at · N` on.
+    /// Reads pack number `at` of a list of registers: those from `at · N` on.
     #[inline(always)]
     pub(crate) fn read(simd: S, registers: &[S::f64s], at: usize) -> Self {
         Self { simd, registers: registers.as_chunks().0[at] }
@@ -76,11 +82,13 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         registers.as_chunks_mut().0[at] = self.registers;
     }
 
-    /// `self·b + c`, rounded once where the instruction set has it (elsewhere a library call would cost more than it is
-    /// worth).
+    /// Returns `self·b + c`, rounded once if the instruction set has a fused instruction.
+    ///
+    /// Otherwise it rounds twice, because the library call that rounds once would cost more than it is worth.
     #[inline(always)]
     pub(crate) fn mul_add(mut self, b: Self, c: Self) -> Self {
-        // The one set that has no fused multiplication and does not say so. Decided when compiled.
+        // The portable set has no fused instruction, and its `mul_add_e_f64s` would call the library. Decided
+        // when compiled.
         if TypeId::of::<S>() == TypeId::of::<Portable>() {
             return self * b + c;
         }
@@ -95,10 +103,12 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self.map(|simd, x| simd.sqrt_f64s(x))
     }
 
-    /// √x and 1/√x for x in [1e-200, 1e300], within 1 ulp and 2; what is not used is not computed.
+    /// Returns √x within 1 ulp and 1/√x within 2 ulp, for x in [1e-200, 1e300]. A result that is not used is
+    /// not computed.
     ///
-    /// With AVX-512 from an approximation to 14 bits, by a step of Goldschmidt's iteration and a correction of the rounding each
-    /// (Markstein 2004): ten instructions for what the dividing unit takes 40 cycles per register.
+    /// With AVX-512 it starts from an approximation to 14 bits. One step of Goldschmidt's iteration follows,
+    /// then a correction of the rounding of each result (Markstein 2004). These are ten instructions, where
+    /// the dividing unit takes 40 cycles per register.
     #[inline(always)]
     pub(crate) fn sqrt_and_inverse(self) -> (Self, Self) {
         let Some(approximate) = self.approximate_inverse_sqrt() else {
@@ -111,13 +121,13 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         let root = root.mul_add(error, root);
         let minus_half_inverse = minus_half_inverse.mul_add(error, minus_half_inverse);
         let root = root.mul_add(root, -self).mul_add(minus_half_inverse, root);
-        // The root is right now, so that the whole error is that of the inverse.
+        // The root is right now, so the whole error is that of the inverse.
         let minus_inverse = minus_half_inverse * 2.0;
         let error = root.mul_add(minus_inverse, splat(1.0));
         (root, -minus_inverse.mul_add(error, minus_inverse))
     }
 
-    /// 1/√x to 14 bits, where there is an instruction for it. Decided when compiled.
+    /// Returns 1/√x to 14 bits, or `None` if there is no instruction for it. Decided when compiled.
     #[inline(always)]
     fn approximate_inverse_sqrt(self) -> Option<Self> {
         #[cfg(target_arch = "x86_64")]
@@ -142,7 +152,7 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self.map(|simd, x| simd.min_f64s(x, simd.splat_f64s(bound)))
     }
 
-    /// `yes` where the number is below the bound, `no` elsewhere.
+    /// Returns `yes` where the number is below the bound, and `no` elsewhere.
     #[inline(always)]
     pub(crate) fn select_below(self, bound: f64, yes: f64, no: f64) -> Self {
         self.map(|simd, x| {
@@ -151,13 +161,14 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         })
     }
 
-    /// Adds the low 12 bits of `exponents`, an integer in the low bits of a float, to the exponents: `self · 2^k`.
+    /// Returns `self · 2^k`: adds k to the exponent fields. k is the integer in the low 12 bits of each float
+    /// in `exponents`.
     #[inline(always)]
     pub(crate) fn scale_by_power_of_two(mut self, exponents: Self) -> Self {
         let simd = self.simd;
         for i in 0..N {
             let k = simd.transmute_u64s_f64s(exponents.registers[i]);
-            // A multiplication by a power of two compiles to a shift; the trait has no shift of 64 bits.
+            // The trait has no shift of 64 bits. A multiplication by a power of two compiles to one.
             let k = simd.mul_u64s(k, simd.splat_u64s(1 << 52));
             let bits = simd.transmute_u64s_f64s(self.registers[i]);
             self.registers[i] = simd.transmute_f64s_u64s(simd.add_u64s(bits, k));
@@ -165,8 +176,9 @@ impl<S: Simd, const N: usize> Pack<S, N> {
         self
     }
 
-    /// A sum and the products with another pack, register by register. The chain of so many additions is shorter than what else
-    /// there is to do for a pack.
+    /// Returns `sum` plus the products with `other`, added register by register.
+    ///
+    /// These N additions wait for each other, but their chain is shorter than the other work on a pack.
     #[inline(always)]
     pub(crate) fn add_products_to(self, other: Self, mut sum: Pack<S, 1>) -> Pack<S, 1> {
         for i in 0..N {
@@ -186,7 +198,7 @@ impl<S: Simd, const N: usize> Pack<S, N> {
 }
 
 impl<S: Simd> Pack<S, 1> {
-    /// The sum of the lanes.
+    /// Returns the sum of the lanes.
     #[inline(always)]
     pub(crate) fn sum_lanes(self) -> f64 {
         self.simd.reduce_sum_f64s(self.registers[0])
@@ -241,7 +253,7 @@ mod tests {
     use super::*;
     use crate::machine::instruction_set::InstructionSet;
 
-    /// Square roots of numbers, and their inverses.
+    /// Computes the square roots of numbers and their inverses.
     struct Roots<'a>(&'a [f64]);
 
     impl WithSimd for Roots<'_> {
@@ -266,17 +278,18 @@ mod tests {
 
     #[test]
     fn roots_are_right_to_an_ulp_and_their_inverses_to_two() {
-        // A Weyl sequence over every binade of the range, and squares, whose roots are exact.
+        // The numbers are a Weyl sequence over every binade of the range, and squares, whose roots are exact.
         let mantissa = |i: i32| 1.0 + (f64::from(i) * 0.618_033_988_749_894_9).fract();
         let mut numbers: Vec<f64> =
             (0..200_000).map(|i| mantissa(i) * 2f64.powi(i % 1659 - 664)).filter(|x| *x < 1e300).collect();
         numbers.extend((1..5000).map(|i| f64::from(i * i)));
         for set in InstructionSet::available() {
             for (&x, (root, inverse)) in numbers.iter().zip(set.dispatch(Roots(&numbers))) {
-                // root² − x to the last bit, in units of the root.
+                // The error of the root: (root² − x)/(2·root), with the difference rounded only once.
                 let error = root.mul_add(root, -x) / (2.0 * root);
                 assert!(error.abs() <= root.next_up() - root, "√{x:e} on {}: off by {error:e}", set.name());
-                // inverse²·x − 1 by the root and what that lacks: inverse·root is rounded once, ε/4 of an ulp at most.
+                // The relative error of the inverse: inverse·(root − error) − 1. The product inverse·root − 1
+                // is rounded once, by at most ε/4 of an ulp.
                 let product = inverse.mul_add(root, -1.0) - inverse * error;
                 let allowed = 2.0 * (inverse.next_up() - inverse) / inverse;
                 assert!(product.abs() <= allowed, "1/√{x:e} on {}: off by {product:e}", set.name());

@@ -2,10 +2,10 @@
 
 use smallvec::SmallVec;
 
-/// As many numbers as a matrix in four dimensions has; beyond them they go to the heap.
+/// A short vector of f64. Up to 16 numbers, a matrix in four dimensions, are on the stack, more on the heap.
 pub(crate) type Small = SmallVec<[f64; 16]>;
 
-/// So many zeros.
+/// Returns `n` zeros.
 pub(crate) fn zeros(n: usize) -> Small {
     Small::from_elem(0.0, n)
 }

@@ -1,4 +1,4 @@
-//! Small vectors as slices.
+//! Arithmetic of small vectors, given as slices.
 
 use super::small::Small;
 
@@ -6,7 +6,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `√Σv²`; where the squares leave the range of float64 the components are scaled first.
+/// Returns `√Σv²`. If the squares leave the range of float64, the components are scaled first.
 pub(crate) fn norm(v: &[f64]) -> f64 {
     let squared = dot(v, v);
     if (f64::MIN_POSITIVE / f64::EPSILON..f64::INFINITY).contains(&squared) {
@@ -19,8 +19,9 @@ pub(crate) fn norm(v: &[f64]) -> f64 {
     largest * v.iter().map(|c| (c / largest).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The vector of length 1 in the same direction; zero for zero. Components are scaled first, so that none is lost to the range
-/// of float64.
+/// Returns the vector of length 1 in the same direction, or zero for zero.
+///
+/// Components are scaled first, so that none is lost to the range of float64.
 pub(crate) fn unit(v: &[f64]) -> Small {
     let largest = v.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 {
@@ -31,14 +32,15 @@ pub(crate) fn unit(v: &[f64]) -> Small {
     scaled.iter().map(|c| c / length).collect()
 }
 
-/// An orthonormal basis of ν's complement as rows, `[d−1, d]`: the other columns of the Householder reflection that maps ν to
-/// ±e₁.
+/// Returns an orthonormal basis of the complement of the unit vector ν, as rows `[d−1, d]`.
+///
+/// The rows are the other columns of the Householder reflection that maps ν to ±e₁.
 pub(crate) fn tangent_basis(normal: &[f64]) -> Small {
     let d = normal.len();
     let sign = if normal[0] < 0.0 { -1.0 } else { 1.0 };
     let mut w = Small::from_slice(normal);
     w[0] += sign;
-    // |w|² = 2(1 + |ν₁|) for a unit ν: no cancellation by the choice of sign.
+    // For a unit ν, |w|² = 2(1 + |ν₁|): the choice of sign avoids cancellation.
     let factor = 1.0 / (1.0 + normal[0].abs());
     let entry = |axis: usize, i: usize| f64::from(u8::from(i == axis)) - factor * w[i] * w[axis];
     (1..d).flat_map(|axis| (0..d).map(move |i| (axis, i))).map(|(axis, i)| entry(axis, i)).collect()
@@ -54,7 +56,7 @@ mod tests {
             let found = unit(&[3.0 * size, 0.0, -4.0 * size]);
             assert!((found[0] - 0.6).abs() < 1e-15 && (found[2] + 0.8).abs() < 1e-15, "{size}: {found:?}");
         }
-        // Normals of merged points may cancel.
+        // The normals of merged points may cancel.
         assert_eq!(unit(&[0.0, 0.0])[..], [0.0, 0.0]);
     }
 

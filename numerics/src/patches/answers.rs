@@ -16,45 +16,48 @@ use crate::machine::vector::norm;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-/// The surface at m queries, in flat arrays; entries of queries without answer are zero.
+/// Geometry of the surface at m queries, in flat arrays. Entries of queries without an answer are zero.
 pub struct PatchGeometry {
-    /// Whether there is an answer, `[m]`.
+    /// True for queries with an answer, `[m]`.
     pub is_known: Vec<bool>,
     /// Unit normals of either sign, `[m, d]`.
     pub normals: Vec<f64>,
-    /// Minus the second derivatives of the height, over the tangent plane, in space, `[m, d, d]`, 1/L: the shape operator for these
-    /// normals.
+    /// Shape operators for these normals, `[m, d, d]`, 1/L: minus the second derivatives of the height over
+    /// the tangent plane, in the coordinates of space.
     pub shapes: Vec<f64>,
-    /// Whether the query is at the rim of its neighbourhood, `[m]`.
+    /// True for queries at the rim of their neighbourhood, `[m]`.
     pub is_at_rim: Vec<bool>,
     /// Height of the query above the surface along the normal, `[m]`, L.
     pub heights: Vec<f64>,
-    /// `[m]`, radians.
+    /// Standard deviations of the angles of the normals, `[m]`, radians.
     pub normal_deviations: Vec<f64>,
     /// Deviations of the curvatures, if asked for.
     pub curvatures: Option<CurvatureDeviations>,
 }
 
-/// Standard deviations of curvatures, 1/L (1/L^{d−1} for Gauss), in flat arrays; principal ones ascending by the curvatures for the
-/// normals they come with.
+/// Standard deviations of curvatures in flat arrays, unit 1/L, and 1/L^{d−1} for the Gaussian one. Those of
+/// principal curvatures are in the ascending order of the curvatures for the normals they come with.
 #[derive(Default)]
 pub struct CurvatureDeviations {
-    /// `[m, d−1]`
+    /// Principal curvatures, `[m, d−1]`.
     pub principal: Vec<f64>,
-    /// `[m]`
+    /// Mean curvature, `[m]`.
     pub mean: Vec<f64>,
-    /// `[m]`
+    /// Gaussian curvature, `[m]`.
     pub gaussian: Vec<f64>,
-    /// Whether the surface turns by a radian or more within the radius of the neighbourhood, `[m]`: too much for a quadric, and for
-    /// what deviations can say.
+    /// True where the surface turns by a radian or more within the radius of the neighbourhood, `[m]`. A
+    /// quadric cannot follow such a turn, and the deviations miss it.
     pub is_bent: Vec<bool>,
 }
 
-/// Largest curvature in units of the radius of the neighbourhood from which a surface is bent: half of what is off by half in spite of small
-/// deviations is beyond, and 2 % of what is right (docs/error-bars.md).
+/// Least bend of a bent surface: its largest curvature in units of the radius of the neighbourhood.
+///
+/// Half of the curvatures that are off by half in spite of small deviations lie beyond it. Only 2 % of the
+/// right ones do (docs/error-bars.md).
 const BENT: f64 = 1.0;
 
-/// Deviation of a normal below which its neighbourhood is flat enough for a stiffer process to give the slopes, radians.
+/// Deviation of a normal, in radians, below which its neighbourhood is flat. The stiffer process then gives
+/// the slopes.
 const FLAT: f64 = 0.03;
 
 impl PatchGeometry {
@@ -76,7 +79,7 @@ impl PatchGeometry {
         }
     }
 
-    /// The places of every `lanes` queries.
+    /// Splits the arrays into one part for every `lanes` queries.
     fn slots(&mut self, d: usize, lanes: usize) -> Vec<Slots<'_>> {
         let n_slots = self.is_known.len().div_ceil(lanes);
         let mut curvatures: Vec<Option<CurvatureSlots<'_>>> = Vec::new();
@@ -101,7 +104,7 @@ impl PatchGeometry {
     }
 }
 
-/// The part of a [`PatchGeometry`] that belongs to the queries of one batch.
+/// Part of a [`PatchGeometry`] that belongs to the queries of one batch.
 struct Slots<'a> {
     normals: &'a mut [f64],
     shapes: &'a mut [f64],
@@ -141,7 +144,8 @@ impl Slots<'_> {
 }
 
 impl Patches {
-    /// Normals, curvatures and deviations at queries. `are_points` says that they are the points themselves, with their noise.
+    /// Computes normals, curvatures and deviations at queries. `are_points` says that the queries are points
+    /// of the cloud, with their noise.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -179,7 +183,8 @@ impl Patches {
         Ok(geometry)
     }
 
-    /// What is known in each lane: by the models, but for the slopes of what is flat, which are those of the stiff ones.
+    /// Estimates the surface in each lane by `models`. Where it is flat, the slopes are taken from the
+    /// `stiff` models.
     fn estimates(
         &self,
         room: &mut Room,
@@ -206,7 +211,7 @@ impl Patches {
     }
 }
 
-/// Unit normal and shape operator in space.
+/// Unit normal and shape operator in the coordinates of space.
 fn in_space(estimate: &Estimate, place: &Neighbourhood, d: usize) -> (Small, Small) {
     let k = d - 1;
     let axis = |i: usize| &place.frame[i * d..][..d];

@@ -1,39 +1,46 @@
-//! What the models say together of the surface at one query.
+//! Estimate of the surface at one query: the mixture of the models there.
 
 use super::pooled::{Weighted, responsibilities};
 use super::regression::{Kriged, Squares, Terms, n_terms};
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 
-/// Deviations of normals over those of the posterior: noise that neighbours share is more than it says.
+/// Ratio of the deviations of normals to those of the posterior. It exceeds 1 because neighbours share noise,
+/// which the posterior does not know.
 const NORMAL_CALIBRATION: f64 = 1.07;
 
-/// Deviations of curvatures over those of the posterior, by the largest curvature in units of the radius of the neighbourhood. Up to
-/// 0.6 what the curvature entails leaves less of the surface to the process than this expects; beyond, more (docs/error-bars.md).
+/// Ratio of the deviations of curvatures to those of the posterior, by `bend`, the largest curvature in units
+/// of the radius of the neighbourhood.
+///
+/// Up to a bend of 0.6 the entailed height leaves less of the surface to the process than the process
+/// expects. Beyond, it leaves more (docs/error-bars.md).
 fn curvature_calibration(bend: f64) -> f64 {
     0.80 + 0.95 * (bend.min(1.2) - 0.6).max(0.0)
 }
 
-/// Expectation of |x| over its deviation, for a normal x of mean 0.
+/// Expectation of |x| divided by its deviation, for a normal x of mean 0.
 const MEAN_MAGNITUDE: f64 = 0.8;
 
-/// 95 % bound of the length of an error in the plane with equal deviations, against 1.96, squared, minus 1.
+/// Weight of the variances beside the largest one: `(b/1.96)² − 1`. Here b bounds 95 % of the lengths of an
+/// error in the plane with equal deviations of 1.
 const SECOND_DIRECTION: f64 = 0.56;
 
-/// Heights over a tangent plane with derivatives up to second order and their uncertainty, all in units of the radius of the
-/// neighbourhood: the fourth powers of lengths that variances of curvatures are would leave the range of float64.
+/// Height over a tangent plane with its derivatives up to second order and their covariance.
+///
+/// All are in units of the radius of the neighbourhood. Variances of curvatures hold fourth powers of
+/// lengths, which would leave the range of float64.
 pub(crate) struct Estimate {
     /// Value, slopes, second derivatives, `[p]`.
     pub means: Terms,
     pub covariance: Squares,
     /// σ²: variance of a point across the surface.
     pub noise: f64,
-    /// Variance of a third derivative along three axes, by the prior.
+    /// Prior variance of a third derivative along three different axes.
     pub third: f64,
 }
 
 impl Estimate {
-    /// The mixture of what each model says; `None` where none says anything.
+    /// Mixes the models by their posterior probabilities. Returns `None` if no model has an answer.
     pub(crate) fn of(models: &[Weighted], kriged: &[Kriged], dimension: usize) -> Option<Self> {
         let p = n_terms(dimension);
         let shares = responsibilities(models, kriged);
@@ -44,7 +51,7 @@ impl Estimate {
         }
         let mut covariance = Squares::from_elem(0.0, p * p);
         for (share, kriged) in used() {
-            // Of Student's t distribution, the scale being estimated.
+            // Student's t distribution is wider than the normal one, because the scale is estimated.
             let widening = kriged.freedom / (kriged.freedom - 2.0).max(1.0);
             for i in 0..p {
                 for j in 0..p {
@@ -68,7 +75,8 @@ impl Estimate {
         Some(Self { means, covariance, noise, third })
     }
 
-    /// Slopes as another mixture has them, as uncertain as there and as two opinions that differ as much as these.
+    /// Takes the slopes of `other`. Their covariance is that of `other` plus a quarter of the squared
+    /// difference.
     pub(crate) fn take_slopes(&mut self, other: Option<Self>, dimension: usize) {
         let Some(other) = other else { return };
         let p = n_terms(dimension);
@@ -94,8 +102,10 @@ impl Estimate {
         hessian
     }
 
-    /// Deviation of the angle of the normal, radians: what a normal error within which 95 % of the angles lie would have. `moves`
-    /// says whether the query itself is a point with noise, which moves it along the surface too.
+    /// Standard deviation of the angle of the normal, radians. It is such that 95 % of the angles lie within
+    /// 1.96 of it.
+    ///
+    /// `moves` says that the query itself is a point with noise, which also moves it along the surface.
     pub(crate) fn normal_deviation(&self, dimension: usize, moves: bool) -> f64 {
         let (k, p) = (dimension - 1, n_terms(dimension));
         let hessian = self.hessian(dimension);
@@ -113,10 +123,12 @@ impl Estimate {
         NORMAL_CALIBRATION * (largest + SECOND_DIRECTION * others).sqrt()
     }
 
-    /// Principal curvatures for the normal of the frame, ascending, and the deviations of these, of their mean and of their product.
+    /// Returns the deviations of the principal curvatures, of their mean and of their product, and the bend.
+    /// Principal curvatures are those for the normal of the frame, ascending.
     ///
-    /// By the delta method: to first order `dκ_i = −v_iᵀ dH v_i`. Eigenvalues repel: where two of them are closer than the deviation
-    /// of the entry between them, what that moves them by is added.
+    /// The deviations follow by the delta method: to first order `dκ_i = −v_iᵀ dH v_i`. Eigenvalues repel
+    /// each other. Where two of them are closer than the deviation of the entry between them, the shift that
+    /// this causes is added.
     pub(crate) fn curvatures(&self, dimension: usize, moves: bool) -> CurvatureEstimate {
         let (k, p) = (dimension - 1, n_terms(dimension));
         let shape: Small = self.hessian(dimension).iter().map(|h| -h).collect();
@@ -162,17 +174,17 @@ impl Estimate {
     }
 }
 
-/// Sums over two directions of displacement of the variances of `∂z_aa` and of `∂(z_ss + z_tt)/2`, in units of the variance of `∂³z` along
-/// one axis over 15.
+/// Variances of `∂z_aa` and of `∂(z_ss + z_tt)/2`, each summed over two directions of displacement. The unit
+/// is a 15th of the variance of `∂³z` along one axis.
 const THIRD_OF_CURVATURE: f64 = 18.0;
 const THIRD_OF_MEAN: f64 = 12.0;
 
-/// In units of the radius of the neighbourhood.
+/// Deviations of curvatures and the bend, in units of the radius of the neighbourhood.
 pub(crate) struct CurvatureEstimate {
     pub principal: Small,
     pub mean: f64,
     pub gaussian: f64,
-    /// The largest curvature.
+    /// Largest absolute curvature.
     pub bend: f64,
 }
 
@@ -188,7 +200,7 @@ fn form(u: &[f64], v: &[f64]) -> Terms {
     coefficients
 }
 
-/// Index of a second derivative among the terms.
+/// Index of the second derivative along axes a and b among the terms.
 fn second(k: usize, a: usize, b: usize) -> usize {
     let (a, b) = (a.min(b), a.max(b));
     k + 1 + a * k - a * (a + 1) / 2 + b

@@ -1,4 +1,4 @@
-//! What a surface is regressed on: the points of a cloud, or means of a few of them.
+//! Data of the regression: the points of a cloud, or means of a few of them.
 
 use std::sync::Arc;
 
@@ -12,9 +12,9 @@ use crate::points::sampling::Sampling;
 
 /// Points, or means of points, with their neighbours.
 ///
-/// The mean of m points has the m-th part of their noise, and a neighbourhood of so many means reaches √m times as far: that is how
-/// neighbourhoods grow with the noise at the same cost. Polynomials of second order are averaged exactly, by the second moments
-/// of the points about their mean.
+/// The mean of m points has the m-th part of their noise, and a neighbourhood of equally many means reaches
+/// √m times as far. So neighbourhoods grow with the noise at the same cost. Polynomials of second order are
+/// averaged exactly, by the second moments of the points about their mean.
 pub(crate) enum Support {
     Points { cloud: Arc<Cloud>, sampling: Arc<Sampling> },
     Means(Means),
@@ -23,14 +23,15 @@ pub(crate) enum Support {
 pub(crate) struct Means {
     cloud: Cloud,
     neighbours: Neighbours,
-    /// Points of each mean, `[n]`.
+    /// Number of points of each mean, `[n]`.
     counts: Vec<f64>,
-    /// Second moments about it, over the count, upper triangles `[n, d(d+1)/2]`, unit L².
+    /// Second moments of the points about their mean, divided by their number, unit L². Upper triangles,
+    /// `[n, d(d+1)/2]`.
     moments: Vec<f64>,
 }
 
 impl Support {
-    /// Means of cells of at most `group` points.
+    /// Averages cells of at most `group` points.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -63,7 +64,7 @@ impl Support {
         }
     }
 
-    /// Points per mean: 1 for points.
+    /// Number of points behind one mean, 1 for a point.
     pub(crate) fn count(&self, at: usize) -> f64 {
         match self {
             Self::Points { .. } => 1.0,
@@ -71,7 +72,7 @@ impl Support {
         }
     }
 
-    /// `uᵀMv` of the second moments M of a mean.
+    /// Returns `uᵀMv`, M the second moments of a mean, or 0 for a point.
     pub(crate) fn moment(&self, at: usize, u: &[f64], v: &[f64]) -> f64 {
         let Self::Means(means) = self else { return 0.0 };
         let d = u.len();
@@ -88,12 +89,12 @@ impl Support {
         sum
     }
 
-    /// Whether its points stand for several of the cloud.
+    /// Returns whether the data are means, which have second moments.
     pub(crate) fn has_moments(&self) -> bool {
         matches!(self, Self::Means(_))
     }
 
-    /// Bytes held on the heap beside the cloud and its sampling.
+    /// Bytes held on the heap besides the cloud and its sampling.
     pub(crate) fn n_bytes(&self) -> usize {
         match self {
             Self::Points { .. } => 0,

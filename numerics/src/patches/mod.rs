@@ -1,9 +1,11 @@
-//! Local regression: a surface as heights over a tangent plane at every query, kriged from the nearest points.
+//! Local regression: the surface around each query as a height over its tangent plane, kriged from the
+//! nearest points.
 //!
-//! The surface around a query is a height over its tangent plane: a quadric, what its curvature entails beyond second order, a Gaussian
-//! process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample of neighbourhoods
-//! (`pooled`), and so does the size of the neighbourhoods, which grows with the noise (`means`). The posterior gives normal and
-//! curvatures with their deviations (`estimate`). Everything is local: work and memory are linear in points and queries.
+//! The height is the sum of a quadric, the entailed height that its curvature implies beyond second order, a
+//! Gaussian process and noise (`regression`). Hyperparameters come from the likelihood pooled over a sample
+//! of neighbourhoods (`pooled`). The size of the neighbourhoods is chosen along with them and grows with the
+//! noise (`means`). The posterior gives normal and curvatures with their deviations (`estimate`). Everything
+//! is local: work and memory are linear in points and queries.
 
 mod answers;
 mod estimate;
@@ -29,44 +31,46 @@ use room::{Found, Purpose};
 
 pub use answers::{CurvatureDeviations, PatchGeometry};
 
-/// Neighbourhoods whose likelihood is pooled, or fewer than twice as many.
+/// Number of neighbourhoods whose likelihood is pooled, or fewer than twice as many.
 const N_SITES: usize = 96;
 
-/// Those at most, where others choose them.
+/// Greatest number of sites that a caller of [`Patches::learned_at`] may choose.
 pub const MAX_SITES: usize = 2 * N_SITES;
 
-/// Points per mean that are tried, one after the other.
+/// Points per mean, tried in this order.
 const GROUPS: [usize; 7] = [1, 3, 8, 24, 72, 216, 648];
 
-/// Means that a cloud must leave for it to be worth trying.
+/// Least number of means that a group size must leave of a cloud to be tried.
 const LEAST_MEANS: usize = 60;
 
-/// How much smaller deviations must become for larger neighbourhoods.
+/// Fraction to which deviations must fall for the next larger group size to be accepted.
 const WORTH: f64 = 0.95;
 
 /// Local regressions of the surface that a cloud samples, d ≥ 2.
 pub struct Patches {
     support: Support,
     models: Vec<Weighted>,
-    /// For slopes where the surface is flat; none where there is no noise.
+    /// Models for the slopes where the surface is flat. Empty where there is no noise.
     stiff: Vec<Weighted>,
+    /// Points, or means, in a neighbourhood. Below `n_terms(d) + 2`, no query has an answer.
     count: usize,
     noise: f64,
     kernel: PatchKernel,
+    /// Points per mean, at most. 1 if the points themselves are used.
     group: usize,
 }
 
-/// The covariance of the heights where most of the cloud is.
+/// Hyperparameters of the covariance of the heights: medians over the sites.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PatchKernel {
-    /// ℓ, unit L.
+    /// Length scale ℓ, unit L.
     pub length_scale: f64,
-    /// s², unit L².
+    /// Variance s², unit L².
     pub variance: f64,
 }
 
 impl Patches {
-    /// Chooses neighbourhoods and hyperparameters, as points of every spacing have them.
+    /// Chooses group size and hyperparameters by a sample of the points that covers all spacings.
     ///
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
@@ -79,8 +83,8 @@ impl Patches {
         Self::learned_at(&sites, cloud, sampling, observer)
     }
 
-    /// Chooses them as the neighbourhoods of sites `[s, d]` have it. Parts of a cloud that hold the same
-    /// neighbourhoods of the same sites learn the same.
+    /// Chooses group size and hyperparameters by the neighbourhoods of sites `[s, d]`. Parts of a cloud that
+    /// hold the same neighbourhoods of the same sites learn the same.
     ///
     /// # Errors
     /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
@@ -115,8 +119,8 @@ impl Patches {
         best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
     }
 
-    /// The hyperparameters on one support, with the median deviation of the curvatures that they promise at
-    /// sites.
+    /// Learns the hyperparameters on one support. Also returns the median over the sites of the largest
+    /// deviation of a principal curvature, which [`Patches::learned_at`] compares between group sizes.
     fn over(
         sites: &Cloud,
         support: Support,
@@ -155,7 +159,8 @@ impl Patches {
         Ok((deviation, patches))
     }
 
-    /// The mixture of models of one length scale that makes neighbourhoods of these queries most likely.
+    /// Returns the mixture of models of one length scale that makes the neighbourhoods of these queries most
+    /// likely.
     fn pooled(
         &self,
         length_scale: f64,
@@ -168,7 +173,8 @@ impl Patches {
         Ok(pool(&candidates, &found.iter().flatten().map(logs).collect::<Vec<Vec<f64>>>()))
     }
 
-    /// Largest deviation of a principal curvature, variance of the noise, ℓ and s² of one neighbourhood.
+    /// Returns the largest deviation of a principal curvature (1/L), the variance of the noise (L²), ℓ (L)
+    /// and s² (L²) of one neighbourhood.
     fn summary(&self, at: &Neighbourhood, kriged: &[Kriged], d: usize) -> Option<(f64, f64, f64, f64)> {
         let estimate = Estimate::of(&self.models, kriged, d)?;
         let deviations = estimate.curvatures(d, true).principal;
@@ -179,7 +185,7 @@ impl Patches {
         {
             length_scale += share * weighted.model.length_scale * at.radius;
             variance += share * kriged.scale * at.radius.powi(2);
-            // Below what rounding leaves, there is none.
+            // Noise ratios up to 1e-7 are rounding and count as no noise.
             noise +=
                 share * if weighted.model.noise > 1e-7 { kriged.scale * weighted.model.noise } else { 0.0 };
         }
@@ -196,17 +202,17 @@ impl Patches {
         self.noise
     }
 
-    /// The covariance of the heights where most of the cloud is.
+    /// Hyperparameters of the covariance of the heights: medians over the sites.
     pub fn kernel(&self) -> PatchKernel {
         self.kernel
     }
 
-    /// Points that a neighbourhood reaches at most.
+    /// Greatest number of points of the cloud that a neighbourhood draws on.
     pub fn n_points_used(&self) -> usize {
         self.count * self.group
     }
 
-    /// Bytes held on the heap beside the cloud and its sampling.
+    /// Bytes held on the heap besides the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
         self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
     }

@@ -3,27 +3,34 @@
 use super::regression::{Kriged, Model};
 use crate::kernel::Family;
 
-/// ν = 9/2: kriged curvatures of analytic surfaces are as far off as their deviations say. With ν = 7/2 they are closer than that, with
-/// Gauss's kernel farther (docs/error-bars.md).
+/// Order of Matérn's kernel: ν = 9/2. Kriged curvatures of analytic surfaces are then as far off as their
+/// deviations say. With ν = 7/2 they are closer than that, with Gauss's kernel farther (docs/error-bars.md).
 const ORDER: u8 = 4;
 
-/// ℓ in units of the radius of a neighbourhood. Its size follows the curvature, so that this is one for all scales; shorter ones take noise
-/// that neighbours share for shape, longer ones promise more of a scan than they keep (docs/error-bars.md).
+/// Length scale ℓ in units of the radius of a neighbourhood.
+///
+/// The radius follows the curvature, so one ratio serves surfaces of all sizes. Shorter length scales mistake
+/// noise that neighbours share for shape. Longer ones promise deviations that are too small on scans
+/// (docs/error-bars.md).
 pub(crate) const LENGTH_SCALE: f64 = 1.4;
 
-/// The same for slopes where the surface is flat and the cloud has noise. Neighbours of a scan have some of their noise in common, which
-/// the likelihood takes for shape and the short scale for slopes; the stiffer process averages it, and where there is nothing but noise,
-/// its bias is none (docs/error-bars.md).
+/// Length scale of the stiff models, in units of the radius, for slopes where the surface is flat and the
+/// cloud has noise.
+///
+/// Neighbours of a scan have some of their noise in common. The likelihood takes it for shape, and the short
+/// length scale takes it for slopes. The stiffer process averages it, and has no bias where there is nothing
+/// but noise (docs/error-bars.md).
 pub(crate) const STIFF: f64 = 4.0;
 
-/// Variances of the noise over that of the process.
+/// Candidate ratios of the variance of the noise to that of the process.
 const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0];
 
-/// Share of the neighbourhoods below which a model is left out, and models that are kept at most.
+/// Share of the neighbourhoods below which a model is dropped.
 const LEAST_SHARE: f64 = 0.01;
+/// Greatest number of models kept.
 const MAX_MODELS: usize = 6;
 
-/// Steps of expectation and maximization: shares settle to a hundredth within some fifty.
+/// Number of expectation-maximization steps. Shares settle to a hundredth within some fifty.
 const STEPS: usize = 100;
 
 /// A model with the logarithm of the share of neighbourhoods that it describes.
@@ -33,15 +40,17 @@ pub(crate) struct Weighted {
     pub log_share: f64,
 }
 
-/// The models of one length scale among which the likelihood decides.
+/// Candidate models of one length scale, among which the likelihood decides.
 pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Vec<Model> {
     let family = Family::Matern { order: ORDER };
     let of = |noise: f64| Model { family, length_scale, noise, n_trend };
     NOISES.map(of).to_vec()
 }
 
-/// Shares of the models among neighbourhoods with these log likelihoods, `[neighbourhoods][models]`: the mixture that makes the sample
-/// most likely, by expectation and maximization (nonparametric maximum likelihood: Laird 1978).
+/// Finds the mixture of the candidates that makes a sample of neighbourhoods most likely.
+///
+/// `log_likelihoods` is `[neighbourhoods][models]`. The shares come from expectation and maximization
+/// (nonparametric maximum likelihood: Laird 1978).
 pub(crate) fn pool(candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<Weighted> {
     let n = candidates.len();
     let mut shares = vec![1.0 / n as f64; n];
@@ -66,7 +75,8 @@ pub(crate) fn pool(candidates: &[Model], log_likelihoods: &[Vec<f64>]) -> Vec<We
     kept.map(|at| Weighted { model: candidates[at], log_share: shares[at].ln() }).collect()
 }
 
-/// Probabilities from their logarithms up to a constant; what is not finite has none, and all are 0 if none is.
+/// Returns probabilities from their logarithms up to a constant. Entries that are not finite have probability
+/// 0, and all are 0 if none is finite.
 pub(crate) fn normalized(logs: &[f64]) -> Vec<f64> {
     let largest = logs.iter().copied().filter(|log| log.is_finite()).fold(f64::NEG_INFINITY, f64::max);
     let mut weights: Vec<f64> =

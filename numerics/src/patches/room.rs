@@ -1,4 +1,4 @@
-//! Neighbourhoods solved several at a time, in room that a thread keeps.
+//! Batches of neighbourhoods, solved together in buffers that a thread reuses.
 
 use std::ops::Range;
 
@@ -13,25 +13,26 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
 
+/// A neighbourhood with the result of each model there.
 pub(super) type Found = (Neighbourhood, Vec<Kriged>);
 
-/// What a batch is solved for.
+/// Purpose for which a batch is solved. Derivatives at the query are computed for predictions only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     Likelihood,
     Prediction,
 }
 
-/// Room that a thread keeps from one batch to the next.
+/// Buffers that a thread reuses from one batch to the next.
 pub(super) struct Room {
     batch: Batch,
     workspace: Workspace,
     scratch: Scratch,
     nearest: Vec<Neighbour>,
     set: InstructionSet,
-    /// Whether no lane has a neighbourhood.
+    /// True if no lane has a neighbourhood.
     is_empty: bool,
-    /// By lane and model.
+    /// Results by lane and model.
     pub kriged: Vec<Vec<Kriged>>,
 }
 
@@ -48,7 +49,7 @@ impl Room {
         }
     }
 
-    /// Puts the neighbourhoods of some queries side by side.
+    /// Fills the lanes with the neighbourhoods of a range of queries.
     pub(super) fn put(
         &mut self,
         patches: &Patches,
@@ -67,7 +68,7 @@ impl Room {
             }
             places.push(place);
         }
-        // Lanes without a neighbourhood do as one that has: their numbers are not looked at.
+        // Lanes without a neighbourhood get a copy of one that has. Their results are never read.
         let filled = places.iter().position(Option::is_some);
         self.is_empty = filled.is_none();
         if let Some(filled) = filled {
@@ -79,6 +80,7 @@ impl Room {
         places
     }
 
+    /// Solves the current batch for each model and stores the results in `kriged`.
     pub(super) fn krige(&mut self, models: &[Model], purpose: Purpose) {
         self.kriged.iter_mut().for_each(Vec::clear);
         if self.is_empty {
@@ -95,7 +97,7 @@ impl Room {
 }
 
 impl Patches {
-    /// What models say at a few queries.
+    /// Solves each query for the given models. A query without a neighbourhood gives `None`.
     pub(super) fn krige_each(
         &self,
         queries: &Cloud,

@@ -1,24 +1,24 @@
-//! A cloud in cells of near points.
+//! A cloud partitioned into cells of near points.
 
 use super::cloud::{Cloud, squared_distance};
 use crate::machine::small::{Small, zeros};
 
-/// Points whose halves are split side by side.
+/// Number of points above which the two halves are split in parallel.
 const SHARED: usize = 4096;
 
-/// Points in cells: halves of halves, each across where its points reach farthest, until none has more than a
-/// number of points.
+/// A partition of points into cells, made by halving until no cell exceeds a given number of points.
 ///
-/// All cells have nearly as many points. Neighbours in the list of cells are mostly neighbours in space.
+/// Each halving cuts across the direction in which the points reach farthest. All cells have nearly as many
+/// points. Neighbours in the list of cells are mostly neighbours in space.
 pub(crate) struct Cells {
-    /// Cell by cell.
+    /// Point indices, cell by cell.
     points: Vec<u32>,
-    /// Where each cell ends among them.
+    /// End of each cell within `points`.
     ends: Vec<u32>,
 }
 
 impl Cells {
-    /// Cells of at most `most` points each, of some points of a cloud.
+    /// Partitions `points` of a cloud into cells of at most `most` points each.
     pub(crate) fn of(cloud: &Cloud, mut points: Vec<u32>, most: usize) -> Self {
         let sizes = split(cloud, &mut points, most.max(1));
         let add = |end: &mut u32, size: u32| {
@@ -28,7 +28,7 @@ impl Cells {
         Self { points, ends: sizes.into_iter().scan(0, add).collect() }
     }
 
-    /// Cells of all points of a cloud.
+    /// Partitions all points of a cloud into cells of at most `most` points each.
     pub(crate) fn of_all(cloud: &Cloud, most: usize) -> Self {
         Self::of(cloud, (0..cloud.n_points() as u32).collect(), most)
     }
@@ -37,14 +37,14 @@ impl Cells {
         self.ends.len()
     }
 
-    /// The points of each cell.
+    /// Iterates over the cells, each as a slice of point indices.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &[u32]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts.zip(&self.ends).map(|(start, &end)| &self.points[start as usize..end as usize])
     }
 }
 
-/// Orders points cell by cell, and says how many each has.
+/// Reorders points cell by cell and returns the size of each cell.
 fn split(cloud: &Cloud, points: &mut [u32], most: usize) -> Vec<u32> {
     let n = points.len();
     if n <= most {
@@ -59,12 +59,12 @@ fn split(cloud: &Cloud, points: &mut [u32], most: usize) -> Vec<u32> {
     sizes
 }
 
-/// The first `middle` of some points and the others, in the order in which they come along the line between
-/// two that are far apart. Where several lie at `middle`, by index.
+/// Splits points into the first `middle` and the rest, ordered along a line between two points that lie far
+/// apart.
 ///
-/// The first end of the line is the point farthest from their mean, the second the one farthest from that.
-/// Unlike sides parallel to the axes, these turn with the cloud, so that nothing that is computed from halves
-/// depends on the axes.
+/// The line starts at the point farthest from the mean of the points. It ends at the point farthest from its
+/// start. Ties at `middle` are broken by index. The cut turns with the cloud, unlike cuts parallel to the
+/// axes, so nothing computed from the halves depends on the axes.
 pub(crate) fn halve<'a>(
     cloud: &Cloud,
     points: &'a mut [u32],
@@ -82,7 +82,7 @@ pub(crate) fn halve<'a>(
     points.split_at_mut(middle)
 }
 
-/// Where the one of some points lies that is farthest from x; x where there is none.
+/// Returns the position of the point farthest from x, or x if there are no points.
 fn farthest(cloud: &Cloud, points: &[u32], x: &[f64]) -> Small {
     let mut found = (-1.0, x);
     for &point in points {
@@ -95,11 +95,11 @@ fn farthest(cloud: &Cloud, points: &[u32], x: &[f64]) -> Small {
     Small::from_slice(found.1)
 }
 
-/// The mean of some points of a cloud, `[d]`, unit L.
+/// Mean of `points`, `[d]`, unit L. Zero if there are none.
 pub(crate) fn mean(cloud: &Cloud, points: &[u32]) -> Small {
     let mut mean = zeros(cloud.dimension());
     let Some(&first) = points.first() else { return mean };
-    // About the first point, so that no digit is lost far from the origin.
+    // Differences to the first point are summed, so that no digit is lost far from the origin.
     let origin = cloud.point(first as usize);
     for &point in points {
         let position = cloud.point(point as usize);
@@ -109,7 +109,7 @@ pub(crate) fn mean(cloud: &Cloud, points: &[u32]) -> Small {
     mean
 }
 
-/// The second moments of some points about their mean, over their number: `[d, d]`, unit L².
+/// Second moments of `points` about their mean, divided by their number: `[d, d]`, unit L².
 pub(crate) fn second_moments(cloud: &Cloud, points: &[u32], mean: &[f64]) -> Small {
     let d = mean.len();
     let mut moments = zeros(d * d);
@@ -135,10 +135,11 @@ mod tests {
             let mut points: Vec<u32> = cells.iter().flatten().copied().collect();
             points.sort_unstable();
             assert!(points.into_iter().eq(0..1000));
-            // Half of more than the most, rounded down.
+            // A cell is split only if it exceeds `most`, so no half is smaller than `most / 2` rounded down.
             assert!(cells.iter().all(|cell| (most.min(999) / 2..=most).contains(&cell.len()) || most == 1));
         }
-        // A 64th of the sphere is a cap of radius 0.25, and cells are at most three times as long as wide.
+        // A cell is a 64th of the sphere: as a cap it has radius 0.25. Cells are at most three times as long
+        // as wide.
         for cell in Cells::of_all(&cloud, 16).iter() {
             let first = cloud.point(cell[0] as usize);
             let is_near = |&point: &u32| {

@@ -1,15 +1,16 @@
-//! Points in space: finite, rectangular, flat. Clouds and queries are both of this type.
+//! Point lists: finite, rectangular, flat. Clouds and queries both have the type [`Cloud`].
 
 use crate::error::NumericsError;
 use crate::machine::heap::vec_bytes;
 
-/// Coordinates up to here have squared distances, and length scales chosen from them, well inside float64.
+/// Largest coordinate accepted, in magnitude. Squared distances, and length scales chosen from them, then
+/// stay well inside float64.
 pub const MAX_COORDINATE: f64 = 1e100;
 
 /// A list of n ≥ 1 points with d ≥ 1 finite coordinates each.
 ///
-/// Row-major storage, shape `[n, d]`, unit L (the client's length unit). The order of the points is the client's and is
-/// preserved in every answer. `-0.0` is stored as `0.0`, so equal points have equal bytes.
+/// Row-major storage, shape `[n, d]`, unit L (the client's length unit). The order of the points is the
+/// client's and is preserved in every answer. `-0.0` is stored as `0.0`, so equal points have equal bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
     coordinates: Vec<f64>,
@@ -17,12 +18,13 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// Takes coordinates row by row.
+    /// Builds a cloud from coordinates, row by row.
     ///
     /// # Errors
-    /// [`NumericsError::EmptyCloud`], [`NumericsError::ZeroDimension`], [`NumericsError::RaggedPoints`] when the length is
-    /// no multiple of `dimension`, [`NumericsError::NonFiniteCoordinate`] and [`NumericsError::CoordinateTooLarge`] with the
-    /// first offender.
+    /// [`NumericsError::ZeroDimension`] if `dimension` is 0. [`NumericsError::EmptyCloud`] if there are no
+    /// coordinates. [`NumericsError::RaggedPoints`] if their number is not a multiple of `dimension`.
+    /// [`NumericsError::NonFiniteCoordinate`] and [`NumericsError::CoordinateTooLarge`] with the first
+    /// offending coordinate.
     pub fn new(mut coordinates: Vec<f64>, dimension: usize) -> Result<Self, NumericsError> {
         if dimension == 0 {
             return Err(NumericsError::ZeroDimension);
@@ -48,7 +50,7 @@ impl Cloud {
             });
         }
         for x in &mut coordinates {
-            // -0.0 + 0.0 is 0.0; every other number is left as it is.
+            // -0.0 + 0.0 is 0.0. Every other number stays as it is.
             *x += 0.0;
         }
         Ok(Self { coordinates, dimension })
@@ -69,22 +71,23 @@ impl Cloud {
         &self.coordinates
     }
 
-    /// Some of its points, in this order.
+    /// Returns the cloud of the given points, in the given order.
     pub(crate) fn select(&self, points: &[usize]) -> Self {
         let coordinates = points.iter().flat_map(|&point| self.point(point)).copied().collect();
         Self { coordinates, dimension: self.dimension }
     }
 
-    /// Its coordinates times a factor for each axis, none greater than 1.
+    /// Returns the cloud with each axis multiplied by its factor. No factor may exceed 1.
     pub(crate) fn stretched(&self, factors: &[f64]) -> Self {
         let stretched =
             |point: &[f64]| -> Vec<f64> { point.iter().zip(factors).map(|(x, s)| x * s + 0.0).collect() };
         Self { coordinates: self.points().flat_map(stretched).collect(), dimension: self.dimension }
     }
 
-    /// The same cloud without what a parser reserved beyond its points: for clouds that are kept.
+    /// Returns the cloud without spare capacity beyond its points. Meant for clouds that are kept.
     ///
-    /// `Vec::shrink_to_fit` may leave a block as it is; a copy is the size of the points.
+    /// A parser may have reserved more than the points need. `Vec::shrink_to_fit` may leave a block as it is,
+    /// whereas a copy is exactly as large as the points.
     pub fn compact(mut self) -> Self {
         if self.coordinates.capacity() > self.coordinates.len() {
             self.coordinates = self.coordinates.as_slice().to_vec();
@@ -102,12 +105,12 @@ impl Cloud {
         &self.coordinates[point_idx * self.dimension..][..self.dimension]
     }
 
-    /// The points in order.
+    /// Iterates over the points in order.
     pub fn points(&self) -> impl ExactSizeIterator<Item = &[f64]> {
         self.coordinates.chunks_exact(self.dimension)
     }
 
-    /// Least and greatest value of each coordinate.
+    /// Least and greatest value of each coordinate, as two lists `[d]`.
     pub fn bounding_box(&self) -> (Vec<f64>, Vec<f64>) {
         let mut min = self.point(0).to_vec();
         let mut max = min.clone();
@@ -120,28 +123,33 @@ impl Cloud {
         (min, max)
     }
 
-    /// Half the diagonal of the bounding box, the size against which default length scales are chosen. Unit L.
+    /// Half the diagonal of the bounding box, unit L. Default length scales are chosen relative to it.
     pub fn radius(&self) -> f64 {
         let (min, max) = self.bounding_box();
         0.5 * min.iter().zip(&max).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt()
     }
 
+    /// Checks that `other` has as many coordinates per point as this cloud.
+    ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`] unless `other` has the dimension of this cloud.
+    /// [`NumericsError::DimensionMismatch`] if it does not.
     pub fn check_same_dimension(&self, other: &Cloud) -> Result<(), NumericsError> {
         let (expected, found) = (self.dimension, other.dimension);
         if expected == found { Ok(()) } else { Err(NumericsError::DimensionMismatch { expected, found }) }
     }
 
+    /// Checks that `entries` has one entry per point.
+    ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`] unless there is one entry per point.
+    /// [`NumericsError::LengthMismatch`] if it does not.
     pub fn check_one_per_point<T>(&self, entries: &[T]) -> Result<(), NumericsError> {
         let (expected, found) = (self.n_points(), entries.len());
         if expected == found { Ok(()) } else { Err(NumericsError::LengthMismatch { expected, found }) }
     }
 }
 
-/// Squared Euclidean distance, from coordinate differences: never |x|² + |y|² − 2x·y, which cancels far from the origin.
+/// Squared Euclidean distance, computed from coordinate differences. |x|² + |y|² − 2x·y would cancel far from
+/// the origin.
 pub(crate) fn squared_distance(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(a, b)| (a - b) * (a - b)).sum()
 }

@@ -1,15 +1,15 @@
-//! Points that coincide exactly, and the cloud without them.
+//! Exact duplicates among the points of a cloud, and the cloud with them merged.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use super::cloud::Cloud;
 
-/// Finds points by position, to the bit.
+/// A hash table from coordinates to points. Coordinates match if they are equal to the bit.
 pub(crate) struct Positions(HashMap<Box<[u64]>, usize>);
 
 impl Positions {
-    /// Of points that coincide, the first one is kept.
+    /// Builds the table. Points that coincide are represented by the first of them.
     pub(crate) fn of(cloud: &Cloud) -> Self {
         let mut positions = HashMap::with_capacity(cloud.n_points());
         for (point, x) in cloud.points().enumerate() {
@@ -27,7 +27,7 @@ impl Positions {
     }
 }
 
-/// `Cloud` stores no −0.0 and no NaN, so equal coordinates have equal bits.
+/// Bits of the coordinates. `Cloud` stores no −0.0 and no NaN, so equal coordinates have equal bits.
 fn bits(x: &[f64]) -> Box<[u64]> {
     x.iter().map(|c| c.to_bits()).collect()
 }
@@ -38,8 +38,10 @@ pub fn count_duplicates(cloud: &Cloud) -> usize {
     order.windows(2).filter(|pair| coincide(cloud, pair[0], pair[1])).count()
 }
 
-/// Points for which `counts` holds by their coordinates. Sorted, equal points are neighbours. A table would leave the allocator thousands
-/// of small holes among what is kept.
+/// Returns the points for which `counts` holds, sorted by their coordinates, so that equal points are
+/// adjacent.
+///
+/// A hash table would leave thousands of small holes in the allocator, among allocations that are kept.
 fn sorted(cloud: &Cloud, counts: impl Fn(usize) -> bool) -> Vec<u32> {
     let row = |point: u32| cloud.point(point as usize);
     let compare = |&a: &u32, &b: &u32| {
@@ -55,7 +57,8 @@ fn coincide(cloud: &Cloud, a: u32, b: u32) -> bool {
     cloud.point(a as usize) == cloud.point(b as usize)
 }
 
-/// All points that share their position with another one, ascending, among those for which `counts` holds.
+/// Returns all points that share their position with another one, ascending, among those for which `counts`
+/// holds.
 pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -> Vec<usize> {
     let order = sorted(cloud, counts);
     let groups = order.chunk_by(|&a, &b| coincide(cloud, a, b)).filter(|group| group.len() > 1);
@@ -64,10 +67,12 @@ pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -
     points
 }
 
-/// Which merged point each point of a cloud became.
+/// A map from the points of a cloud to merged points, one per distinct position. n′ is the number of merged
+/// points.
 ///
-/// Merging replaces values by the mean over each group. As a linear map that is `mean`, shape `[n′, n]`; [`Merge::spread`]
-/// is its transpose, so matrices keep one column per point of the original cloud with the weight split equally.
+/// Merging replaces values by their mean over each group of coinciding points. This linear map is
+/// [`Merge::mean`], of shape `[n′, n]`. [`Merge::spread`] is its transpose: matrices keep one column per
+/// point of the original cloud, with the weight split equally within a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Merge {
     group_of: Vec<usize>,
@@ -75,7 +80,8 @@ pub struct Merge {
 }
 
 impl Merge {
-    /// Returns the cloud of distinct positions, in the order of their first occurrence; `None` if there is nothing to merge.
+    /// Returns the cloud of distinct positions, in the order of their first occurrence, and its map. Returns
+    /// `None` if there is nothing to merge.
     pub fn duplicates_of(cloud: &Cloud) -> Option<(Cloud, Merge)> {
         let positions = Positions::of(cloud);
         if positions.n_distinct() == cloud.n_points() {
@@ -85,7 +91,7 @@ impl Merge {
         let mut group_of = vec![0; cloud.n_points()];
         let mut group_sizes = Vec::with_capacity(positions.n_distinct());
         for (point, x) in cloud.points().enumerate() {
-            // The first occurrence of every position is found by construction.
+            // The table holds every point's position, so the default is never used.
             let first = positions.find(x).unwrap_or(point);
             if first == point {
                 group_of[point] = group_sizes.len();
@@ -100,22 +106,22 @@ impl Merge {
         Some((merged, Merge { group_of, group_sizes }))
     }
 
-    /// Points before merging, n.
+    /// Number of points before merging, n.
     pub fn n_points(&self) -> usize {
         self.group_of.len()
     }
 
-    /// How many points disappeared.
+    /// Number of points that merging removed, n − n′.
     pub fn n_merged(&self) -> usize {
         self.group_of.len() - self.group_sizes.len()
     }
 
-    /// The first point of a group.
+    /// Returns the first point of a group.
     pub fn first_point(&self, group: usize) -> usize {
         self.group_of.iter().position(|&g| g == group).unwrap_or(group)
     }
 
-    /// Means over the groups, `[n] → [n′]`.
+    /// Returns the mean of the values over each group, `[n] → [n′]`.
     pub fn mean(&self, values: &[f64]) -> Vec<f64> {
         let mut means = vec![0.0; self.group_sizes.len()];
         for (&group, &value) in self.group_of.iter().zip(values) {
@@ -124,7 +130,7 @@ impl Merge {
         means
     }
 
-    /// Each entry split equally over its group, row by row, `[rows, n′] → [rows, n]`.
+    /// Returns the matrix with each entry split equally over its group, row by row, `[rows, n′] → [rows, n]`.
     pub fn spread(&self, matrix: &[f64]) -> Vec<f64> {
         let spread_row = |row: &[f64]| {
             let split = |&group: &usize| row[group] / self.group_sizes[group] as f64;

@@ -1,4 +1,4 @@
-//! What a quadric through its neighbours says of a surface at each of many positions.
+//! Quadrics fitted to the neighbours of many positions: normal, curvatures, height and residual at each.
 
 use rayon::prelude::*;
 
@@ -14,22 +14,24 @@ use crate::machine::small::Small;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
 
-/// Residual against the radius, and curvature times radius, up to which a local fit is believed: the neighbours lie on one
-/// sheet without an edge.
+/// Largest residual, relative to the radius, of a reliable fit: the neighbours then lie on one sheet without
+/// an edge.
 const RELIABLE_RESIDUAL: f64 = 0.05;
+/// Largest product of curvature and radius of a reliable fit.
 const RELIABLE_BEND: f64 = 1.5;
 
-/// Residual against the radius below which there is no noise to speak of.
+/// Residual, relative to the radius, below which the noise is negligible.
 const SMOOTH_RESIDUAL: f64 = 0.01;
 
-/// A surface near a position x, from a quadric over its own tangent plane.
+/// A local model of the surface near a position x: a quadric over its own tangent plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LocalQuadric<'a> {
     /// Unit normal of either sign, `[d]`.
     pub normal: &'a [f64],
-    /// Principal curvatures for that normal, ascending, 1/L, `[d−1]`: of the parallel surface through x.
+    /// Principal curvatures for that normal, ascending, 1/L, `[d−1]`. They belong to the parallel surface
+    /// through x.
     pub curvatures: &'a [f64],
-    /// The quadric at x against x, along the normal, unit L.
+    /// Height of the quadric above x along the normal, unit L.
     pub height: f64,
     /// Root mean square distance of the neighbours from the quadric, unit L.
     pub residual: f64,
@@ -41,17 +43,17 @@ pub(crate) struct LocalQuadric<'a> {
 }
 
 impl LocalQuadric<'_> {
-    /// Whether the neighbours look like a piece of one smooth surface.
+    /// Returns whether the neighbours look like a piece of one smooth surface.
     pub(crate) fn is_reliable(&self) -> bool {
         self.residual < RELIABLE_RESIDUAL * self.radius && self.bend() < RELIABLE_BEND
     }
 
-    /// Whether the quadric leaves so little that the points are free of noise.
+    /// Returns whether the residual is so small that the points count as free of noise.
     pub(crate) fn is_smooth(&self) -> bool {
         self.residual < SMOOTH_RESIDUAL * self.radius && self.bend() < RELIABLE_BEND
     }
 
-    /// The curvatures for a normal on the same side as `normal`, ascending, `[d−1]`.
+    /// Returns the curvatures for a normal on the same side as `normal`, ascending, `[d−1]`.
     pub(crate) fn curvatures_for(&self, normal: &[f64]) -> Small {
         match dot(self.normal, normal) < 0.0 {
             true => self.curvatures.iter().rev().map(|k| -k).collect(),
@@ -59,7 +61,7 @@ impl LocalQuadric<'_> {
         }
     }
 
-    /// The quadric around p, with the height above its tangent plane of an x near p.
+    /// Returns this quadric, fitted at p, with `height` measured from x near p to its tangent plane.
     pub(crate) fn seen_from(self, p: &[f64], x: &[f64]) -> Self {
         let along: f64 = x.iter().zip(p).zip(self.normal).map(|((x, p), n)| (x - p) * n).sum();
         Self { height: self.height - along, ..self }
@@ -71,10 +73,10 @@ impl LocalQuadric<'_> {
     }
 }
 
-/// Whether there is a quadric at a position.
+/// Outcome of the fit at one position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Found {
-    /// The neighbours determine none.
+    /// The neighbours do not determine a quadric.
     Nothing,
     Inside,
     AtRim,
@@ -89,7 +91,8 @@ pub(crate) struct LocalQuadrics {
 }
 
 impl LocalQuadrics {
-    /// Fits the nearest points of a cloud around each query, d ≥ 2, [`super::quadric::n_quadric_neighbours`] of them.
+    /// Fits a quadric to the nearest points of a cloud around each query, d ≥ 2. The neighbourhoods hold
+    /// [`super::quadric::n_quadric_neighbours`] points each.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -112,7 +115,7 @@ impl LocalQuadrics {
         Ok(Self { dimension: d, rows, found })
     }
 
-    /// The quadric at a position, if its neighbours determine one.
+    /// Returns the quadric at a position, or `None` if its neighbours do not determine one.
     pub(crate) fn at(&self, position: usize) -> Option<LocalQuadric<'_>> {
         let (d, width) = (self.dimension, width(self.dimension));
         if self.found[position] == Found::Nothing {
@@ -135,22 +138,23 @@ fn width(dimension: usize) -> usize {
     2 * dimension + 3
 }
 
-/// Fits the given points, nearest to x first, into a row; `None` if they do not determine a quadric.
+/// Fits a quadric to the given points, nearest to x first, and writes it into `row`. Returns `None` if the
+/// points do not determine a quadric.
 ///
-/// The frame of the principal axes is tilted by cubic terms of the surface; a second fit over the tangent plane of the
-/// first is not.
+/// Cubic terms of the surface tilt the frame of the principal axes. So a second quadric is fitted over the
+/// tangent plane of the first, which they do not tilt.
 fn fit(cloud: &Cloud, x: &[f64], nearest: &[Neighbour], row: &mut [f64]) -> Option<Found> {
     let mut patch = Patch::of(cloud, x, nearest.iter().map(|found| found.point))?;
     let first = Quadric::of(&patch)?;
     patch.turn_over(&first.slope);
     let quadric = Quadric::of(&patch)?;
     let d = patch.dimension();
-    // For the frame's normal the shape operator is minus the Hessian of the height.
+    // For the normal of the frame, the shape operator is minus the Hessian of the height.
     let shape: Small = quadric.hessian.iter().map(|h| -h / patch.radius).collect();
     let (curvatures, directions) = symmetric_eigen(&shape, d - 1);
     let height = quadric.height * patch.radius;
     row[..d].copy_from_slice(patch.normal());
-    // Through x, at a distance −height, runs a parallel surface.
+    // The curvatures are those of the parallel surface through x, at the distance −height.
     let parallel = curvatures.iter().map(|kappa| kappa / (1.0 - height * kappa).max(0.1));
     row[d..2 * d - 1].iter_mut().zip(parallel).for_each(|(slot, kappa)| *slot = kappa);
     let errors = directions.chunks_exact(d - 1).map(|direction| quadric.standard_error(direction));
@@ -167,7 +171,7 @@ mod tests {
     use crate::points::quadric::n_quadric_neighbours;
     use crate::testing::{circle, fibonacci_sphere};
 
-    /// One quadric, through so many points.
+    /// Fits one quadric to the `count` nearest positions around x.
     fn around(cloud: &Cloud, x: &[f64], count: usize) -> LocalQuadrics {
         let d = cloud.dimension();
         let mut rows = vec![0.0; width(d)];
@@ -183,7 +187,8 @@ mod tests {
         let cloud = Cloud::new(grid.flat_map(|[x, y]| [x, y, height(x, y)]).collect(), 3).unwrap();
         let quadrics = around(&cloud, cloud.point(12), 25);
         let fit = quadrics.at(0).unwrap();
-        // At the origin: unit normal (0.2, −0.1, 1)/|·|, shape operator by the first and second fundamental forms.
+        // Exact values at the origin: unit normal (0.2, −0.1, 1)/|·|, and the shape operator by the first and
+        // second fundamental forms.
         let length = (1.0f64 + 0.04 + 0.01).sqrt();
         let cosine = dot(fit.normal, &[0.2 / length, -0.1 / length, 1.0 / length]).abs();
         // A graph over another plane is not exactly a quadric: third-order terms of the patch remain.

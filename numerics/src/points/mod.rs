@@ -1,4 +1,4 @@
-//! What positions alone say, without a kernel: distances, neighbours, quadrics, noise.
+//! Geometry of a cloud from its positions alone, without a kernel: distances, neighbours, quadrics, noise.
 
 pub(crate) mod cells;
 pub mod cloud;

@@ -1,22 +1,23 @@
-//! Monomials, and how many nodes determine what they reproduce.
+//! Monomials, and the number of nodes of a stencil that reproduces them.
 
-/// Degree of the polynomials that stencils reproduce, at most.
+/// Greatest degree of the polynomials that stencils reproduce.
 pub(crate) const MAX_STENCIL_DEGREE: usize = 4;
 
-/// Nodes per monomial: twice as many are needed for weights that do not oscillate, some more for the rims of neighbourhoods.
+/// Nodes per monomial. Weights oscillate unless there are twice as many nodes as monomials. Rims of
+/// neighbourhoods need some more.
 pub(crate) const NODES_PER_MONOMIAL: f64 = 2.5;
 
-/// Nodes of a stencil over the tangent plane of a hypersurface, at most: 38 in space.
+/// Greatest number of nodes of a stencil over the tangent plane of a hypersurface: 38 in space.
 pub(crate) fn n_stencil_nodes(dimension: usize) -> usize {
     (NODES_PER_MONOMIAL * n_monomials(dimension - 1, MAX_STENCIL_DEGREE) as f64).ceil() as usize
 }
 
-/// Monomials in k variables up to a degree: `(k + degree)! / (k! degree!)`.
+/// Number of monomials in k variables up to a degree: `(k + degree)! / (k! degree!)`.
 pub(crate) fn n_monomials(k: usize, degree: usize) -> usize {
     (1..=k).fold(1, |product, i| product * (degree + i) / i)
 }
 
-/// Exponents of the monomials in k variables up to a degree.
+/// Exponents of the monomials in k variables up to a degree, one list of k per monomial.
 pub(crate) fn exponents(k: usize, degree: usize) -> Vec<Vec<usize>> {
     if k == 0 {
         return vec![Vec::new()];

@@ -1,4 +1,4 @@
-//! The nearest points of many positions, searched for once.
+//! Nearest positions around many queries, searched for once.
 
 use rayon::prelude::*;
 
@@ -9,13 +9,15 @@ use crate::observer::Observer;
 
 /// The nearest positions of a cloud around each of m queries, nearest first.
 pub(crate) struct Neighbourhoods {
-    /// As many as were asked for, or as the cloud has.
+    /// Neighbours per query: the number asked for, or all positions of the cloud if it has fewer.
     count: usize,
-    /// `[m, count]`.
+    /// Neighbours of each query, `[m, count]`.
     found: Vec<Neighbour>,
 }
 
 impl Neighbourhoods {
+    /// Finds the `count` nearest positions around each query.
+    ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
     pub(crate) fn of(
@@ -24,7 +26,7 @@ impl Neighbourhoods {
         count: usize,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        // Every query sees as many positions.
+        // Every query finds equally many positions.
         let count = neighbours.nearest_positions(queries.point(0), count).len();
         let mut found = vec![Neighbour { point: 0, squared_distance: 0.0 }; queries.n_points() * count];
         found.par_chunks_exact_mut(count).enumerate().try_for_each_init(
@@ -66,7 +68,7 @@ mod tests {
     fn every_position_is_seen_once_and_no_more_than_there_are() {
         assert_eq!(around(&[0.0, 1.0, 3.0], 2), [[0, 1], [1, 0], [2, 1]]);
         assert_eq!(around(&[0.0, 1.0, 3.0], 18), [[0, 1, 2], [1, 0, 2], [2, 1, 0]]);
-        // Copies see, and are seen by their first.
+        // Copies have neighbours too. As neighbours they are represented by their first point.
         assert_eq!(around(&[0.0, 2.0, 2.0, 2.0], 18), [[0, 1], [1, 0], [1, 0], [1, 0]]);
         assert_eq!(around(&[5.0, 5.0], 18), [[0], [0]]);
     }

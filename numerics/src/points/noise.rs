@@ -9,20 +9,24 @@ use super::sampling::{Sampling, median};
 use crate::error::NumericsError;
 use crate::observer::Observer;
 
-/// Residual degrees of freedom of the smaller neighbourhood: few, so that it stays within the curvature of coarse clouds.
+/// Residual degrees of freedom of the smaller neighbourhood. They are few, so that the neighbourhood stays
+/// small against the curvature of coarse clouds.
 pub(crate) const DEGREES_OF_FREEDOM: usize = 2;
 
-/// Points that are looked at, or up to twice as many: their median scatters by 4 %.
+/// Number of points examined, or up to twice as many. The median of 1,000 estimates scatters by 4 %.
 pub(crate) const MAX_SITES: usize = 1000;
 
-/// Standard deviation of the noise of the points across the surface they sample, unit L; 0 where none shows, and for
-/// clouds too small to tell.
+/// Estimates the standard deviation of the noise of the points across their surface, unit L. Returns 0 where
+/// no noise shows, and for clouds that are too small.
 ///
-/// At every point quadrics are fitted to the k₁ and to the 2k₁ nearest points. The noise σ² shows in both residual
-/// variances s²; what the quadrics miss of a smooth surface grows like the distance cubed, so its part in s² grows by
-/// ρ = 2^{6/(d−1)}, and `(ρ s₁² − s₂²)/(ρ − 1)` has none of it. The median over the points ignores edges and outliers; it is
-/// corrected by that of a χ² variable (Wilson and Hilferty 1931). Within a tenth up to σ = 0.3 spacings; beyond, low: the
-/// neighbourhoods are no longer those of the surface.
+/// At every examined point one quadric is fitted to the k₁ nearest points and another to the 2k₁ nearest.
+/// Both residual variances s² contain the noise variance σ². They also contain what a quadric misses of a
+/// smooth surface: it grows like the distance cubed, so its part in s² grows by ρ = 2^{6/(d−1)}. The
+/// combination `(ρ s₁² − s₂²)/(ρ − 1)` cancels that part.
+///
+/// The median over the points ignores edges and outliers. It is divided by the median of a χ² variable over
+/// its degrees of freedom (Wilson and Hilferty 1931). The estimate is within a tenth up to σ = 0.3 spacings.
+/// Beyond, it is too low, because the neighbourhoods are no longer those of the surface.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -73,7 +77,8 @@ mod tests {
         estimate_noise(cloud, &Sampling::of(cloud, &Unobserved).unwrap(), &Unobserved).unwrap()
     }
 
-    /// The cloud with every coordinate moved by a number of mean 0 and this standard deviation: cosines of large angles.
+    /// Returns the cloud with noise of mean 0 and standard deviation `sigma` on every coordinate: cosines of
+    /// large angles.
     fn noisy(cloud: &Cloud, sigma: f64) -> Cloud {
         let moved =
             |(i, x): (usize, &f64)| x + sigma * 2f64.sqrt() * (12.9898 * (i as f64 + 1.0).powi(2)).cos();
@@ -84,7 +89,7 @@ mod tests {
     fn exact_clouds_have_next_to_no_noise() {
         for cloud in [circle(60), fibonacci_sphere(400)] {
             let noise = noise_of(&cloud);
-            // Against a spacing of 0.1 and 0.18.
+            // The spacings are 0.1 and 0.18.
             assert!(noise < 1e-3, "{noise}");
         }
     }

@@ -1,4 +1,4 @@
-//! The nearest points in a frame of their own.
+//! The nearest points of a position in a local frame.
 
 use smallvec::SmallVec;
 
@@ -7,19 +7,21 @@ use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 use crate::machine::vector::{dot, norm, tangent_basis};
 
-/// Breadth against length under which points lie on a line.
+/// Ratio of breadth to length below which points lie on a line.
 const THREAD: f64 = 1e-3;
 
-/// Coordinates of a patch, on the stack for as many points as the quadric of a surface in space is fitted to.
+/// Coordinates of a patch. They fit on the stack for as many points as a quadric of a surface in space is
+/// fitted to.
 type Coordinates = SmallVec<[f64; 64]>;
 
 /// Points near a position x in an orthonormal frame at x, scaled by their greatest distance from x.
 pub(crate) struct Patch {
-    /// Rows: d − 1 tangents, then the normal, `[d, d]`.
+    /// Axes of the frame as rows: d − 1 tangents, then the normal, `[d, d]`.
     frame: Small,
-    /// Least standard deviation along a tangent against the greatest.
+    /// Least standard deviation of the points along a tangent, relative to the greatest.
     breadth: f64,
-    /// Coordinates over `radius`, the last one the height above the tangent plane, `[k, d]`.
+    /// Coordinates of the points divided by `radius`, `[k, d]`. The last one is the height above the tangent
+    /// plane.
     coordinates: Coordinates,
     dimension: usize,
     /// Greatest distance of a point from x, unit L.
@@ -27,7 +29,8 @@ pub(crate) struct Patch {
 }
 
 impl Patch {
-    /// The patch of given points, in the frame of their principal axes; `None` if all of them are at x.
+    /// Makes the patch of the given points in the frame of their principal axes. Returns `None` if all of
+    /// them lie at x.
     pub(crate) fn of(cloud: &Cloud, x: &[f64], points: impl IntoIterator<Item = usize>) -> Option<Self> {
         match cloud.dimension() {
             2 => Self::gather::<2>(cloud, x, points),
@@ -36,7 +39,8 @@ impl Patch {
         }
     }
 
-    /// D is the dimension where the compiler shall know it, so that it copies no three numbers by a call; else 0.
+    /// Makes the patch. D is the dimension if it is known at compile time, else 0. Knowing it spares a call
+    /// for each copy of three numbers.
     fn gather<const D: usize>(
         cloud: &Cloud,
         x: &[f64],
@@ -76,7 +80,7 @@ impl Patch {
         let normal = self.in_space(&normal);
         let mut frame = tangent_basis(&normal);
         frame.extend_from_slice(&normal);
-        // The new axes in the old frame turn coordinates in that into the new ones.
+        // The new axes, expressed in the old frame, map old coordinates to new ones.
         let mut turn = frame.clone();
         turn_into::<D>(&self.frame, &mut turn, d);
         turn_into::<D>(&turn, &mut self.coordinates, d);
@@ -101,12 +105,12 @@ impl Patch {
         &self.coordinates
     }
 
-    /// Components of a vector in the frame.
+    /// Returns the components of a vector in the frame.
     pub(crate) fn to_frame(&self, v: &[f64]) -> Small {
         self.frame.chunks_exact(v.len()).map(|axis| dot(axis, v)).collect()
     }
 
-    /// The vector with these components in the frame.
+    /// Returns the vector with these components in the frame.
     pub(crate) fn in_space(&self, components: &[f64]) -> Small {
         let mut v = zeros(components.len());
         for (axis, c) in self.frame.chunks_exact(components.len()).zip(components) {
@@ -115,15 +119,16 @@ impl Patch {
         v
     }
 
-    /// Whether the points lie on a thread: they span fewer than d − 1 directions, and no surface.
+    /// Returns whether the points lie on a thread: they span fewer than d − 1 directions and so no surface.
     pub(crate) fn is_thread(&self) -> bool {
         self.breadth < THREAD
     }
 
-    /// Whether x is at the rim of the patch: no neighbour lies within 75° of the direction opposite to most of them.
+    /// Returns whether x is at the rim of the patch: no neighbour lies within 75° of the direction opposite
+    /// to most of them.
     ///
-    /// In the plane that is a sector of 150° without points; a uniformly random cloud shows one inside at 0.2 % of its
-    /// points, a straight rim at nearly all of them.
+    /// In the plane this is an empty sector of 150°. Inside a uniformly random cloud it occurs at 0.2 % of
+    /// the points, at a straight rim at nearly all of them.
     pub(crate) fn is_at_rim(&self) -> bool {
         let k = self.dimension - 1;
         let tangential = || self.coordinates.chunks_exact(k + 1).map(|t| &t[..k]);
@@ -136,12 +141,12 @@ impl Patch {
             return false;
         }
         const COSINE: f64 = 0.26;
-        // Points closer than a hundredth of the patch have no direction to speak of.
+        // Points closer than a hundredth of the radius have no reliable direction.
         tangential().filter(|t| norm(t) > 0.01).all(|t| dot(t, &away) < COSINE * length * norm(t))
     }
 }
 
-/// Turns vectors `[k, d]` into their components along the axes of a frame `[d, d]`.
+/// Replaces vectors `[k, d]` by their components along the axes of a frame `[d, d]`.
 fn turn_into<const D: usize>(frame: &[f64], vectors: &mut [f64], d: usize) {
     let d = if D == 0 { d } else { D };
     let (mut components, frame) = (zeros(d), &frame[..d * d]);
@@ -152,8 +157,9 @@ fn turn_into<const D: usize>(frame: &[f64], vectors: &mut [f64], d: usize) {
     }
 }
 
-/// Orthonormal principal axes of differences `[k, d]` about their mean, the direction of least variance last; and the standard
-/// deviation along the last but one against that along the first.
+/// Computes the orthonormal principal axes of differences `[k, d]` about their mean, the direction of least
+/// variance last. Also returns the standard deviation along the last axis but one, relative to that along the
+/// first.
 fn principal_axes<const D: usize>(differences: &[f64], d: usize) -> (Small, f64) {
     let d = if D == 0 { d } else { D };
     let n = (differences.len() / d) as f64;

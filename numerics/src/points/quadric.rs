@@ -1,47 +1,48 @@
-//! Quadrics through the nearest points.
+//! Least-squares quadrics through the nearest points.
 //!
-//! A second opinion on normals and curvatures that knows neither kernel nor length scale: it sees the positions of a few
-//! neighbours and nothing else.
+//! They are a second opinion on normals and curvatures without kernel or length scale: they use nothing but
+//! the positions of a few neighbours.
 
 use smallvec::SmallVec;
 
 use super::patch::Patch;
 use crate::machine::small::{Small, zeros};
 
-/// The numbers of a least-squares problem, on the stack for a surface in space.
+/// Storage of a least-squares problem, on the stack for a surface in space.
 type Columns = SmallVec<[f64; 128]>;
 
-/// Neighbours per coefficient of a quadric: 18 for surfaces in space.
+/// Neighbours per coefficient of a quadric: 18 neighbours for surfaces in space.
 const NEIGHBOURS_PER_COEFFICIENT: usize = 3;
 
-/// Diagonal entries of R below this fraction of the largest mean that the neighbours do not determine a quadric.
+/// Least diagonal entry of R relative to the largest. Below it, the neighbours do not determine a quadric.
 const RANK_TOLERANCE: f64 = 1e-6;
 
-/// Coefficients of a quadric over d − 1 tangential coordinates: `d(d+1)/2`.
+/// Number of coefficients of a quadric over d − 1 tangential coordinates: `d(d+1)/2`.
 pub(crate) fn n_coefficients(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
-/// Neighbours that a quadric is fitted to by default.
+/// Default number of neighbours that a quadric is fitted to.
 pub(crate) fn n_quadric_neighbours(dimension: usize) -> usize {
     NEIGHBOURS_PER_COEFFICIENT * n_coefficients(dimension)
 }
 
-/// `z = height + slope·t + ½ tᵀ hessian t` in the frame and scale of a patch.
+/// A quadric `z = height + slope·t + ½ tᵀ hessian t` in the frame and scale of a patch.
 pub(crate) struct Quadric {
     pub height: f64,
-    /// `[d−1]`.
+    /// Gradient at t = 0, `[d−1]`.
     pub slope: Small,
-    /// `[d−1, d−1]`.
+    /// Second derivatives, `[d−1, d−1]`.
     pub hessian: Small,
-    /// Root mean square of what it leaves, corrected for the degrees of freedom.
+    /// Root mean square residual, corrected for the degrees of freedom.
     pub residual: f64,
-    /// R of AᵀA = RᵀR, A the terms at the points: upper triangle, `[p, p]`.
+    /// Triangular factor R of AᵀA = RᵀR, where A holds the terms at the points: upper triangle, `[p, p]`.
     factor: Columns,
 }
 
 impl Quadric {
-    /// The least-squares quadric of heights over tangential coordinates; `None` if the points do not determine it.
+    /// Fits the heights over the tangential coordinates by least squares. Returns `None` if the points do not
+    /// determine a quadric.
     pub(crate) fn of(patch: &Patch) -> Option<Self> {
         let d = patch.dimension();
         let (k, p) = (d - 1, n_coefficients(d));
@@ -49,7 +50,7 @@ impl Quadric {
         if n < p {
             return None;
         }
-        // 1, the tangential coordinates, their products.
+        // The columns are 1, the tangential coordinates, and their products.
         let mut columns = Columns::from_elem(1.0, n * p);
         let (linear, products) = columns[n..].split_at_mut(k * n);
         let coordinate = |axis| patch.coordinates().iter().skip(axis).step_by(d);
@@ -84,7 +85,8 @@ impl Quadric {
         })
     }
 
-    /// Standard error of the second derivative along a unit vector v, `[d−1]`, if the residual is noise: that of `vᵀHv` by `(AᵀA)⁻¹`.
+    /// Standard error of the second derivative `vᵀHv` along a unit vector v, `[d−1]`, by `(AᵀA)⁻¹`. It takes
+    /// the residual to be noise.
     pub(crate) fn standard_error(&self, v: &[f64]) -> f64 {
         let (k, p) = (v.len(), n_coefficients(v.len() + 1));
         let mut form = zeros(p);
@@ -103,8 +105,10 @@ impl Quadric {
     }
 }
 
-/// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2), A `[n, p]` column by column.
-/// Answers c, the squared residual and R; `None` if A has not full rank.
+/// Minimises `|Ac − b|` by Householder reflections in place (Golub and Van Loan 2013, sec. 5.2.2).
+///
+/// A is `[n, p]`, column by column. Returns c, the squared residual and R, or `None` if A does not have full
+/// rank.
 fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64, Columns)> {
     let n = b.len();
     let mut diagonal = zeros(p);
@@ -142,7 +146,7 @@ fn least_squares(a: &mut [f64], b: &mut [f64], p: usize) -> Option<(Small, f64, 
     Some((c, b[p..].iter().map(|r| r * r).sum(), factor))
 }
 
-/// A scalar product in four sums, none of which waits for the others.
+/// Scalar product in four independent sums, none of which waits for the others.
 fn long_dot(a: &[f64], b: &[f64]) -> f64 {
     let (fours_a, rest_a) = a.as_chunks::<4>();
     let (fours_b, rest_b) = b.as_chunks::<4>();

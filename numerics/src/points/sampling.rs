@@ -1,4 +1,4 @@
-//! How a cloud is sampled: who is near whom, how far apart, and the lengths that kernels follow.
+//! Sampling of a cloud: neighbours, spacings, and the lengths that kernels follow.
 
 use rayon::prelude::*;
 
@@ -8,10 +8,10 @@ use crate::error::NumericsError;
 use crate::machine::heap::vec_bytes;
 use crate::observer::Observer;
 
-/// Positions around a point that define the sampling distance there.
+/// Number of positions around a point that define the spacing there.
 pub const SPACING_NEIGHBOURS: usize = 4;
 
-/// What the positions of a cloud say, found once for all who ask.
+/// The neighbour tree, spacings and lengths of a cloud, computed once and shared.
 pub struct Sampling {
     neighbours: Neighbours,
     spacings: Vec<f64>,
@@ -19,7 +19,7 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Looks at the neighbours of every point.
+    /// Builds the tree and measures the distances from every position to its neighbours.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -50,12 +50,13 @@ impl Sampling {
         &self.neighbours
     }
 
-    /// h_q: mean distance from a point to the [`SPACING_NEIGHBOURS`] nearest positions elsewhere, unit L; 0 for one position alone.
+    /// h_q: mean distance from a point to the [`SPACING_NEIGHBOURS`] nearest positions elsewhere, unit L. 0
+    /// if the cloud has only one position.
     pub fn spacing(&self, point: usize) -> f64 {
         self.spacings[point]
     }
 
-    /// [`Sampling::spacing`] of all points, `[n]`.
+    /// Spacings of all points, as in [`Sampling::spacing`], `[n]`.
     pub fn spacings(&self) -> &[f64] {
         &self.spacings
     }
@@ -64,9 +65,10 @@ impl Sampling {
         &self.scales
     }
 
-    /// So many points, or fewer than twice as many, of every spacing: at equal steps in the order of
-    /// [`Sampling::spacing`], which neither the order of the points nor the axes change. Where spacings tie,
-    /// by index.
+    /// Returns a sample of `count` points, or fewer than twice as many, that covers all spacings.
+    ///
+    /// Points are taken at equal steps in the order of [`Sampling::spacing`]. Neither the order of the points
+    /// nor the axes changes that order, except that ties are broken by index.
     pub fn of_every_spacing(&self, count: usize) -> Vec<usize> {
         let n = self.spacings.len();
         let mut order: Vec<usize> = (0..n).collect();
@@ -80,7 +82,7 @@ impl Sampling {
     }
 }
 
-/// Lengths of a cloud, unit L; those that kernels follow are 1 for one position alone, which has no scale.
+/// Lengths of a cloud, unit L. All are 1 for a cloud with only one position, which has no scale.
 #[derive(Debug, Clone, Copy)]
 pub struct Scales {
     /// Half the diagonal of the bounding box.
@@ -94,7 +96,7 @@ pub struct Scales {
     nearest_range: Option<NearestRange>,
 }
 
-/// Distances from each point to the nearest point elsewhere, unit L.
+/// Statistics of the distance from each point to the nearest point elsewhere, unit L.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestRange {
     pub min: f64,
@@ -118,7 +120,7 @@ impl Scales {
         }
     }
 
-    /// `None` if all points coincide.
+    /// Statistics of the nearest distances, or `None` if all points coincide.
     pub fn nearest_range(&self) -> Option<NearestRange> {
         self.nearest_range
     }
@@ -133,7 +135,7 @@ fn extent(cloud: &Cloud) -> f64 {
     cloud.points().map(|x| squared_distance(x, &centroid) / n).sum::<f64>().sqrt()
 }
 
-/// The middle of a list, the upper one of two.
+/// Median of a list, or `None` if it is empty. Of two middle values the upper one is taken.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     if values.is_empty() {

@@ -1,23 +1,26 @@
-//! Fewer points, spread as the cloud is.
+//! Thinning: fewer points that are spread as the cloud is.
 
 use super::cells::halve;
 use super::cloud::Cloud;
 
-/// Points of the coarse cloud at most: their factorization takes a second and a half on two cores. With 4,000
-/// thin parts of a scan have a third more normals on the wrong side.
+/// Greatest number of points of the coarse cloud. Factorizing 6,000 takes a second and a half on two cores.
+/// With 4,000, thin parts of a scan have a third more normals on the wrong side.
 const MAX_COARSE: usize = 6000;
 
-/// Points of the cloud per point of the coarse one, where that leaves more than [`LEAST_COARSE`].
+/// Points of the cloud per point of the coarse one, if that leaves more than [`LEAST_COARSE`].
 const POINTS_PER_COARSE: usize = 6;
+/// Least number of points of the coarse cloud, for clouds that have as many.
 const LEAST_COARSE: usize = 600;
 
-/// Points of the coarse cloud for one of n.
+/// Returns the number of points of the coarse cloud for a cloud of `n_points`.
 pub(crate) fn n_coarse(n_points: usize) -> usize {
     (n_points / POINTS_PER_COARSE).clamp(LEAST_COARSE, MAX_COARSE).min(n_points)
 }
 
-/// At most `count` points of a cloud, one for each of as many parts with equally many points: halves of
-/// halves of the cloud, of each the point in the middle of its last halving.
+/// Returns at most `count` points of a cloud, spread as the cloud is.
+///
+/// The cloud is halved again and again into parts with equally many points, as many as points are wanted.
+/// Each part contributes the point in the middle along its last halving.
 pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
     if count >= cloud.n_points() {
         return cloud.clone();
@@ -25,7 +28,7 @@ pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
     cloud.select(&thinned_points(cloud, count))
 }
 
-/// The points of [`thinned`], ascending.
+/// Indices of the points of [`thinned`], ascending.
 pub(crate) fn thinned_points(cloud: &Cloud, count: usize) -> Vec<usize> {
     let n = cloud.n_points();
     if count >= n {
@@ -38,7 +41,7 @@ pub(crate) fn thinned_points(cloud: &Cloud, count: usize) -> Vec<usize> {
     chosen
 }
 
-/// Chooses so many of these points.
+/// Chooses `count` of these points and appends them to `chosen`.
 fn choose(cloud: &Cloud, points: &mut [u32], count: usize, chosen: &mut Vec<usize>) {
     if count == 0 || points.is_empty() {
         return;

@@ -1,8 +1,8 @@
-//! What each value is predicted to be from all others.
+//! Predictions of each value from all others.
 //!
-//! With `P = W − WF(FᵀWF)⁻¹FᵀW`, `W = (K + N)⁻¹` and `Λ = PY`, the value of point i is predicted by all others as `Y_i − Λ_i/P_ii` with the
-//! variance `1/P_ii`, its own noise included, and the coefficients of the mean are those that the others have (Rasmussen and Williams 2006,
-//! eqs. 5.12 and 5.13; Dubrule 1983).
+//! Let `P = W − WF(FᵀWF)⁻¹FᵀW`, `W = (K + N)⁻¹` and `Λ = PY`. All other values predict the value of point i
+//! as `Y_i − Λ_i/P_ii`. The variance is `1/P_ii`, the noise of the value included. The coefficients of the
+//! mean are those that the other values give (Rasmussen and Williams 2006, eqs. 5.12 and 5.13; Dubrule 1983).
 
 use std::f64::consts::TAU;
 
@@ -20,24 +20,27 @@ use crate::solver::trend::{Mean, Trend};
 use crate::solver::{Solution, Solver};
 use crate::sums::regularization::Regularization;
 
-/// Columns of `L⁻¹` that are held at once.
+/// Number of columns of `L⁻¹` held at once.
 const COLUMNS_PER_BLOCK: usize = 512;
 
-/// Predictions of each value from all others, `[n]` each, in the order of the points; NaN where the mean is not determined without the point.
+/// Predictions of each value from all others, `[n]` each, in the order of the points. NaN where the mean is
+/// not determined without the point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeaveOneOut {
-    /// Unit V.
+    /// Predicted values, unit V.
     pub means: Vec<f64>,
-    /// Of the latent function, no noise added; unit V². What rounding makes negative is 0.
+    /// Variances of the latent function, without noise, unit V². Negative results of rounding are replaced
+    /// by 0.
     pub variances: Vec<f64>,
-    /// Of the value, its own noise included; unit V².
+    /// Variances of the values, their own noise included, unit V².
     pub observation_variances: Vec<f64>,
-    /// `ln p(Y_i | Y_{−i})`, with its own noise.
+    /// Log predictive densities `ln p(Y_i | Y_{−i})`, the noise of the value included.
     pub log_predictive_densities: Vec<f64>,
 }
 
 impl LeaveOneOut {
-    /// From Λ and `P_ii`.
+    /// Computes the predictions from Λ and `P_ii`. Kernel and noise are `factor` times those behind Λ and
+    /// `P_ii`.
     fn of(values: &[f64], weights: &[f64], diagonal: &[f64], noise: &Regularization, factor: f64) -> Self {
         let each = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             (0..values.len()).map(|i| if diagonal[i] > 0.0 { of(i) } else { f64::NAN }).collect()
@@ -52,17 +55,19 @@ impl LeaveOneOut {
         Self { means, variances, observation_variances, log_predictive_densities }
     }
 
-    /// Sum of the log densities: the score of [`Criterion::LeaveOneOut`].
+    /// Returns the sum of the log densities, the score of [`Criterion::LeaveOneOut`].
     pub fn score(&self) -> f64 {
         self.log_predictive_densities.iter().sum()
     }
 }
 
-/// The predictions under a system that is factorized, with kernel and noise `factor` times as large as the solver has them; n³ flops.
+/// Predicts each value with an existing factorization, in n³ flops. Kernel and noise are `factor` times those
+/// of the solver.
 ///
 /// # Errors
-/// [`NumericsError::LengthMismatch`]; [`NumericsError::NotPositiveDefinite`] without a Cholesky factor; [`NumericsError::MeanNotDetermined`] where
-/// the mean is not determined without one of the points; [`NumericsError::Cancelled`].
+/// [`NumericsError::LengthMismatch`]. [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
+/// [`NumericsError::MeanNotDetermined`] if the mean is not determined without one of the points.
+/// [`NumericsError::Cancelled`].
 pub fn leave_one_out(
     solver: &Solver,
     solution: &Solution,
@@ -79,11 +84,13 @@ pub fn leave_one_out(
     Ok(LeaveOneOut::of(values, &solution.weights, &diagonal, solver.regularization(), factor))
 }
 
-/// The predictions under hyperparameters, from a factorization of its own; 2n³/3 flops. Points without which the mean is not determined have none.
+/// Predicts each value under hyperparameters, with a factorization of its own, in 2n³/3 flops. Predictions
+/// are NaN at points without which the mean is not determined.
 ///
 /// # Errors
-/// Those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`]; [`NumericsError::NotPositiveDefinite`];
-/// [`NumericsError::MeanNotDetermined`] by all points; [`NumericsError::Cancelled`].
+/// [`NumericsError::LengthMismatch`], [`NumericsError::NotPositiveDefinite`], [`NumericsError::Cancelled`].
+/// [`NumericsError::MeanNotDetermined`] if all points together do not determine the mean. Also the errors of
+/// [`Hyperparameters::kernel_on`].
 pub fn leave_one_out_with(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
     at: &Hyperparameters,
@@ -98,7 +105,7 @@ pub fn leave_one_out_with(
     Ok(LeaveOneOut::of(values, &weights, &diagonal, &at.noise, 1.0))
 }
 
-/// `W_ii = |L⁻¹e_i|²`, some columns at a time.
+/// Computes `W_ii = |L⁻¹e_i|²`, [`COLUMNS_PER_BLOCK`] columns at a time.
 fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
     let n = solver.n_points();
     let mut buffer = vec![0.0; n * COLUMNS_PER_BLOCK.min(n)];
@@ -117,7 +124,7 @@ fn inverse_diagonal(solver: &Solver, observer: &dyn Observer) -> Result<Vec<f64>
     Ok(diagonal)
 }
 
-/// Subtracts the diagonal of `WF(FᵀWF)⁻¹FᵀW`.
+/// Turns `W_ii` into `P_ii`: subtracts the diagonal of `WF(FᵀWF)⁻¹FᵀW`.
 fn remove_mean(diagonal: &mut [f64], solver: &Solver, trend: &Trend) -> Result<(), NumericsError> {
     let (n, basis) = (diagonal.len(), trend.basis());
     let functionals = basis.functionals(solver).ok_or(NumericsError::MeanNotDetermined)?;

@@ -1,8 +1,9 @@
-//! Which kernel and how much noise values want.
+//! Model selection: the choice of a kernel, its hyperparameters and the noise, from values.
 //!
-//! [`learn`] is for whoever says nothing: a grid of kernels and noises, coarse enough for a cache. [`select()`] searches the best
-//! hyperparameters of all values by a [`Criterion`], in n³ flops for every evaluation; [`alpha_path()`] looks at many α for one
-//! kernel, and [`leave_one_out()`] predicts each value from all others.
+//! [`learn`] serves clients that name no kernel. It searches a grid of kernels and noises, coarse enough that
+//! different values share cached factorizations. [`select()`] maximises a [`Criterion`] of all values over
+//! hyperparameters, in n³ flops for every evaluation. [`alpha_path()`] scores many α for one kernel.
+//! [`leave_one_out()`] predicts each value from all others.
 
 mod alpha_path;
 mod criterion;

@@ -1,24 +1,24 @@
-//! Hyperparameters, and which of them are free.
+//! Hyperparameters of a process, and which of them a search may vary.
 
 use crate::error::NumericsError;
 use crate::kernel::{Family, Kernel};
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;
 
-/// What a process is made of: `v φ(Σ_c (x_c − y_c)²/ℓ_c²)` and noise.
+/// Hyperparameters of a process: the kernel `v φ(Σ_c (x_c − y_c)²/ℓ_c²)` and the noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyperparameters {
     pub family: Family,
-    /// ℓ, unit L: one, or one for each axis, `[d]`.
+    /// Length scales ℓ, unit L: one for all axes, or one for each axis, `[d]`.
     pub length_scales: Vec<f64>,
-    /// v, unit V².
+    /// Variance v, unit V².
     pub variance: f64,
-    /// N, unit V².
+    /// Noise variance N, unit V².
     pub noise: Regularization,
 }
 
 impl Hyperparameters {
-    /// Those of a kernel.
+    /// Returns the hyperparameters of a kernel with this noise.
     pub fn of(kernel: &Kernel, noise: Regularization) -> Self {
         let length_scales = match kernel.length_scales() {
             Some(length_scales) => length_scales.to_vec(),
@@ -27,11 +27,11 @@ impl Hyperparameters {
         Self { family: kernel.family(), length_scales, variance: kernel.variance(), noise }
     }
 
-    /// The kernel on a cloud.
+    /// Returns the kernel on a cloud.
     ///
     /// # Errors
-    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::InvalidLengthScale`], also for neither one nor d length scales;
-    /// [`NumericsError::KernelNotPositiveDefinite`].
+    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::KernelNotPositiveDefinite`].
+    /// [`NumericsError::InvalidLengthScale`], also for a number of length scales that is neither one nor d.
     pub fn kernel_on(&self, cloud: &Cloud) -> Result<Kernel, NumericsError> {
         let kernel = match self.length_scales[..] {
             [length_scale] => Kernel::new(self.family, length_scale, self.variance),
@@ -41,7 +41,7 @@ impl Hyperparameters {
         Ok(kernel)
     }
 
-    /// α, if every point has the same noise.
+    /// Returns α if every point has the same noise.
     pub(super) fn alpha(&self) -> Option<f64> {
         match self.noise {
             Regularization::Uniform(alpha) => Some(alpha),
@@ -50,10 +50,10 @@ impl Hyperparameters {
     }
 }
 
-/// What may be free.
+/// A hyperparameter that a search may vary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Parameter {
-    /// ℓ, one for all axes.
+    /// ℓ, one number for all axes.
     LengthScale,
     /// ℓ_c of every axis: d free numbers.
     LengthScales,
@@ -61,14 +61,14 @@ pub enum Parameter {
     LengthScaleOfAxis(usize),
     /// v.
     Variance,
-    /// α, the same noise everywhere.
+    /// α, the same noise at every point.
     Alpha,
-    /// ε of the Laplace family; other families leave it alone.
+    /// ε of the Laplace family. Other families ignore it.
     Epsilon,
 }
 
 impl Parameter {
-    /// The least and the greatest number that bounds may be.
+    /// Returns the least and the greatest number allowed as a bound.
     pub fn range(self) -> (f64, f64) {
         match self {
             Self::Epsilon => (1e-300, 1e5),
@@ -88,11 +88,11 @@ pub struct Variation {
     pub max: f64,
 }
 
-/// A number this near to a bound is the bound: a logarithm and back is off by rounding.
+/// Relative distance within which a number counts as its bound: exp(ln x) differs from x by rounding.
 const ROUNDING: f64 = 1e-12;
 
 impl Variation {
-    /// The number with this logarithm, within its bounds.
+    /// Returns the number with this logarithm, moved into its bounds.
     pub(super) fn number(&self, logarithm: f64) -> f64 {
         match logarithm.exp() {
             number if number <= self.min * (1.0 + ROUNDING) => self.min,
@@ -101,7 +101,7 @@ impl Variation {
         }
     }
 
-    /// What is wrong with the bounds.
+    /// Checks the bounds. The error states the requirement that they break.
     pub(super) fn check_bounds(&self) -> Result<(), &'static str> {
         let Self { parameter, min, max } = *self;
         let (least, greatest) = parameter.range();

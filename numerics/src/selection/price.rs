@@ -1,20 +1,23 @@
-//! What model selection takes, known before it begins.
+//! Cost of model selection, estimated before it begins.
 
 use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
 use super::search::SIDE_BY_SIDE;
 use crate::solver::choose::Price;
 
-/// Evaluations that a descent over so many free numbers takes, mostly: some 50 for 6 of them and 70 to 110 for 12 were counted
-/// (`bench/peers/model_selection.py`).
+/// Returns the number of evaluations that a descent over `n_free` numbers usually takes. About 50 were
+/// counted for 6 numbers and 70 to 110 for 12 (`bench/peers/model_selection.py`).
 pub fn expected_evaluations(n_free: usize) -> usize {
     if n_free == 0 { 1 } else { 40 + 6 * n_free }
 }
 
-/// What so many evaluations take: with all slopes n³ for the likelihood, twice that for others, a third of it without slopes, and a pass over
-/// the pairs.
+/// Returns the cost of `n_evaluations` evaluations.
 ///
-/// `n_descents` are families times starts: those of up to 1,024 points run side by side, on `n_threads`, with memory of their own.
+/// With all slopes, an evaluation takes n³ flops for the likelihood and 2n³ for other criteria. Without
+/// slopes it takes a third of that. A pass over the pairs is added.
+///
+/// `n_descents` is the number of families times starts. Descents of up to 1,024 points run side by side on
+/// `n_threads`, each with memory of its own.
 pub fn selection_price(
     (n_points, dimension): (usize, usize),
     criterion: Criterion,
@@ -39,8 +42,8 @@ pub fn selection_price(
     }
 }
 
-/// What a path of so many α takes: an eigendecomposition, and a product of matrices for what needs the diagonal of the inverse; or a
-/// factorization for each α.
+/// Returns the cost of a path over `n_alphas` values of α. Either it takes one eigendecomposition, with
+/// matrix products where the score needs the diagonal of the inverse, or a factorization for each α.
 pub fn alpha_path_price(
     (n_points, dimension): (usize, usize),
     criterion: Criterion,
@@ -66,7 +69,8 @@ pub fn alpha_path_price(
     }
 }
 
-/// What predictions of all values from all others take: beside a solver, or with a factorization of their own.
+/// Returns the cost of predicting every value from all others, beside a solver or with a factorization of its
+/// own.
 pub fn leave_one_out_price(n_points: usize, n_functions: usize) -> Price {
     let n = n_points as f64;
     let n_numbers = n_points.saturating_mul(3 * n_points.min(512) + 3 * n_functions + 20);

@@ -1,4 +1,4 @@
-//! What is looked at: values at points, and what their mean may be.
+//! Values at points with the functions of their mean, the data of every evaluation.
 
 use faer::Mat;
 
@@ -9,13 +9,13 @@ use crate::points::cloud::Cloud;
 use crate::solver::trend::{Basis, Mean, Trend, solve_gram};
 use crate::sums::regularization::Regularization;
 
-/// What a leverage lacks of 1 at least: less is rounding.
+/// Least difference between 1 and a leverage. Less is rounding.
 const LEVERAGE: f64 = 1e-10;
 
-/// Values at the points of a cloud with a mean: what all evaluations share.
+/// Values at the points of a cloud with a mean. All evaluations share them.
 pub(super) struct Subject<'a> {
     pub(super) cloud: &'a Cloud,
-    /// `[n]`, without what all of them share where there is a mean.
+    /// Values, `[n]`. If there is a mean, their average is subtracted.
     pub(super) values: Vec<f64>,
     shared: f64,
     basis: Basis,
@@ -25,9 +25,11 @@ pub(super) struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
+    /// Prepares values at the points of a cloud.
+    ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`]; [`NumericsError::MeanNotDetermined`] if the points do not tell the functions of the mean apart, or there
-    /// are no more of them.
+    /// [`NumericsError::LengthMismatch`]. [`NumericsError::MeanNotDetermined`] if the points do not
+    /// distinguish the functions of the mean, or if there are no more points than functions.
     pub(super) fn of(cloud: &'a Cloud, values: &[f64], mean: Mean) -> Result<Self, NumericsError> {
         cloud.check_one_per_point(values)?;
         let (n, basis) = (values.len(), Basis::of(mean, cloud));
@@ -37,13 +39,14 @@ impl<'a> Subject<'a> {
         if p > 0 && (n <= p || solve_gram(&gram, Mat::identity(p, p)).is_none()) {
             return Err(NumericsError::MeanNotDetermined);
         }
-        // What all values share would cost digits of what they do not share.
+        // A large average would cost digits of the differences between values.
         let shared = if p > 0 { values.iter().sum::<f64>() / n as f64 } else { 0.0 };
         let values = values.iter().map(|value| value - shared).collect();
         Ok(Self { cloud, values, shared, basis, functions, n_functions: p })
     }
 
-    /// Whether the mean is determined without any one of the points: none has all of the leverage, `fᵀ(FᵀF)⁻¹f < 1`.
+    /// Checks that the mean is determined without any one of the points: each leverage `fᵀ(FᵀF)⁻¹f` is
+    /// below 1.
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`].
@@ -63,7 +66,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The norm of what the mean leaves of the values at least: what it leaves where all of them weigh the same.
+    /// Returns the least norm that the mean can leave of the values: the residual norm of ordinary least
+    /// squares.
     pub(super) fn rest(&self) -> f64 {
         let n = self.n_points();
         let mut columns = self.functions.clone();
@@ -77,14 +81,14 @@ impl<'a> Subject<'a> {
         self.values.len()
     }
 
-    /// The mean with coefficients that generalised least squares found, `[p]`.
+    /// Returns the mean with the coefficients `[p]` of generalised least squares. `None` if there is no mean.
     pub(super) fn trend(&self, mut coefficients: Vec<f64>) -> Option<Trend> {
         *coefficients.first_mut()? += self.shared;
         Some(Trend::new(self.basis.clone(), coefficients))
     }
 }
 
-/// The noise in units of its mean: 1 where it is the same everywhere, or nothing.
+/// Returns the noise in units of its mean, `[n]`. It is 1 where the noise is uniform or zero everywhere.
 pub(super) fn relative_noise(noise: &Regularization, n: usize) -> Vec<f64> {
     match noise {
         Regularization::Uniform(_) => vec![1.0; n],

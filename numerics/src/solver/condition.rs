@@ -1,12 +1,14 @@
-//! Estimate of the 1-norm of a linear map that is only known by its action.
+//! Estimate of the 1-norm of a linear map that is known only by its action.
 
 use faer::{Mat, MatMut};
 
-/// A lower bound of `‖W‖₁` for an `[n, n]` map, nearly always within a factor 3 of it, and `W·1`, where it begins.
+/// Returns a lower bound of `‖W‖₁` for an `[n, n]` map, and `W·1`, the first image that it computes.
+/// The bound is nearly always within a factor 3.
 ///
-/// One step of Hager's algorithm with Higham's safeguard (Higham 2002, "Accuracy and Stability of Numerical Algorithms", algorithm
-/// 15.1): the gradient of `‖Wx‖₁` at the mean of all columns names a large one. More steps seldom find a column that is
-/// twice as large, and each costs two more applications. A bound that is not finite means the map overflows.
+/// The method is one step of Hager's algorithm with Higham's safeguard (Higham 2002, "Accuracy and Stability
+/// of Numerical Algorithms", algorithm 15.1). The gradient of `‖Wx‖₁` at the mean of all columns points to a
+/// large column. More steps seldom find a column that is twice as large, and each costs two more
+/// applications. A bound that is not finite means that the map overflows.
 pub(crate) fn estimate_norm1(
     n: usize,
     apply: impl Fn(MatMut<'_, f64>),
@@ -23,7 +25,7 @@ pub(crate) fn estimate_norm1(
     let slope = |i: usize| gradient[(i, 0)].abs();
     let steepest = (0..n).max_by(|&a, &b| slope(a).total_cmp(&slope(b))).unwrap_or(0);
     let (of_column, _) = norm_of_image(Mat::from_fn(n, 1, |i, _| if i == steepest { 1.0 } else { 0.0 }));
-    // The safeguard: a vector of alternating signs, against the matrices on which the gradient is blind.
+    // The safeguard: a vector of alternating signs, for matrices on which the gradient is blind.
     let ramp = |i: usize| 1.0 + i as f64 / (n.max(2) - 1) as f64;
     let (of_ramp, _) = norm_of_image(Mat::from_fn(n, 1, |i, _| if i % 2 == 0 { ramp(i) } else { -ramp(i) }));
     let found = [of_ones / n as f64, of_column, 2.0 * of_ramp / (3.0 * n as f64)];

@@ -11,14 +11,15 @@ use crate::error::NumericsError;
 use crate::observer::{Observer, Stage};
 use crate::sums::many::values_of_each;
 
-/// Lists that are solved together.
+/// Number of lists that are solved together.
 const LISTS_PER_BLOCK: usize = 256;
 
 impl Solution {
-    /// [`Solution::with_mean`] of each of k lists of values `[k, n]`.
+    /// Computes [`Solution::with_mean`], without its outlier, for each of k lists of values `[k, n]`.
     ///
     /// # Errors
-    /// Those of [`Solution::with_mean`]; [`NumericsError::LengthMismatch`] for lists that are not whole.
+    /// [`NumericsError::LengthMismatch`] for a list that is incomplete. Also the errors of
+    /// [`Solution::with_mean`].
     pub fn of_each(
         solver: &Solver,
         values: &[f64],
@@ -30,7 +31,7 @@ impl Solution {
         if !lists.remainder().is_empty() {
             solver.cloud().check_one_per_point(lists.remainder())?;
         }
-        // Least squares gain by a step of refinement each (Solution::of).
+        // The least squares of the fallback gain by a step of refinement for each list (`Solution::of`).
         if solver.method() != Method::Cholesky {
             return lists.map(|list| Self::with_mean(solver, list, mean, observer)).collect();
         }

@@ -1,7 +1,7 @@
-//! Whether values bear out the kernel and the noise that they were fitted with.
+//! Check of values against the kernel and the noise that they were fitted with.
 //!
-//! A Gaussian process says how far each value may be from what the others make of it. Where values are much
-//! farther, its deviations are too short: there, or everywhere.
+//! A Gaussian process says how far each value may be from what the others predict. Where values are much
+//! farther, its deviations are too short, there or everywhere.
 
 use faer::MatMut;
 
@@ -10,27 +10,32 @@ use crate::error::NumericsError;
 use crate::machine::vector::norm;
 use crate::observer::Observer;
 
-/// Values with the largest weights are those that the others explain worst, about: so many are looked at.
+/// Number of values that are examined. Those with the largest weights are about the ones that the others
+/// explain worst.
 const N_SUSPECTS: usize = 8;
 
-/// Deviations that an outlier is off at least: one normal number of five hundred million is.
+/// Least standardised residual of an outlier. One normal number in five hundred million is beyond it.
 const OUTLYING: f64 = 6.0;
 
-/// What the mean square of standardised residuals is at most, beside five deviations of such a mean.
+/// Largest mean square of standardised residuals that is no contradiction, before five deviations of such a
+/// mean are added.
 const MEAN_SQUARE: f64 = 1.5;
 
 /// The value that the others explain worst.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlier {
     pub point: usize,
-    /// How far it is from what others say of it, in standard deviations.
+    /// Distance from what the others predict, in standard deviations.
     pub deviations: f64,
 }
 
 impl Outlier {
-    /// Of the values with the largest weights, each given all others: `|Λ_i|/√W_ii` with `W = (K + N)⁻¹`
-    /// (Rasmussen and Williams 2006, eq. 5.12), under the variance of the solver's kernel. That the mean is found
-    /// from the values as well makes it a little larger. `None` where there is no Cholesky factor.
+    /// Finds the largest standardised residual `|Λ_i|/√W_ii` with `W = (K + N)⁻¹` (Rasmussen and Williams
+    /// 2006, eq. 5.12), each value given all others. The variance is that of the solver's kernel. `None` if
+    /// there is no Cholesky factor.
+    ///
+    /// Only the values with the largest weights are examined. If the mean is found from the values as well,
+    /// the exact residual is a little larger, since its denominator is then smaller.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -58,7 +63,7 @@ impl Outlier {
     }
 }
 
-/// The points whose weights are largest, measured by the noise where that differs.
+/// Returns the points with the largest weights, measured by the noise where that differs.
 fn suspects(solver: &Solver, weights: &[f64]) -> Vec<usize> {
     let (n, noise) = (solver.n_points(), solver.regularization());
     let mean = (0..n).map(|point| noise.at(point)).sum::<f64>() / n as f64;
@@ -72,32 +77,32 @@ fn suspects(solver: &Solver, weights: &[f64]) -> Vec<usize> {
     points
 }
 
-/// Near values that are together farther off than chance has it, though none of them alone is.
+/// Near values that are together farther off than chance explains, although none of them alone is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// The one that is farthest off.
+    /// The point whose value is farthest off.
     pub point: usize,
     pub n_points: usize,
-    /// How far they are from what others say of them, in standard deviations, in root mean square but for the
-    /// one or two that are farthest off.
+    /// Root mean square distance from what others predict, in standard deviations. The one or two values that
+    /// are farthest off are left out.
     pub deviations: f64,
 }
 
-/// How values contradict kernel and noise.
+/// Disagreement of values with the kernel and noise of their fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disagreement {
-    /// The value that is farthest off, if one is by more than six deviations.
+    /// The value that is farthest off, if it is off by more than six deviations.
     pub outlier: Option<Outlier>,
-    /// The place that is farthest off, where places were looked at, if one is.
+    /// The place that is farthest off, if places were examined and one is off.
     pub place: Option<Place>,
-    /// Mean square of the values, each without what those before it say of it, in units of the deviations that
-    /// these leave: 1 where kernel and noise are right.
+    /// Mean square of standardised residuals: each value without what those before it predict, in units of
+    /// the deviations that these leave. It is 1 where kernel and noise are right.
     pub mean_square: f64,
 }
 
 impl Disagreement {
-    /// What was found of values with so many degrees of freedom, with the outlier only if it is one; `None` if
-    /// that is no contradiction.
+    /// Returns the disagreement of values with this many degrees of freedom, or `None` if there is no
+    /// contradiction. Its outlier is kept only if it is more than six deviations off.
     pub(crate) fn if_any(self, n_degrees: usize) -> Option<Self> {
         let outlier = self.outlier.filter(|outlier| outlier.deviations > OUTLYING);
         let most = MEAN_SQUARE + 5.0 * (2.0 / n_degrees as f64).sqrt();
@@ -107,7 +112,7 @@ impl Disagreement {
 }
 
 impl Solution {
-    /// How the n values contradict a kernel and noise that are `scale` times those that they were solved with.
+    /// Returns how the n values contradict a kernel and noise that are `scale` times those of the solver.
     pub fn disagreement(&self, n_points: usize, scale: f64) -> Option<Disagreement> {
         let n_functions = self.trend.as_ref().map_or(0, |trend| trend.basis().n_functions());
         let n_degrees = n_points.checked_sub(n_functions).filter(|&n_degrees| n_degrees > 0)?;
@@ -130,7 +135,8 @@ mod tests {
     use crate::sums::regularization::Regularization;
     use crate::testing::Random;
 
-    /// A field with noise of a tenth on a line, and how it contradicts a kernel with noise of this variance.
+    /// Returns how a field on a line with noise of deviation 0.1 contradicts a kernel with noise variance
+    /// `alpha`.
     fn contradiction(shift: f64, alpha: f64, scale: f64) -> Option<Disagreement> {
         let (n, mut random) = (300, Random(7));
         let cloud = Arc::new(Cloud::new((0..n).map(|i| 0.02 * f64::from(i)).collect(), 1).unwrap());
@@ -155,7 +161,8 @@ mod tests {
     fn one_value_that_is_off_is_named_with_its_residual() {
         let found = contradiction(1.0, 0.01, 1.0).unwrap();
         let outlier = found.outlier.unwrap();
-        // Ten deviations of the noise, give or take those of its own noise and of what the others say there.
+        // Ten deviations of the noise, give or take the noise of the value and the error of what the others
+        // predict.
         assert!(outlier.point == 170 && (7.0..13.0).contains(&outlier.deviations), "{found:?}");
         assert!(found.mean_square < 1.7, "{found:?}");
     }
@@ -164,7 +171,7 @@ mod tests {
     fn noise_that_is_called_too_small_is_seen_by_all_values() {
         let found = contradiction(0.0, 1e-4, 1.0).unwrap();
         assert!((50.0..150.0).contains(&found.mean_square), "{found:?}");
-        // The same by the factor of a kernel whose variance and noise are smaller in proportion.
+        // A kernel whose variance and noise are smaller in proportion gives the same by its factor.
         let scaled = contradiction(0.0, 0.01, 0.01).unwrap();
         assert!((50.0..150.0).contains(&scaled.mean_square), "{scaled:?}");
         assert!(scaled.outlier.is_some());

@@ -1,4 +1,4 @@
-//! Weights for given values, and what is known of their quality.
+//! Weights for given values, and measures of their accuracy.
 
 use faer::MatMut;
 
@@ -10,24 +10,29 @@ use crate::machine::heap::vec_bytes;
 use crate::observer::{Observer, Stage};
 use crate::sums::jets::{JetOrder, Jets};
 
-/// Relative residuals above this may be worth one step of refinement: backward stable solves stay below it unless the weights
-/// are huge against the values.
+/// Relative residual above which a step of refinement may be worthwhile. Backward stable solves stay below it
+/// unless the weights are huge compared to the values.
 const REFINE_ABOVE: f64 = 1e-12;
 
-/// Backward errors of Cholesky up to this are rounding: a step in the same precision was seen to take a fifth to two thirds off a
-/// residual that is noise (Matérn 5/2, Laplace and Gauss on 500 to 4,000 points, reciprocal conditions down to 3e-14), for
-/// the price of another solve and another pass over all pairs. The least squares of the fallback gain by it all the same: half of
-/// the error of the answers (`tests/conditioning/smooth.rs`).
+/// Backward error of Cholesky up to which the residual is rounding. A refinement step in the same precision
+/// took a fifth to two thirds off such a residual, which is noise. It costs another solve and another pass
+/// over all pairs. This was seen for Matérn 5/2, Laplace and Gauss on 500 to 4,000 points, with reciprocal
+/// conditions down to 3e-14.
+///
+/// The least squares of the fallback gain by refinement all the same: half of the error of the answers
+/// (`tests/conditioning/smooth.rs`).
 const ROUNDING: f64 = f64::EPSILON;
 
-/// Beyond these no honest answer exists (numerics.md, Fit 3).
+/// Largest relative residual of an answer. Beyond it, or beyond [`MAX_BACKWARD_ERROR`], no honest answer
+/// exists (numerics.md, Fit 3).
 pub(crate) const MAX_RELATIVE_RESIDUAL: f64 = 1e-5;
 const MAX_BACKWARD_ERROR: f64 = 1e-13;
 
-/// `Λ = (K + αI)⁻¹ Y` with its residual and norms. Where the function has a mean, Y is what the mean leaves of the values.
+/// Weights `Λ = (K + αI)⁻¹ Y` with their residual and norms. If the function has a mean, Y is the values
+/// without it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// Λ, one for each centre of the solver's expansions: `[n]`, or `[r]` for the fallback.
+    /// Weights Λ, one for each centre of the solver's expansions: `[n]`, or `[r]` for the fallback.
     pub weights: Vec<f64>,
     /// `‖Y − (K + αI)Λ‖₂ / ‖Y‖₂`, 0 for Y = 0.
     pub relative_residual: f64,
@@ -43,25 +48,27 @@ pub struct Solution {
     pub refined: bool,
     /// The mean, if there is one.
     pub trend: Option<Trend>,
-    /// The value that the others explain worst, under the variance of the solver's kernel, if it was looked for.
+    /// The value that the others explain worst, under the variance of the solver's kernel. `None` if it was
+    /// not looked for.
     pub outlier: Option<Outlier>,
 }
 
 impl Solution {
-    /// Solves for values `[n]`, checks the residual against the matrix itself (not its solver), and refines once where that
-    /// helps.
+    /// Solves for values `[n]`. Checks the residual against the matrix itself, not its solver, and refines
+    /// once where that helps.
     ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::NotPositiveDefinite`] if the
-    /// residual exceeds 1e-5 or the backward error 1e-13, [`NumericsError::Cancelled`].
+    /// [`NumericsError::LengthMismatch`], [`NumericsError::WeightsOverflow`], [`NumericsError::Cancelled`].
+    /// [`NumericsError::NotPositiveDefinite`] if the residual exceeds 1e-5 or the backward error 1e-13.
     pub fn of(solver: &Solver, values: &[f64], observer: &dyn Observer) -> Result<Self, NumericsError> {
         Ok(Self::solve(solver, values, None, observer)?.0)
     }
 
-    /// [`Solution::of`] for a function with a mean, and with the value that the others explain worst.
+    /// Computes [`Solution::of`] for a function with a mean, and finds the value that the others explain
+    /// worst.
     ///
     /// # Errors
-    /// Those of [`Solution::of`], and [`NumericsError::MeanNotDetermined`].
+    /// [`NumericsError::MeanNotDetermined`], and the errors of [`Solution::of`].
     pub fn with_mean(
         solver: &Solver,
         values: &[f64],
@@ -81,10 +88,11 @@ impl Solution {
         Ok(Self { outlier, ..found })
     }
 
-    /// [`Solution::of`] with the function at the points to an order: its values are needed for the residual anyway.
+    /// Computes [`Solution::of`] with the jets of the function at the points. Their values are needed for the
+    /// residual anyway.
     ///
     /// # Errors
-    /// Those of [`Solution::of`], and [`NumericsError::Overflow`] of derivatives.
+    /// [`NumericsError::Overflow`] of derivatives, and the errors of [`Solution::of`].
     pub fn with_jets(
         solver: &Solver,
         values: &[f64],
@@ -135,11 +143,11 @@ fn solve(solver: &Solver, values: &[f64]) -> Vec<f64> {
     weights
 }
 
-/// Weights at all points with `KΛ`, evaluated afresh from the kernel, and the residual.
+/// Weights at all points with their residual, and with `KΛ` evaluated afresh from the kernel.
 pub(super) struct Candidate {
     weights: Vec<f64>,
     at_points: Vec<f64>,
-    /// To the order that was asked for.
+    /// Jets to the requested order.
     jets: Option<Jets>,
     residual: Vec<f64>,
 }
@@ -166,7 +174,7 @@ impl Candidate {
         Ok(Self { jets, ..Self::evaluated(solver, values, weights, at_points) })
     }
 
-    /// With `KΛ` at hand.
+    /// Creates a candidate from a given `KΛ`.
     pub(super) fn evaluated(solver: &Solver, values: &[f64], weights: Vec<f64>, at_points: Vec<f64>) -> Self {
         let residual = (0..values.len())
             .map(|i| values[i] - at_points[i] - solver.regularization().at(i) * weights[i])
@@ -174,7 +182,7 @@ impl Candidate {
         Self { weights, at_points, jets: None, residual }
     }
 
-    /// Whether a step of refinement promises something.
+    /// Returns whether a step of refinement is promising.
     pub(super) fn wants_refinement(&self, solver: &Solver, values: &[f64]) -> bool {
         let is_rounding =
             || solver.method() == Method::Cholesky && self.backward_error(solver, values) <= ROUNDING;
@@ -186,7 +194,7 @@ impl Candidate {
         if scale == 0.0 { 0.0 } else { norm2(&self.residual) / scale }
     }
 
-    /// `‖Y − (K + αI)Λ‖_∞/(‖K + αI‖_∞ ‖Λ‖_∞ + ‖Y‖_∞)` (Higham 2002, th. 7.1).
+    /// Returns the backward error `‖Y − (K + αI)Λ‖_∞/(‖K + αI‖_∞ ‖Λ‖_∞ + ‖Y‖_∞)` (Higham 2002, th. 7.1).
     fn backward_error(&self, solver: &Solver, values: &[f64]) -> f64 {
         let scale = solver.norm1() * norm_max(&self.weights) + norm_max(values);
         if scale == 0.0 { 0.0 } else { norm_max(&self.residual) / scale }
@@ -225,7 +233,7 @@ impl Candidate {
     }
 }
 
-/// Scaled, so that squares neither overflow nor vanish.
+/// Returns the 2-norm, scaled so that squares neither overflow nor vanish.
 fn norm2(x: &[f64]) -> f64 {
     let largest = norm_max(x);
     if largest == 0.0 || !largest.is_finite() {

@@ -1,4 +1,4 @@
-//! `K(X, X) + αI`, not yet solved.
+//! The system `K(X, X) + αI` before it is solved.
 
 use std::sync::Arc;
 
@@ -9,7 +9,8 @@ use crate::points::cloud::Cloud;
 use crate::points::duplicates::coinciding_points;
 use crate::sums::regularization::Regularization;
 
-/// The linear system of a fit, `(K(X, X) + αI) Λ = Y` for any values Y. That it can have a solution is checked.
+/// The linear system of a fit, `(K(X, X) + αI) Λ = Y` for any values Y. Its constructor checks that a
+/// solution can exist.
 #[derive(Clone)]
 pub struct System {
     cloud: Arc<Cloud>,
@@ -18,9 +19,11 @@ pub struct System {
 }
 
 impl System {
+    /// Creates the system of a kernel on a cloud.
+    ///
     /// # Errors
-    /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension, [`NumericsError::LengthMismatch`] of noise
-    /// variances, [`NumericsError::DuplicatePoints`] where two coinciding points have no regularization.
+    /// [`NumericsError::KernelNotPositiveDefinite`] in this dimension. [`NumericsError::LengthMismatch`] of
+    /// noise variances. [`NumericsError::DuplicatePoints`] if two coinciding points have no regularization.
     pub fn new(
         cloud: Arc<Cloud>,
         kernel: Kernel,
@@ -35,7 +38,7 @@ impl System {
         Ok(Self { cloud, kernel, regularization })
     }
 
-    /// X.
+    /// Returns the points X.
     pub fn cloud(&self) -> &Arc<Cloud> {
         &self.cloud
     }
@@ -44,7 +47,7 @@ impl System {
         &self.kernel
     }
 
-    /// α.
+    /// Returns the regularization α.
     pub fn regularization(&self) -> &Regularization {
         &self.regularization
     }
@@ -53,7 +56,8 @@ impl System {
         self.cloud.n_points()
     }
 
-    /// Bytes held on the heap, those of the cloud included: the system may outlive whoever shares it.
+    /// Returns the bytes held on the heap, including those of the cloud: the system may outlive its other
+    /// owners.
     pub(crate) fn n_bytes(&self) -> usize {
         let noise = match &self.regularization {
             Regularization::Uniform(_) => 0,

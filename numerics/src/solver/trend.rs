@@ -1,8 +1,9 @@
-//! The mean of a function: few known functions with coefficients found together with the weights.
+//! The mean of a function: a combination of few known functions, with coefficients found together with the
+//! weights.
 //!
-//! With `u = Σ_a β_a f_a + Σ_j λ_j k(·, x_j)` and F the `f_a` at the points, generalised least squares take
-//! `β = (FᵀWF)⁻¹FᵀWY`, `Λ = W(Y − Fβ)`, W = (K + αI)⁻¹: universal kriging, and the posterior under a flat prior on β (Rasmussen and
-//! Williams 2006, sec. 2.7; Chilès and Delfiner 2012, sec. 3.4).
+//! Let `u = Σ_a β_a f_a + Σ_j λ_j k(·, x_j)`, F the `f_a` at the points, and W = (K + αI)⁻¹. Generalised
+//! least squares give `β = (FᵀWF)⁻¹FᵀWY` and `Λ = W(Y − Fβ)`. This is universal kriging, and the posterior
+//! under a flat prior on β (Rasmussen and Williams 2006, sec. 2.7; Chilès and Delfiner 2012, sec. 3.4).
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatMut, Side};
@@ -14,10 +15,10 @@ use crate::machine::heap::vec_bytes;
 use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
 
-/// Which functions the mean is a combination of.
+/// Functions that a mean combines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Mean {
-    /// None: far from the points the function tends to 0.
+    /// No function: far from the points, u tends to 0.
     #[default]
     Zero,
     /// The constant.
@@ -27,7 +28,7 @@ pub enum Mean {
 }
 
 impl Mean {
-    /// Functions in dimension d.
+    /// Returns the number of functions in dimension d.
     pub fn n_functions(self, dimension: usize) -> usize {
         match self {
             Self::Zero => 0,
@@ -37,10 +38,11 @@ impl Mean {
     }
 }
 
-/// A mean is not determined where the points leave one of its functions to rounding: the least share of its square that must be left.
+/// Least share of the square of a function that the others must leave of it at the points. With less, the
+/// mean is not determined.
 const DEPENDENT: f64 = 1e-12;
 
-/// The functions of a mean, about the centre of a cloud and in units of its size.
+/// Functions of a mean, relative to the centre of a cloud and in units of its size.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Basis {
     mean: Mean,
@@ -60,7 +62,7 @@ impl Basis {
         self.mean.n_functions(self.centre.len())
     }
 
-    /// The functions at a point, `[p]`.
+    /// Writes the functions at a point, `[p]`.
     pub(crate) fn at(&self, x: &[f64], functions: &mut [f64]) {
         let (Some((constant, linear)), true) = (functions.split_first_mut(), self.mean != Mean::Zero) else {
             return;
@@ -76,8 +78,8 @@ impl Basis {
         slopes.for_each(|(function, component)| *function += component / self.size);
     }
 
-    /// `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values. `None` if the points do not tell the functions
-    /// apart.
+    /// Returns `(FᵀWF)⁻¹FᵀW`, `[p, n]`: the coefficients of the mean as functionals of the values. `None` if
+    /// the points do not distinguish the functions.
     pub(crate) fn functionals(&self, solver: &Solver) -> Option<Vec<f64>> {
         let (n, p) = (solver.n_points(), self.n_functions());
         let columns = self.columns(solver.cloud());
@@ -88,8 +90,11 @@ impl Basis {
         Some((0..p * n).map(|at| solved[(at / n, at % n)]).collect())
     }
 
-    /// Turns rows that weigh what the mean leaves of the values, `[rows, n]`, into those that weigh the values: with `exact` what a row is to be on each
-    /// of the functions, `row − (row F − exact)(FᵀWF)⁻¹FᵀW`. A row without that is left as it is. `None` if the points do not tell the functions apart.
+    /// Turns rows that weigh the values without their mean, `[rows, n]`, into rows that weigh the values:
+    /// `row − (row F − exact)(FᵀWF)⁻¹FᵀW`.
+    ///
+    /// `exact` gives what a row must yield on each of the functions. A row for which it gives nothing is left
+    /// as it is. `None` if the points do not distinguish the functions.
     pub(crate) fn make_exact(
         &self,
         solver: &Solver,
@@ -109,7 +114,7 @@ impl Basis {
         Some(())
     }
 
-    /// The functions at the points of a cloud, one column for each: `[n, p]` column by column.
+    /// Returns the functions at the points of a cloud, `[n, p]` column by column.
     pub(crate) fn columns(&self, cloud: &Cloud) -> Vec<f64> {
         let (n, p) = (cloud.n_points(), self.n_functions());
         let (mut columns, mut functions) = (vec![0.0; n * p], vec![0.0; p]);
@@ -126,47 +131,49 @@ impl Basis {
 pub struct Trend {
     basis: Basis,
     coefficients: Vec<f64>,
-    /// `(FᵀWF)⁻¹` `[p, p]`, the covariance of the coefficients under the kernel that they were found with; empty where they are known.
+    /// Covariance `(FᵀWF)⁻¹` of the coefficients, `[p, p]`, under the kernel that they were found with. Empty
+    /// if they are known.
     covariance: Vec<f64>,
 }
 
-/// How well the coefficients of a mean are known.
+/// Uncertainty of the coefficients of a mean.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrendUncertainty<'a> {
     pub(crate) basis: &'a Basis,
-    /// `[p, p]`, under the kernel that they were found with.
+    /// Covariance of the coefficients, `[p, p]`, under the kernel that they were found with.
     pub(crate) covariance: &'a [f64],
 }
 
 impl Trend {
-    /// With coefficients that are known, one for each function.
+    /// Creates a mean with known coefficients, one for each function.
     pub(crate) fn new(basis: Basis, coefficients: Vec<f64>) -> Self {
         Self { basis, coefficients, covariance: Vec::new() }
     }
 
-    /// With coefficients that were found, and their covariance `[p, p]` under the kernel that they were found with.
+    /// Creates a mean with estimated coefficients and their covariance `[p, p]`, under the kernel that they
+    /// were found with.
     pub(crate) fn found(basis: Basis, coefficients: Vec<f64>, covariance: Vec<f64>) -> Self {
         Self { basis, coefficients, covariance }
     }
 
-    /// How well the coefficients are known, unless they are given.
+    /// Returns the uncertainty of the coefficients, or `None` if they are known.
     pub(crate) fn uncertainty(&self) -> Option<TrendUncertainty<'_>> {
         let Self { basis, covariance, .. } = self;
         (!covariance.is_empty()).then_some(TrendUncertainty { basis, covariance })
     }
 
-    /// The mean of values `[n]` under a solver; `None` for [`Mean::Zero`].
+    /// Finds the mean of values `[n]` under a solver. `None` for [`Mean::Zero`].
     ///
     /// # Errors
-    /// [`NumericsError::MeanNotDetermined`] if the points do not tell its functions apart.
+    /// [`NumericsError::MeanNotDetermined`] if the points do not distinguish its functions.
     pub(crate) fn fit(solver: &Solver, values: &[f64], mean: Mean) -> Result<Option<Self>, NumericsError> {
         Ok(Self::fit_each(solver, values, mean)?.map(|mut trends| trends.remove(0)))
     }
 
-    /// The mean of each of k lists of values `[k, n]`.
+    /// Finds the mean of each of k lists of values `[k, n]`.
     ///
     /// # Errors
-    /// Those of [`Trend::fit`].
+    /// Returns the errors of [`Trend::fit`].
     pub(super) fn fit_each(
         solver: &Solver,
         values: &[f64],
@@ -182,7 +189,7 @@ impl Trend {
         weights.extend_from_slice(&columns[n..]);
         let p = basis.n_functions();
         solver.solve_in_place(MatMut::from_column_major_slice_mut(&mut weights[n..], n, p - 1));
-        // What all values of a list share is taken off first: it would cost digits of what they do not share.
+        // The average of a list is subtracted first, since it would cost digits of the differences.
         let lists = values.chunks_exact(n);
         let shared: Vec<f64> = lists.clone().map(|list| list.iter().sum::<f64>() / n as f64).collect();
         let moments: Vec<f64> = lists
@@ -209,20 +216,20 @@ impl Trend {
         Ok(Some(shared.iter().enumerate().map(trend).collect()))
     }
 
-    /// `m(x)`.
+    /// Returns `m(x)`.
     pub(crate) fn at(&self, x: &[f64]) -> f64 {
         let mut functions = vec![0.0; self.coefficients.len()];
         self.basis.at(x, &mut functions);
         dot(&functions, &self.coefficients)
     }
 
-    /// `∇m`, the same everywhere.
+    /// Returns `∇m`, the same everywhere.
     pub(crate) fn gradient(&self) -> Vec<f64> {
         let slopes = self.coefficients[1..].iter().map(|slope| slope / self.basis.size);
         slopes.chain(std::iter::repeat(0.0)).take(self.basis.centre.len()).collect()
     }
 
-    /// Values without the mean, `[n]`.
+    /// Returns the values without the mean, `[n]`.
     pub(crate) fn removed_from(&self, values: &[f64], cloud: &Cloud) -> Vec<f64> {
         cloud.points().zip(values).map(|(x, value)| value - self.at(x)).collect()
     }
@@ -231,14 +238,14 @@ impl Trend {
         &self.basis
     }
 
-    /// The mean as a function of the coordinates: the constant, then the slopes, if it has any.
+    /// Returns the mean as a function of the coordinates: the constant, then the slopes, if it has any.
     pub fn of_coordinates(&self) -> Vec<f64> {
         let slopes: Vec<f64> = self.coefficients[1..].iter().map(|slope| slope / self.basis.size).collect();
         let at_centre: f64 = slopes.iter().zip(&self.basis.centre).map(|(slope, x)| slope * x).sum();
         std::iter::once(self.coefficients[0] - at_centre).chain(slopes).collect()
     }
 
-    /// Functions of the mean.
+    /// Returns the number of functions of the mean.
     pub fn n_functions(&self) -> usize {
         self.coefficients.len()
     }
@@ -249,10 +256,10 @@ impl Trend {
     }
 }
 
-/// `G⁻¹` times some columns, G symmetric and positive definite; `None` if it is not by [`DEPENDENT`].
+/// Solves `G X = columns` with G symmetric and positive definite. `None` if G is not, by [`DEPENDENT`].
 pub(crate) fn solve_gram(gram: &Mat<f64>, columns: Mat<f64>) -> Option<Mat<f64>> {
     let p = gram.nrows();
-    // In units of its diagonal, so that the functions may have any size.
+    // Dividing by the diagonal allows functions of any size.
     let roots: Vec<f64> = (0..p).map(|a| gram[(a, a)].sqrt()).collect();
     if roots.iter().any(|root| root.is_nan() || *root <= 0.0) {
         return None;

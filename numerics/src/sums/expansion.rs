@@ -1,4 +1,4 @@
-//! A function as a sum over centres.
+//! A function as a sum of kernels over centres.
 
 use super::jets::{JetOrder, Jets};
 use super::symmetric::kernel_times;
@@ -7,21 +7,24 @@ use crate::kernel::Kernel;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-/// `u(x) = Σ_j λ_j k(x, z_j)`: the centres z are all points of a system, or those that its solver gives weights.
+/// A function `u(x) = Σ_j λ_j k(x, z_j)` with r centres z.
+///
+/// The centres are all points of a system, or those to which its solver gives weights.
 #[derive(Clone, Copy)]
 pub struct Expansion<'a> {
-    /// `[r, d]`
+    /// The centres z, `[r, d]`.
     pub centres: &'a Cloud,
     pub kernel: &'a Kernel,
-    /// λ, `[r]`, unit of the values over that of the kernel.
+    /// λ, `[r]`, in the unit of the values over that of the kernel.
     pub weights: &'a [f64],
 }
 
 impl Expansion<'_> {
-    /// u and its derivatives at queries `[m, d]`; whether the kernel has them there is for the caller to know.
+    /// Evaluates u and its derivatives at queries `[m, d]`. The caller makes sure that the kernel has these
+    /// derivatives there.
     ///
     /// # Errors
-    /// Those of [`Jets::evaluate`].
+    /// Returns the errors of [`Jets::evaluate`].
     pub fn at(
         self,
         queries: &Cloud,
@@ -34,10 +37,11 @@ impl Expansion<'_> {
         }
     }
 
-    /// u at queries alone, `[m]`; where they are the centres themselves, by half of the pairs.
+    /// Evaluates u alone at queries, `[m]`. If they are the centres themselves, each pair is evaluated only
+    /// once.
     ///
     /// # Errors
-    /// Those of [`Jets::evaluate`].
+    /// Returns the errors of [`Jets::evaluate`].
     pub(crate) fn values_at(
         self,
         queries: &Cloud,

@@ -18,7 +18,7 @@ const COLUMNS_PER_TASK: usize = 16;
 
 /// Writes the lower triangle of `K + αI` into a column-major buffer of n columns, `stride` apart.
 ///
-/// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j; what lies above the diagonal is left untouched.
+/// `gram[j·stride + i] = k(x_i, x_j) + [i = j] α_i` for i ≥ j. Entries above the diagonal are left untouched.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -53,7 +53,9 @@ pub(crate) fn fill_kernel_column(
     nodes.dispatch(KernelColumn { nodes, kernel, x, points, out });
 }
 
-/// Writes `cross[j·n + i] = k(x_i, q_j)`, the cross-Gram matrix `[m, n]` row by row, i.e. one query after the other.
+/// Writes the cross-Gram matrix `[m, n]` row by row, i.e. one query after the other.
+///
+/// `cross[j·n + i] = k(x_i, q_j)`.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -100,7 +102,7 @@ impl WithSimd for KernelColumn<'_> {
     }
 }
 
-/// Writes the kernel's values for a block.
+/// Writes the kernel's values for the pairs of x with a block.
 struct Values<'a, S> {
     simd: S,
     column: &'a KernelColumn<'a>,

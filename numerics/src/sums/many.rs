@@ -1,4 +1,4 @@
-//! Values of many expansions over the same centres: kernel values are computed once for all of them.
+//! Values of many expansions over the same centres. Kernel values are computed once for all of them.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef};
@@ -11,13 +11,13 @@ use crate::machine::parallelism::parallelism;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-/// Queries whose kernel values are held at once.
+/// Queries per block: kernel values of one block are held at a time.
 pub(crate) const QUERIES_PER_BLOCK: usize = 256;
 
-/// `Σ_j λ_ij k(x, z_j)` of k sets of weights `[k, r]` at queries `[m, d]`: `[k, m]`.
+/// Evaluates `Σ_j λ_ij k(x, z_j)` for k sets of weights `[k, r]` at queries `[m, d]`. The result is `[k, m]`.
 ///
 /// # Errors
-/// [`NumericsError::Overflow`] where a result leaves float64, [`NumericsError::Cancelled`].
+/// [`NumericsError::Overflow`] if a result leaves float64, [`NumericsError::Cancelled`].
 pub(crate) fn values_of_each(
     centres: &Cloud,
     kernel: &Kernel,

@@ -7,10 +7,10 @@ use crate::machine::instruction_set::InstructionSet;
 use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::points::cloud::Cloud;
 
-/// Points in blocks of `BLOCK`, each block coordinate by coordinate: `[n / BLOCK][d][BLOCK]`, with the instruction set
-/// that the loops over them run on.
+/// The points of a cloud in blocks of `BLOCK`, each block coordinate by coordinate: `[n / BLOCK][d][BLOCK]`.
 ///
-/// The last block is padded with copies of the last point; whoever sums over it gives them weight 0.
+/// It also holds the instruction set for the loops over the points. The last block is padded with copies of
+/// the last point. Sums must give these copies weight 0.
 pub struct Nodes {
     coordinates: Vec<Block>,
     n_points: usize,
@@ -19,11 +19,12 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// For the best instruction set of this machine.
+    /// Lays out a cloud for the best instruction set of this machine.
     pub fn of(cloud: &Cloud) -> Self {
         Self::on(InstructionSet::best(), cloud)
     }
 
+    /// Lays out a cloud for an instruction set.
     pub fn on(instruction_set: InstructionSet, cloud: &Cloud) -> Self {
         let (n_points, dimension) = (cloud.n_points(), cloud.dimension());
         let mut coordinates = vec![Block::ZERO; n_points.div_ceil(BLOCK) * dimension];
@@ -51,8 +52,10 @@ impl Nodes {
         self.instruction_set.dispatch(op)
     }
 
-    /// `q = |u|²/ℓ²` for pack `at` of the points y of a block, u the difference `x − y` as the kernel stretches it; `each(c, u[c])` sees
-    /// its coordinates, in order.
+    /// Returns `q = |u|²/ℓ²` between x and pack `at` of the points y of a block.
+    ///
+    /// Here u is the difference `x − y`, stretched as the kernel stretches it. `each(c, u[c])` is called for
+    /// every coordinate c, in order.
     #[inline(always)]
     pub(crate) fn scaled_distances<S: Simd>(
         &self,
@@ -65,7 +68,7 @@ impl Nodes {
         let columns = &self.coordinates[block * self.dimension..][..self.dimension];
         let coordinates = columns.iter().zip(x).enumerate();
         let mut sum = Pack::splat(simd, 0.0);
-        // Two loops: a question for each coordinate takes a twentieth of the time of both.
+        // Two loops, because a test for each coordinate would take a twentieth of their time.
         match kernel.factors() {
             None => {
                 for (c, (column, &x)) in coordinates {
@@ -86,7 +89,7 @@ impl Nodes {
     }
 }
 
-/// One number per point in the layout of [`Nodes`], zero where the last block is padded.
+/// Lays out one number per point like [`Nodes`], with zeros where the last block is padded.
 pub(crate) fn blocked(values: &[f64]) -> Vec<Block> {
     let mut blocks = vec![Block::ZERO; values.len().div_ceil(BLOCK)];
     for (block, chunk) in blocks.iter_mut().zip(values.chunks(BLOCK)) {

@@ -1,29 +1,34 @@
-//! What is added to the diagonal of the Gram matrix.
+//! The regularization α, added to the diagonal of the Gram matrix.
 
 use crate::error::NumericsError;
 use crate::points::cloud::Cloud;
 
-/// α, added to the diagonal of the (variance-scaled) Gram matrix exactly as given; unit V².
+/// The regularization α, unit V², added to the diagonal of the (variance-scaled) Gram matrix as given.
 ///
-/// 0 interpolates. Under the Gaussian-process reading it is the variance of the observation noise, which may differ from
-/// point to point.
+/// With α = 0 the fit interpolates. Under the Gaussian-process reading α is the variance of the observation
+/// noise, which may differ from point to point.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Regularization {
     Uniform(f64),
-    /// One entry per point.
+    /// An α for each point, `[n]`.
     PerPoint(Vec<f64>),
 }
 
 impl Regularization {
+    /// Returns one α for all points.
+    ///
     /// # Errors
-    /// [`NumericsError::InvalidRegularization`] if α is negative or not finite.
+    /// [`NumericsError::InvalidRegularization`] if α is negative, not finite or above 1e300.
     pub fn uniform(alpha: f64) -> Result<Self, NumericsError> {
         check("alpha", alpha, None)?;
         Ok(Self::Uniform(alpha))
     }
 
+    /// Returns a regularization with one noise variance per point.
+    ///
     /// # Errors
-    /// [`NumericsError::InvalidRegularization`] with the first point whose variance is negative or not finite.
+    /// [`NumericsError::InvalidRegularization`] with the first point whose variance is negative, not finite
+    /// or above 1e300.
     pub fn per_point(variances: Vec<f64>) -> Result<Self, NumericsError> {
         for (point, &variance) in variances.iter().enumerate() {
             check("noise variance", variance, Some(point))?;
@@ -31,8 +36,10 @@ impl Regularization {
         Ok(Self::PerPoint(variances))
     }
 
+    /// Checks that a regularization per point has one entry for each point of the cloud.
+    ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`] if there is an entry per point, but not of this cloud.
+    /// [`NumericsError::LengthMismatch`] if the number of entries differs.
     pub fn check_matches(&self, cloud: &Cloud) -> Result<(), NumericsError> {
         match self {
             Self::Uniform(_) => Ok(()),
@@ -40,7 +47,7 @@ impl Regularization {
         }
     }
 
-    /// The entry of one point.
+    /// Returns the α of one point.
     pub fn at(&self, point: usize) -> f64 {
         match self {
             Self::Uniform(alpha) => *alpha,
@@ -49,7 +56,7 @@ impl Regularization {
     }
 }
 
-/// Up to 1e300, so that adding it to a kernel value stays finite.
+/// Checks that a value lies between 0 and 1e300, so that adding it to a kernel value stays finite.
 fn check(parameter: &'static str, value: f64, point: Option<usize>) -> Result<(), NumericsError> {
     if (0.0..=1e300).contains(&value) {
         Ok(())

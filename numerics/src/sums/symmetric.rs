@@ -1,4 +1,6 @@
-//! `Kλ` at the centres themselves: the matrix is symmetric, so every pair of blocks is evaluated once and serves both.
+//! Products `Kλ` at the centres themselves.
+//!
+//! The matrix K is symmetric, so every pair of blocks is evaluated once and serves both.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -10,10 +12,10 @@ use crate::machine::registers::{BLOCK, Block, Pack};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 
-/// `Σ_j λ_j k(x_i, x_j)` at every point of the cloud, `[n]`.
+/// Computes `Σ_j λ_j k(x_i, x_j)` at every point of the cloud, `[n]`.
 ///
 /// # Errors
-/// [`NumericsError::Overflow`] where a result leaves float64, [`NumericsError::Cancelled`].
+/// [`NumericsError::Overflow`] if a result leaves float64, [`NumericsError::Cancelled`].
 pub(crate) fn kernel_times(
     cloud: &Cloud,
     kernel: &Kernel,
@@ -23,7 +25,7 @@ pub(crate) fn kernel_times(
     over(&Nodes::of(cloud), cloud, kernel, weights, observer)
 }
 
-/// The same over points that are laid out already.
+/// Computes the products of [`kernel_times`] over points that are laid out already.
 fn over(
     nodes: &Nodes,
     cloud: &Cloud,
@@ -44,14 +46,16 @@ fn over(
     }
 }
 
-/// A block of points with its sums.
+/// The index of a block of points, with its sums.
 pub(crate) type Share<'a> = (usize, &'a mut [Block]);
 
-/// Sums `[n_blocks, n_sums]` over all pairs of blocks: `pair` adds what the points of a block give one another, or those of two
-/// each other, the smaller index first.
+/// Computes sums `[n_blocks, n_sums]` over all pairs of points, one pair of blocks at a time.
 ///
-/// Like rounds of a tournament, in each of which every block meets one other: no two tasks write to the same sums, and the
-/// order in which a block meets the others depends on nothing but their number.
+/// `pair(a, None)` adds what the points of block a contribute to one another. `pair(a, Some(b))`, `a < b`,
+/// adds what the points of two blocks contribute to each other.
+///
+/// The schedule is that of a tournament: in each round every block meets one other block. So no two tasks
+/// write to the same sums. The order in which a block meets the others depends only on the number of blocks.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -72,17 +76,17 @@ pub(crate) fn sum_pairs(
         observer.checkpoint()?;
         let (left, right) = seats.split_at_mut(half);
         left.par_iter_mut().zip(right.par_iter_mut().rev()).for_each(|both| {
-            // Of an odd number one sits out.
+            // With an odd number of blocks, one sits out.
             let (Some((a, of_a)), Some((b, of_b))) = both else { return };
             if a < b { pair((*a, of_a), Some((*b, of_b))) } else { pair((*b, of_b), Some((*a, of_a))) }
         });
-        // All but the first move on by one.
+        // All seats but the first move on by one.
         seats[1..].rotate_right(1);
     }
     Ok(sums)
 }
 
-/// The pairs of the points of a block with those of another, or with one another.
+/// The pairs between the points of block `a` and those of block `b`, or among those of `a` if `b` is `None`.
 struct BlockPair<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
@@ -98,7 +102,8 @@ impl WithSimd for BlockPair<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { nodes, kernel, weights, cloud, a: (row, own), b } = self;
-        // By itself first: sums of n terms one after the other would lose a digit.
+        // Each pair of blocks is summed by itself first: adding n terms one after the other would lose a
+        // digit.
         let mut mirrored = Block::ZERO;
         let block = b.as_ref().map_or(row, |(block, _)| *block);
         for (at, point) in block_points(cloud, row).enumerate() {
@@ -108,19 +113,19 @@ impl WithSimd for BlockPair<'_> {
             kernel.profiles(Row::<S> { simd, position, weight, others, sum: sum_here, mirrored });
             own[0].0[at] += sum.sum_lanes();
         }
-        // Within a block both points of a pair have had their turn.
+        // Within a single block, both points of a pair have been the point of a row already.
         if let Some((_, sums)) = b {
             sums[0].0.iter_mut().zip(mirrored.0).for_each(|(sum, mirrored)| *sum += mirrored);
         }
     }
 }
 
-/// The points of a block; the last one may have fewer.
+/// Returns the indices of the points of a block. The last block may have fewer.
 pub(crate) fn block_points(cloud: &Cloud, block: usize) -> std::ops::Range<usize> {
     block * BLOCK..cloud.n_points().min((block + 1) * BLOCK)
 }
 
-/// One point with a block: its own sum, and that of each point there.
+/// The pairs of one point with a block. Adds to the sum of the point and to those of the block's points.
 struct Row<'a, S: Simd> {
     simd: S,
     position: (&'a Nodes, &'a Kernel, &'a [f64], usize),
@@ -158,7 +163,7 @@ mod tests {
 
     #[test]
     fn products_are_the_values_at_the_points() {
-        // Less than a block, one, one and a point, and an odd number.
+        // The sizes are less than a block, one block, one block and a point, and an odd number of blocks.
         for n in [1, 128, 129, 600] {
             let cloud = fibonacci_sphere(n);
             let weights: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();
@@ -169,7 +174,8 @@ mod tests {
                 for set in InstructionSet::available() {
                     let nodes = Nodes::on(set, &cloud);
                     let found = over(&nodes, &cloud, &kernel, &weights, &Unobserved).unwrap();
-                    // Each sum has n terms of at most 1.7, and profiles differ by a few roundings from set to set.
+                    // Each sum has n terms of at most 1.7, and profiles differ by a few roundings between
+                    // instruction sets.
                     let allowed = 4.0 * f64::EPSILON * 1.7 * n as f64;
                     for (point, found) in found.iter().enumerate() {
                         let close = (found - jets.value(point)).abs() <= allowed;
@@ -186,20 +192,22 @@ mod tests {
         let weights: Vec<f64> = (0..4000).map(|i| 1.5 + (0.7 * i as f64).cos()).collect();
         let kernel = Kernel::new(crate::kernel::Family::Gauss, 1.0, 1.0).unwrap();
         let found = kernel_times(&cloud, &kernel, &weights, &Unobserved).unwrap();
-        // The last points are those that every other block gives something.
+        // The last points are those to which every other block contributes.
         for point in (3900..4000).step_by(7) {
             let terms = cloud.points().zip(&weights).map(|(y, weight)| {
                 let q: f64 = cloud.point(point).iter().zip(y).map(|(a, b)| (a - b) * (a - b)).sum();
                 weight * (-q).exp()
             });
-            // Kahan's sum, of terms that are each within two roundings: those scatter, and add up to less than one of the sum.
+            // The reference is Kahan's sum of terms that are each within two roundings. These errors scatter,
+            // and add up to less than one rounding of the sum.
             let (mut exact, mut lost) = (0.0, 0.0);
             for term in terms {
                 let next = exact + (term - lost);
                 lost = (next - exact) - (term - lost);
                 exact = next;
             }
-            // Sums of 128 terms and of 32 sums: 4 ε; one after the other they were off by up to 10.
+            // Sums of 128 terms, then of 32 sums, are within 4 ε. Sums of one term after the other were off
+            // by up to 10 ε.
             let error = (found[point] - exact).abs() / exact;
             assert!(error <= 4.0 * f64::EPSILON, "{point}: {}", error / f64::EPSILON);
         }

@@ -1,10 +1,10 @@
-//! Which side is outside, from the signature function of a part of the points.
+//! The outward side of a surface, from the signature function of a subset of its points.
 
 use std::sync::Arc;
 
-use crate::defaults::{Purpose, default_fit};
 use crate::error::NumericsError;
 use crate::function::interpolant::Interpolant;
+use crate::kernel::defaults::{Purpose, default_fit};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::duplicates::Merge;
@@ -14,11 +14,13 @@ use crate::solver::{Solver, System};
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 
-/// Minus the gradient of a coarse signature function at the points, `[n, d]`: outward on closed clouds. `noise` is the standard
-/// deviation of the points across the surface.
+/// Computes directions at the points, `[n, d]`: minus the gradient of a coarse signature function.
+///
+/// They point outward on closed clouds. `noise` is the standard deviation of the points across the surface,
+/// unit L.
 ///
 /// # Errors
-/// Those of the fit, which with this kernel and α do not occur; [`NumericsError::Cancelled`].
+/// Returns [`NumericsError::Cancelled`]. Errors of the fit do not occur with this kernel and α.
 pub(crate) fn outward_directions(
     cloud: &Cloud,
     noise: f64,

@@ -4,11 +4,13 @@ use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 use crate::machine::vector::{dot, norm, tangent_basis};
 
-/// Principal curvatures `[d−1]`, ascending, 1/L, and their directions `[d−1, d]`: eigenpairs of `S = σ P D²u P/|∇u|`,
-/// `P = I − ννᵀ`, ν = σ∇u/|∇u|, on the tangent space (errata.md, 3).
+/// Computes the principal curvatures `[d−1]`, ascending, 1/L, and their directions `[d−1, d]`.
 ///
-/// Directions are orthonormal and tangent, the component of largest magnitude positive. Sphere of radius r, ν outward: all
-/// +1/r. The gradient must not be zero.
+/// They are the eigenpairs of `S = σ P D²u P/|∇u|` on the tangent space, with `P = I − ννᵀ` and ν = σ∇u/|∇u|
+/// (errata.md, 3).
+///
+/// Directions are orthonormal and tangent, and their component of largest magnitude is positive. A sphere of
+/// radius r with outward ν has curvatures +1/r. The gradient must not be zero.
 pub(crate) fn principal_curvatures(gradient: &[f64], hessian: &[f64], sign: f64) -> (Small, Small) {
     let d = gradient.len();
     let length = norm(gradient);
@@ -32,7 +34,7 @@ pub(crate) fn principal_curvatures(gradient: &[f64], hessian: &[f64], sign: f64)
     (values, directions)
 }
 
-/// Flips a vector so that its component of largest magnitude is positive; the first of several.
+/// Flips a vector so that its component of largest magnitude is positive. On a tie the first one counts.
 fn make_largest_positive(v: &mut [f64]) {
     let largest = v.iter().fold(0.0, |a: f64, &b| if b.abs() > a.abs() { b } else { a });
     if largest < 0.0 {
@@ -40,7 +42,7 @@ fn make_largest_positive(v: &mut [f64]) {
     }
 }
 
-/// `tr H − νᵀHν`: the trace over the tangent space.
+/// Returns the trace of a Hessian over the tangent space, `tr H − νᵀHν`.
 pub(crate) fn tangential_trace(hessian: &[f64], normal: &[f64]) -> f64 {
     let d = normal.len();
     let trace: f64 = (0..d).map(|i| hessian[i * d + i]).sum();

@@ -1,4 +1,5 @@
-//! Where geometry has no meaning, or less accuracy than it seems: the criteria of docs/numerics.md, Geometry.
+//! Criteria for queries where geometry is undefined, or less accurate than its digits suggest
+//! (docs/numerics.md, Geometry).
 
 use crate::error::NumericsError;
 use crate::function::interpolant::Interpolant;
@@ -10,27 +11,28 @@ use crate::points::local_quadrics::LocalQuadric;
 use crate::points::sampling::Scales;
 use crate::sums::jets::{JetOrder, Jets};
 
-/// What is wrong at a query.
+/// The reason why a query is degenerate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DegeneracyReason {
-    /// |∇u| is rounding (T1), too small against the Hessian at the scale of the sampling (T2), or oblique to the surface,
-    /// and the offset model is of no help: there is no answer.
+    /// Null: ∇u is rounding (T1), small against the Hessian at the scale of the sampling (T2), or oblique to
+    /// the surface. The offset model has no answer either.
     VanishingGradient,
-    /// The offset model might help, but not within the work that was admitted: there is no answer.
+    /// Null: the offset model might have an answer, but the admitted work is used up.
     UnaffordableRescue,
-    /// The cusp of the kernel is seen: curvatures are served, and wrong by factors.
+    /// Curvatures are served, but wrong by factors, because second derivatives see the cusp of the kernel.
     KernelTooRough,
-    /// The query is far from every point of the cloud: the level surface through it is not the one that was sampled.
+    /// The query is far from every point, so the level surface through it is not the one that was sampled.
     FarFromCloud,
-    /// The curvatures differ from those that the neighbours suggest (T4): the sampling does not resolve the surface.
+    /// The sampling does not resolve the surface: the neighbours do not confirm the curvatures (T4), or the
+    /// normal is too uncertain.
     UnderResolved,
-    /// What is known of the side contradicts itself: the winding number of the oriented points is not ½ there,
-    /// or the neighbours point to the other side. The normal is served, and may point inward.
+    /// The normal is served, but may point inward. The winding number of the oriented points is not ½ there,
+    /// or the neighbours point to the other side.
     AmbiguousSide,
 }
 
 impl DegeneracyReason {
-    /// Whether there is no answer at all.
+    /// Returns whether the query has no answer at all.
     pub fn is_null(self) -> bool {
         match self {
             Self::VanishingGradient | Self::UnaffordableRescue => true,
@@ -39,33 +41,33 @@ impl DegeneracyReason {
     }
 }
 
-/// A query at which geometry has no or less meaning.
+/// A query without an answer, or with a flag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Degeneracy {
     pub query: usize,
     pub reason: DegeneracyReason,
-    /// |∇| of the function that was used, 1/L for the signature function.
+    /// Gradient norm of the function that was used. Unit 1/L for the signature function.
     pub gradient_norm: f64,
 }
 
-/// What the nodes around a query are good for.
+/// Quality of the nodes around a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Resolution {
     Resolved,
-    /// They see the curvature of the surface wrong.
+    /// The nodes misrepresent the curvature of the surface.
     Unresolved,
-    /// There are too few of them, or no query: the row is empty.
+    /// The row is empty, because there are too few nodes or the query has no normal.
     #[default]
     Empty,
 }
 
-/// T1: multiple of the rounding bound under which a gradient is rounding.
+/// T1: multiple of the rounding bound below which a gradient counts as rounding.
 const ROUNDING_FACTOR: f64 = 64.0;
 
-/// T2: fraction of `h_q ‖D²u‖_F` under which the direction of ∇u turns within the sampling distance.
+/// T2: fraction of `h_q ‖D²u‖_F` below which the direction of ∇u turns within the sampling distance.
 const SCALE_FACTOR: f64 = 0.05;
 
-/// The same fraction below which a gradient is weak: the error that the sampling leaves in it shows in the curvatures.
+/// Fraction of `h_q ‖D²u‖_F` below which a gradient is weak: its sampling error shows in the curvatures.
 const WEAK_FACTOR: f64 = 0.25;
 
 /// Cosine between ∇u and the normal of a reliable quadric below which ∇u is not normal to the surface at all.
@@ -74,12 +76,14 @@ const OBLIQUE: f64 = 0.5;
 /// Spacings from the nearest point beyond which a query is far from the cloud.
 const FAR_SPACINGS: f64 = 3.0;
 
-/// T1 at each query: `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j| + η(1 + v)Σ|λ_j|) + ‖Y − (K+αI)Λ‖_∞]`, η the
-/// least normal number; and wherever |∇u| itself is below η: subnormal numbers have lost digits, however
-/// small their sum of magnitudes is.
+/// Finds the queries at which ∇u is rounding (T1), `[m]`.
 ///
-/// The sums of magnitudes take half of a pass over all pairs more. They are at most `Σ|λ_j|` times the
-/// greatest values of k and ℓ|∇k|, which nearly every gradient exceeds; only the others are asked for theirs.
+/// The criterion is `ℓ|∇u| ≤ 64 [ε(ℓΣ|λ_j||∇k_j| + Σ|λ_j||k_j| + η(1 + v)Σ|λ_j|) + ‖Y − (K+αI)Λ‖_∞]`, η the
+/// least normal number. It also holds where |∇u| < η: subnormal numbers have lost digits, however small their
+/// sum of magnitudes is.
+///
+/// Sums of magnitudes cost half of a pass over all pairs. They are at most `Σ|λ_j|` times the greatest values
+/// of k and ℓ|∇k|. Nearly every gradient exceeds that bound, so magnitudes are evaluated only for the others.
 ///
 /// # Errors
 /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -114,23 +118,24 @@ pub(crate) fn roundings(
     Ok(found)
 }
 
-/// T2: `|∇u| < 0.05 h_q ‖D²u‖_F`.
+/// Returns whether T2 holds: `|∇u| < 0.05 h_q ‖D²u‖_F`.
 fn turns_within_spacing(jets: &Jets, query: usize, spacing: f64) -> bool {
     norm(jets.gradient(query)) < SCALE_FACTOR * spacing * norm(&jets.hessian(query))
 }
 
-/// Whether curvatures had better come from the offset model, if it has an answer: `|∇u| < 0.25 h_q ‖D²u‖_F`.
+/// Returns whether the offset model, if it has an answer, gives better curvatures: `|∇u| < 0.25 h_q ‖D²u‖_F`.
 pub(crate) fn is_weak(jets: &Jets, query: usize, spacing: f64) -> bool {
     norm(jets.gradient(query)) < WEAK_FACTOR * spacing * norm(&jets.hessian(query))
 }
 
-/// Whether the nearest point is too far away for a query to lie on the surface.
+/// Returns whether the nearest point is too far away for a query to lie on the surface.
 pub(crate) fn is_far(squared_distance: f64, spacing: f64) -> bool {
     squared_distance > (FAR_SPACINGS * spacing).powi(2)
 }
 
-/// Whether ∇u, which is no rounding (T1), is no normal at a query all the same: no direction at the scale of the sampling (T2), or
-/// oblique to a reliable quadric.
+/// Returns whether ∇u, which is not rounding (T1), is still no normal at a query.
+///
+/// Either it has no direction at the scale of the sampling (T2), or it is oblique to a reliable quadric.
 pub(crate) fn is_no_normal(
     jets: &Jets,
     query: usize,
@@ -144,7 +149,8 @@ pub(crate) fn is_no_normal(
         || quadric.filter(LocalQuadric::is_reliable).is_some_and(|quadric| is_oblique(&quadric))
 }
 
-/// Whether second derivatives at the points see a cusp: what rounds it is narrower than the median distance to the nearest point.
+/// Returns whether second derivatives at the points see a cusp of the kernel. They do if the cusp is rounded
+/// over less than the median distance to the nearest point.
 pub(crate) fn is_too_rough(kernel: &Kernel, scales: &Scales) -> bool {
     let nearest = scales.nearest_range().map_or(0.0, |range| range.median);
     kernel.family().cusp_width().is_some_and(|width| width * kernel.length_scale() < nearest)
@@ -163,8 +169,8 @@ mod tests {
 
     #[test]
     fn gradients_that_are_subnormal_are_rounding() {
-        // e^{−d²} from 26.5 to 27.3 away: 1e-305 to 1e-323, and then nothing. A single point has a residual
-        // of exactly 0.
+        // Values e^{−d²} at distances d from 26.5 to 27.3: 1e-305 to 1e-323, and then 0. A single point has a
+        // residual of exactly 0.
         let places: Vec<f64> = (0..9).flat_map(|i| [26.5 + 0.1 * f64::from(i), 0.0, 0.0]).collect();
         let queries = Cloud::new(places, 3).unwrap();
         let cloud = Arc::new(Cloud::new(vec![0.0; 3], 3).unwrap());

@@ -15,7 +15,7 @@ use crate::points::sampling::Sampling;
 
 /// First and second order geometry of the surface at m queries, d ≥ 2.
 ///
-/// Where a query has no answer its normal is zero and meaningless: ask [`Geometry::is_null`] first.
+/// The normal of a query without an answer is zero and meaningless: ask [`Geometry::is_null`] first.
 pub struct Geometry {
     served: Served,
     /// `[m]`
@@ -26,23 +26,23 @@ pub struct Geometry {
     degenerate: Vec<Degeneracy>,
 }
 
-/// Curvatures at m queries, in the order of the queries; entries of null queries are zero and meaningless.
+/// Curvatures at m queries, in the order of the queries. Entries of null queries are zero and meaningless.
 pub struct Curvatures {
     /// `[m, d−1]`, ascending by value, 1/L.
     pub principal: Vec<f64>,
     /// `[m, d−1, d]`, orthonormal and tangent, the component of largest magnitude positive.
     pub directions: Vec<f64>,
-    /// `[m]`, their average, 1/L.
+    /// Average of the principal curvatures, `[m]`, 1/L.
     pub mean: Vec<f64>,
-    /// `[m]`, their product, 1/L^{d−1}.
+    /// Product of the principal curvatures, `[m]`, 1/L^{d−1}.
     pub gaussian: Vec<f64>,
 }
 
 impl Geometry {
-    /// The geometry of a surface at queries: that of the level surface of its function through each query.
+    /// Computes the geometry at each query: that of the level surface of the function through the query.
     ///
     /// # Errors
-    /// Those of [`crate::function::interpolant::Interpolant::at`].
+    /// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
     pub fn of(
         surface: &Surface,
         queries: &Cloud,
@@ -77,7 +77,7 @@ impl Geometry {
         self.normals.len() / self.n_queries()
     }
 
-    /// Whether each query has no answer, `[m]`.
+    /// Returns a mask `[m]`, true where a query has no answer.
     pub fn is_null(&self) -> &[bool] {
         &self.is_null
     }
@@ -87,7 +87,7 @@ impl Geometry {
         &self.degenerate
     }
 
-    /// Flags queries around which nodes do not resolve the surface, and has no answer where there are too few of them.
+    /// Flags queries around which nodes do not resolve the surface. Queries with too few nodes become null.
     pub fn take_resolutions(&mut self, resolutions: &[Resolution]) {
         let all = || resolutions.iter().enumerate();
         let unresolved = all().filter(|(_, resolution)| **resolution != Resolution::Resolved);
@@ -98,7 +98,8 @@ impl Geometry {
         }
     }
 
-    /// Flags queries that are far from all nodes of a function, and not flagged yet: nothing is known of it there.
+    /// Flags queries that are far from all nodes of a function, because nothing is known of it there. Queries
+    /// that have a flag keep it.
     pub fn flag_far_from(&mut self, nodes: &Sampling, queries: &Cloud) {
         let neighbours = nodes.neighbours();
         let is_far = |query: &usize| {
@@ -139,36 +140,38 @@ impl Geometry {
         self.served.deviations()
     }
 
-    /// u at the queries, `[m]`: 1 on the surface at α = 0.
+    /// Values of u at the queries, `[m]`: 1 on the surface at α = 0.
     pub fn levels(&self) -> &[f64] {
         self.served.levels()
     }
 
-    /// |∇u| of the function that serves each query, `[m]`: 1/L for the signature function, about 1 for the offset model.
+    /// Gradient norm |∇u| of the function that serves each query, `[m]`. Unit 1/L for the signature function,
+    /// about 1 for the offset model.
     pub fn gradient_norms(&self) -> &[f64] {
         &self.gradient_norms
     }
 
-    /// ν, `[m, d]`.
+    /// Normals ν, `[m, d]`.
     pub fn normals(&self) -> &[f64] {
         &self.normals
     }
 
-    /// ν at one query.
+    /// Normal ν at one query.
     pub fn normal(&self, query: usize) -> &[f64] {
         let d = self.dimension();
         &self.normals[query * d..][..d]
     }
 
-    /// `tr(Dν) = σ(tr D²u − νᵀD²uν)/|∇u|` at a query: the sum of the principal curvatures, 1/L.
+    /// Returns the sum of the principal curvatures at a query, 1/L: `tr(Dν) = σ(tr D²u − νᵀD²uν)/|∇u|`.
     pub fn trace_of_shape_operator(&self, query: usize) -> f64 {
         let trace = tangential_trace(self.served.hessian(query), self.normal(query));
         self.served.verdict(query).sign * trace / self.gradient_norms[query]
     }
 
-    /// Eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space (errata.md, 3).
+    /// Computes the curvatures: eigenvalues of `S = σ P D²u P/|∇u|`, `P = I − ννᵀ`, on the tangent space
+    /// (errata.md, 3).
     ///
-    /// Sphere of radius r, outward: all +1/r.
+    /// A sphere of radius r with outward normals has curvatures +1/r.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -229,7 +232,8 @@ mod tests {
             let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
             Geometry::of(&surface, &cloud, &request, &Unobserved).unwrap().degenerate.len()
         };
-        // Quadrics over 0.53 of the radius are off by 8 %; a wide kernel predicts all points, a narrow one none.
+        // Quadrics over 0.53 of the radius are off by 8 %. A wide kernel predicts the points that are left
+        // out, a narrow one predicts none.
         assert_eq!(n_flagged(1.0), 0);
         assert!(n_flagged(0.15) > 200);
     }

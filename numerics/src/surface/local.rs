@@ -1,4 +1,4 @@
-//! The surface of local regressions, with one side chosen for all of it.
+//! The surface made of local regressions, with one side chosen for all of it.
 
 use std::sync::Arc;
 
@@ -21,22 +21,23 @@ use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 
-/// Cosine between a normal and the gradient of the coarse function above which that has something to say about its sign.
+/// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
+/// known.
 const SAYS_SIGN: f64 = 0.2;
 
-/// Deviation of a normal, radians, beyond which it is flagged: on a scan a fiftieth of the points, which have seven tenths of the normals
-/// that are off by 30°.
+/// Deviation of a normal, radians, beyond which it is flagged. On a scan this flags a fiftieth of the points,
+/// among them seven tenths of the normals that are off by 30°.
 const UNCERTAIN_NORMAL: f64 = 0.3;
 
 /// Curvature times the radius of the cloud up to which a surface counts as flat.
 const FLAT: f64 = 0.1;
 
-/// What is known of a surface beside its points.
+/// Optional knowledge of a surface beside its points.
 #[derive(Clone, Copy, Default)]
 pub struct Given<'a> {
-    /// Normals of the points, `[n, d]`, of any length but 0: they say which side is outward.
+    /// Normals of the points, `[n, d]`, of any length but 0. They say which side is outward.
     pub normals: Option<&'a Cloud>,
-    /// Where noise and shape are learned, `[s, d]`; see [`Patches::learned_at`].
+    /// Sites where noise and shape are learned, `[s, d]`; see [`Patches::learned_at`].
     pub sites: Option<&'a Cloud>,
 }
 
@@ -45,13 +46,13 @@ pub struct LocalSurface {
     cloud: Arc<Cloud>,
     sampling: Arc<Sampling>,
     patches: Patches,
-    /// What they say at the points, normals outward.
+    /// Geometry of the patches at the points, normals outward.
     at_points: PatchGeometry,
     orientation: SurfaceOrientation,
-    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    /// True where the evidence for the side of a point is contradictory, `[n]`.
     is_ambiguous: Vec<bool>,
     radius: f64,
-    /// What a curvature is of its deviation at least where it is known well enough to be used.
+    /// Least ratio of a curvature to its deviation at which the curvature counts as known.
     least_ratio: f64,
 }
 
@@ -78,7 +79,7 @@ impl LocalSurface {
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
         let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
         let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        // What is not known, or bent, is not sure either.
+        // Unknown and bent points are not sure either.
         let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
         let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
         let least_ratio = least_ratio(&ratios);
@@ -101,7 +102,7 @@ impl LocalSurface {
         &self.patches
     }
 
-    /// `|h|` of the heights h of the points above the surface, L.
+    /// Returns `|h|` of the heights h of the points above the surface, L.
     pub fn misfit(&self) -> f64 {
         norm(&self.at_points.heights)
     }
@@ -114,7 +115,7 @@ impl LocalSurface {
             + block_bytes(arc_payload::<Self>())
     }
 
-    /// What is known at queries: that of a function with |∇u| = 1 that grows outward.
+    /// Serves the geometry at queries, as that of a function with |∇u| = 1 that grows outward.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -139,7 +140,7 @@ impl LocalSurface {
         let (m, d) = (queries.n_points(), queries.dimension());
         let sign = match request.orientation {
             Orientation::Outward => 1.0,
-            // Functions of a surface grow inward.
+            // Signature functions grow inward.
             Orientation::Gradient => -1.0,
         };
         let verdict = |query: usize| {
@@ -187,13 +188,13 @@ impl LocalSurface {
         (!is_resolved).then_some(DegeneracyReason::UnderResolved)
     }
 
-    /// Whether the curvatures are known well enough to be used.
+    /// Returns whether the curvatures are known well enough to be used.
     fn is_resolved(&self, geometry: &PatchGeometry, query: usize) -> bool {
         let ratio = ratio(geometry, query, self.cloud.dimension(), self.radius);
         ratio.is_some_and(|ratio| ratio >= self.least_ratio)
     }
 
-    /// Turns normals to the side of those of the points nearby.
+    /// Turns normals to the side of the normals of nearby points.
     fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
         let d = self.cloud.dimension();
         let mut found = Vec::new();
@@ -203,7 +204,7 @@ impl LocalSurface {
             let along: f64 = found
                 .iter()
                 .map(|found| {
-                    // Near a thin sheet the point on this side of it decides.
+                    // Near a thin sheet this lets the point on the query's side decide.
                     let spacing = self.sampling.spacing(found.point);
                     let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
                     weight * dot(&self.at_points.normals[found.point * d..][..d], normal)
@@ -214,8 +215,9 @@ impl LocalSurface {
     }
 }
 
-/// The largest principal curvature over the largest deviation of one, infinite for deviations of 0; `None` where nothing is
-/// known, and where the surface bends more than deviations say.
+/// Returns the largest principal curvature over the largest deviation of one, infinite for deviations of 0.
+///
+/// `None` where nothing is known, or where the surface bends more than deviations can say.
 fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Option<f64> {
     let deviations = geometry.curvatures.as_ref().filter(|found| !found.is_bent[query])?;
     let (normal, shape) = (&geometry.normals[query * d..][..d], &geometry.shapes[query * d * d..][..d * d]);
@@ -227,7 +229,7 @@ fn ratio(geometry: &PatchGeometry, query: usize, d: usize, radius: f64) -> Optio
     (geometry.is_known[query] && !ratio.is_nan()).then_some(ratio)
 }
 
-/// Signs of the normals of patches: those of a coarse signature function, by whole regions.
+/// Orients the normals of patches, by whole regions, along given normals or a coarse signature function.
 fn orient(
     cloud: &Cloud,
     sampling: &Sampling,
@@ -258,7 +260,7 @@ fn orient(
     Oriented::of_directions(&sampled, directions, given.is_some())
 }
 
-/// Deviations in the order of the curvatures for normals of this sign.
+/// Returns deviations in the order of the curvatures for normals of this sign.
 fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
     let empty = CurvatureDeviations::default();
     let curvatures = geometry.curvatures.as_ref().unwrap_or(&empty);
@@ -276,7 +278,7 @@ fn deviations(geometry: &PatchGeometry, sign: f64, d: usize) -> Deviations {
 }
 
 impl PatchGeometry {
-    /// Multiplies normals and what changes sign with them.
+    /// Flips the normals whose `sign` is negative, with everything that changes sign with them.
     fn turn(&mut self, mut sign: impl FnMut(usize, &[f64]) -> f64) {
         let m = self.is_known.len();
         let d = self.normals.len() / m.max(1);
@@ -325,7 +327,7 @@ mod tests {
 
     #[test]
     fn surfaces_that_leave_nothing_to_regress_have_answers_everywhere() {
-        // On a fine sphere the closed form leaves less than rounding; on a plane nothing at all.
+        // On a fine sphere the closed form leaves less than rounding, on a plane nothing at all.
         let sphere = geometry(fibonacci_sphere(20_000));
         assert!(sphere.is_null().iter().all(|is_null| !is_null));
         let curvatures = sphere.curvatures(&Unobserved).unwrap();

@@ -1,4 +1,4 @@
-//! The surface that a cloud samples, by the function whose level surface it is or by local regressions.
+//! The surface that a cloud samples: the level surface of a function, or local regressions.
 
 pub mod degeneracy;
 pub mod geometry;
@@ -27,19 +27,20 @@ use signature::SignatureSurface;
 
 /// A surface with consistently oriented normals at the points, d ≥ 2.
 ///
-/// Made once: it costs one evaluation at all points, and looks at the neighbours of each.
+/// Building it costs one evaluation at all points and a look at the neighbours of each, so it is made once.
 pub enum Surface {
-    /// Level surface of a global function; large beside the other.
+    /// Level surface of a global function.
     Signature(Box<SignatureSurface>),
     /// Local regressions.
     Local(Box<LocalSurface>),
 }
 
 impl Surface {
-    /// The surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    /// Builds the surface of a signature function. `given` are normals of the points, `[n, d]`, of any length
+    /// but 0.
     ///
     /// # Errors
-    /// Those of [`SignatureSurface::of`].
+    /// Returns the errors of [`SignatureSurface::of`].
     pub fn of(
         signature: Interpolant,
         given: Option<&Cloud>,
@@ -55,7 +56,7 @@ impl Surface {
         }
     }
 
-    /// The function u whose level surface this is, if there is one.
+    /// Returns the function u whose level surface this is, if there is one.
     pub fn signature(&self) -> Option<&Interpolant> {
         match self {
             Self::Signature(surface) => Some(surface.signature()),
@@ -70,7 +71,7 @@ impl Surface {
         }
     }
 
-    /// Who is near whom among its points.
+    /// Neighbour search among the points of the surface.
     pub fn neighbours(&self) -> &Neighbours {
         match self {
             Self::Signature(surface) => surface.sampling().neighbours(),

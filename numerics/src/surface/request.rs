@@ -1,15 +1,16 @@
-//! What is asked of the geometry of a surface.
+//! Requests for the geometry of a surface.
 
-/// Which way normals point.
+/// The direction in which normals point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orientation {
-    /// Out of closed surfaces: ν = −∇u/|∇u| (errata.md, 2), with signs repaired where neighbours contradict it.
+    /// Out of closed surfaces: ν = −∇u/|∇u| (errata.md, 2), with signs repaired where neighbours contradict
+    /// them.
     Outward,
     /// ν = +∇u/|∇u|, whatever its sign.
     Gradient,
 }
 
-/// Which function's level surface is meant.
+/// The function whose level surface is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceModel {
     /// The signature function, and the offset model where its gradient vanishes.
@@ -20,22 +21,24 @@ pub enum SurfaceModel {
     Local,
 }
 
-/// What is asked of a geometry.
+/// Options of a request for geometry.
 #[derive(Debug, Clone, Copy)]
 pub struct GeometryRequest {
     pub orientation: Orientation,
     pub model: SurfaceModel,
-    /// Whether second derivatives are served: they are checked against the neighbours and the cusp of the kernel.
+    /// True if second derivatives are served. They are then checked against the neighbours and the cusp of
+    /// the kernel.
     pub checks_curvatures: bool,
-    /// Queries at which the offset model may be asked where the signature function has no answer; beyond them the answer is
-    /// null. With more queries than that it confirms no curvatures either.
+    /// Most queries at which the offset model may be asked where the signature function has no answer.
+    /// Queries beyond them are null. If there are more queries than this in all, the offset model confirms no
+    /// curvatures either.
     pub max_offsets: usize,
-    /// Whether standard deviations are asked for.
+    /// True if standard deviations are asked for.
     pub has_deviations: bool,
 }
 
 impl GeometryRequest {
-    /// Everything on: outward curvatures, checked, with all the work that they take.
+    /// Outward curvatures, checked, with all the work that they take.
     pub const CURVATURES: Self = Self {
         orientation: Orientation::Outward,
         model: SurfaceModel::Auto,

@@ -1,4 +1,4 @@
-//! What is known of a surface at queries, whichever model says it.
+//! Geometry served at queries, whichever model it comes from.
 
 use super::degeneracy::DegeneracyReason;
 
@@ -10,38 +10,39 @@ pub enum ServedBy {
     Local,
 }
 
-/// Standard deviations at m queries, in flat arrays, in the order of what they belong to; zero at null queries.
+/// Standard deviations at m queries, in flat arrays, in the order of the quantities they belong to. Zero at
+/// null queries.
 #[derive(Debug, Clone)]
 pub struct Deviations {
-    /// Whether there are any, `[m]`.
+    /// True where a query has deviations, `[m]`.
     pub is_known: Vec<bool>,
-    /// Of the angle of the normal, `[m]`, radians.
+    /// Deviations of the angle of the normal, `[m]`, radians.
     pub normal: Vec<f64>,
-    /// Of the principal curvatures, `[m, d−1]`, 1/L.
+    /// Deviations of the principal curvatures, `[m, d−1]`, 1/L.
     pub principal: Vec<f64>,
-    /// `[m]`, 1/L.
+    /// Deviations of the mean curvature, `[m]`, 1/L.
     pub mean: Vec<f64>,
-    /// `[m]`, 1/L^{d−1}.
+    /// Deviations of the Gaussian curvature, `[m]`, 1/L^{d−1}.
     pub gaussian: Vec<f64>,
 }
 
-/// What is known of the surface at m queries, in flat arrays.
+/// Geometry of the surface at m queries, in flat arrays.
 pub(crate) struct Served {
     pub(super) dimension: usize,
-    /// ∇ of the function that serves each query, `[m, d]`.
+    /// Gradient of the function that serves each query, `[m, d]`.
     pub(super) gradients: Vec<f64>,
-    /// Its Hessian, `[m, d, d]`.
+    /// Hessian of the function that serves each query, `[m, d, d]`.
     pub(super) hessians: Vec<f64>,
     pub(super) verdicts: Vec<Verdict>,
-    /// u, `[m]`.
+    /// Values of u, `[m]`.
     pub(super) levels: Vec<f64>,
     pub(super) deviations: Option<Deviations>,
 }
 
-/// What is said of a query beside its numbers.
+/// Sign, model and degeneracy of a query.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Verdict {
-    /// ν against ∇u: +1 or −1.
+    /// Sign of ν against ∇u: +1 or −1.
     pub sign: f64,
     pub by: ServedBy,
     pub reason: Option<DegeneracyReason>,
@@ -58,7 +59,7 @@ impl Served {
         &self.gradients[query * self.dimension..][..self.dimension]
     }
 
-    /// Symmetric `[d, d]`.
+    /// Returns the Hessian at a query, symmetric `[d, d]`.
     pub(crate) fn hessian(&self, query: usize) -> &[f64] {
         let n_entries = self.dimension * self.dimension;
         &self.hessians[query * n_entries..][..n_entries]

@@ -1,37 +1,41 @@
-//! How sure a curvature has to be in a cloud in which hardly any is.
+//! Least ratio of a curvature to its deviation that counts as known, chosen from the ratios all over a cloud.
 
 use crate::machine::normal::cumulative;
 
-/// Curvature over its deviation from which it counts as known: three deviations are half of it. Of those that
-/// pass, and are not bent, less than 1 % are off by half, at any noise (docs/error-bars.md).
+/// Ratio of a curvature to its deviation from which the curvature counts as known: three deviations are half
+/// of it. Of the curvatures that pass and are not bent, less than 1 % are off by half, at any noise
+/// (docs/error-bars.md).
 const SURE: f64 = 6.0;
 
-/// Where a smaller share of a cloud passes, it is asked who does: of many that are not sure some pass by luck.
+/// Share of a cloud that must pass [`SURE`] for that bound to be kept. If fewer pass, the bound is raised:
+/// among many uncertain curvatures some pass by luck.
 const FEW: f64 = 0.3;
 
-/// The share of those that pass which may be there by luck, off by half.
+/// Share of the passing curvatures that may pass by luck while off by half.
 const LUCKY: f64 = 0.02;
 
-/// Deviation of a measured ratio about the true one. It would be 1 if deviations were known; they are estimated from a
-/// few dozen points, and those that come out too small pass first.
+/// Standard deviation of a measured ratio about the true one. It would be 1 if deviations were known. They
+/// are estimated from a few dozen points, and those that come out too small pass first.
 const SPREAD: f64 = 2.0;
 
-/// Where a smaller share than this passes after all, it is a few that are wrong in ways of their own, and none does.
+/// Share of a cloud that must pass the raised bound. If fewer pass, they are a few that are wrong in ways of
+/// their own, and none is accepted.
 const LEAST_SHARE: f64 = 0.02;
 
-/// Ratios that are tried, in steps of this up to four times [`SURE`].
+/// Step between the bounds that are tried, up to four times [`SURE`].
 const STEP: f64 = 0.5;
 
-/// Ratios that are looked at.
+/// Most ratios that are looked at. Larger clouds are thinned evenly.
 const MAX_RATIOS: usize = 4096;
 
-/// The least ratio of a curvature to its deviation that is sure, from the ratios all over a cloud; infinite if
-/// none is.
+/// Returns the least ratio of a curvature to its deviation that is sure, from the ratios all over a cloud. It
+/// is infinite if none is sure.
 ///
-/// With true ratios z, a measured one is z + ε. It passes a bound t, and is off by half of what is true, for ε
-/// beyond both t − z and z/2. The ratios that were measured stand for the true ones. Of 243 noisy clouds of
-/// docs/error-bars.md 77 had more than 2 % that were off by half without a flag by the bound of 6 alone, and 3
-/// have by this one.
+/// A measured ratio is z + ε, z the true one. It passes a bound t while off by half of the truth for ε beyond
+/// both t − z and z/2. The measured ratios stand for the true ones.
+///
+/// Of the 243 noisy clouds of docs/error-bars.md, 77 have more than 2 % of curvatures off by half without a
+/// flag under the bound of 6 alone. Under this bound 3 have.
 pub fn least_ratio(ratios: &[f64]) -> f64 {
     let share =
         |bound: f64| ratios.iter().filter(|&&ratio| ratio >= bound).count() as f64 / ratios.len() as f64;
@@ -54,7 +58,7 @@ mod tests {
     use super::*;
     use crate::testing::Random;
 
-    /// Measured ratios where all true ones are the same.
+    /// Returns measured ratios around one true ratio.
     fn measured(n: usize, truth: f64, random: &mut Random) -> Vec<f64> {
         (0..n).map(|_| truth + random.normal()).collect()
     }

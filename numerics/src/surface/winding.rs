@@ -1,9 +1,9 @@
 //! Winding numbers of oriented points: how often a surface winds around a place.
 //!
-//! By Gauss's formula `w(x) = Σ_y a_y ν_y·(y − x) / (|S^{d−1}| |y − x|^d)`, with the area a_y that each point
-//! stands for, is 1 inside a closed surface with outward normals, 0 outside, and ½ on it, where the sum
-//! leaves x out. Far cells of a tree count as one dipole each (Barill, Dickson, Schmidt, Levin and Jacobson,
-//! "Fast winding numbers for soups and clouds", 2018).
+//! Gauss's formula is `w(x) = Σ_y a_y ν_y·(y − x) / (|S^{d−1}| |y − x|^d)`, a_y the area that a point stands
+//! for. With outward normals of a closed surface w is 1 inside, 0 outside, and ½ on the surface, where the
+//! sum leaves x out. Far cells of a tree count as one dipole each (Barill, Dickson, Schmidt, Levin and
+//! Jacobson, "Fast winding numbers for soups and clouds", 2018).
 
 use smallvec::SmallVec;
 
@@ -17,8 +17,8 @@ const LEAF_SIZE: usize = 16;
 /// Radii of a cell beyond which it counts as one dipole: β of the paper.
 const OPENING: f64 = 2.0;
 
-/// Part of the width of a point's area within which its term is that of a smooth density: normals that are
-/// off would else count without bound at near points.
+/// Softening length over the width of a point's area. Within this length the term of a point is that of a
+/// smooth density. Otherwise normals that are off would count without bound at near points.
 const SOFTENING: f64 = 0.35;
 
 /// Points with areas and normals, in a tree of cells.
@@ -28,7 +28,7 @@ pub(crate) struct Dipoles {
     positions: Vec<f64>,
     /// Area times normal, `[m, d]`, in the order of the positions.
     moments: Vec<f64>,
-    /// Squares that are added to squared distances, `[m]`.
+    /// Squared softening lengths, which are added to squared distances, `[m]`.
     softenings: Vec<f64>,
     cells: Vec<Cell>,
     inverse_sphere: f64,
@@ -38,9 +38,9 @@ pub(crate) struct Dipoles {
 struct Cell {
     start: usize,
     end: usize,
-    /// The index of the second child; the first one follows its parent. None for a leaf.
+    /// Index of the second child. The first child follows its parent. `None` for a leaf.
     right: Option<usize>,
-    /// Mean position, by area.
+    /// Mean position, weighted by area.
     centre: Small,
     moment: Small,
     /// Greatest distance of a point from the centre, squared.
@@ -48,7 +48,8 @@ struct Cell {
 }
 
 impl Dipoles {
-    /// The dipoles of some points of a cloud; `moments` are area times normal of all its points, `[n, d]`.
+    /// Builds the tree over some points of a cloud. `moments` are area times normal of all points of the
+    /// cloud, `[n, d]`.
     pub(crate) fn of(cloud: &Cloud, moments: &[f64], points: &[usize]) -> Self {
         let d = cloud.dimension();
         let mut order: Vec<u32> = points.iter().map(|&point| point as u32).collect();
@@ -65,7 +66,7 @@ impl Dipoles {
         Self { dimension: d, positions, moments, softenings, cells, inverse_sphere }
     }
 
-    /// w(x) without the points at x itself.
+    /// Returns w(x), leaving out points at x itself.
     pub(crate) fn winding(&self, x: &[f64]) -> f64 {
         let (mut sum, mut at) = (0.0, 0);
         let mut pending: SmallVec<[usize; 32]> = SmallVec::new();
@@ -101,7 +102,7 @@ impl Dipoles {
     }
 }
 
-/// `m·(y − x)/(|y − x|² + softening)^{d/2}`; 0 for y = x.
+/// Returns the term of one dipole, `m·(y − x)/(|y − x|² + softening)^{d/2}`, and 0 for y = x.
 fn flux(moment: &[f64], y: &[f64], x: &[f64], softening: f64) -> f64 {
     let squared = squared_distance(x, y) + softening;
     if squared == 0.0 {
@@ -115,7 +116,7 @@ fn flux(moment: &[f64], y: &[f64], x: &[f64], softening: f64) -> f64 {
     }
 }
 
-/// The volume of the unit ball in k dimensions: `V_k = V_{k−2} 2π/k`, from V_0 = 1 and V_1 = 2.
+/// Returns the volume of the unit ball in k dimensions: `V_k = V_{k−2} 2π/k`, from V_0 = 1 and V_1 = 2.
 pub(crate) fn ball_volume(k: usize) -> f64 {
     match k {
         0 => 1.0,
@@ -124,9 +125,10 @@ pub(crate) fn ball_volume(k: usize) -> f64 {
     }
 }
 
-/// The axis along which some points of a cloud spread most; the first of several. Sides that are in doubt may
-/// come out otherwise for a cloud that is turned: halves that turn with the cloud cost more wrong ones on
-/// folded strips.
+/// Returns the axis along which some points of a cloud spread most, the first one on a tie.
+///
+/// Sides that are in doubt may therefore come out differently for a rotated cloud. Axes that rotate with the
+/// cloud give more wrong sides on folded strips.
 fn widest_axis(cloud: &Cloud, points: &[u32]) -> usize {
     let extent = |axis: usize| {
         let along = || points.iter().map(|&point| cloud.point(point as usize)[axis]);
@@ -145,7 +147,8 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Appends the cells of these points, which come after `start` others: halves across the widest side.
+    /// Appends the cells of these points, in halves across the widest side. `start` is the number of points
+    /// before them.
     fn split(&self, cells: &mut Vec<Cell>, order: &mut [u32], start: usize) {
         let this = cells.len();
         cells.push(self.cell(order, start));

@@ -1,7 +1,7 @@
-//! Clouds on which several tests, benchmarks or examples agree, and values at their points.
+//! Clouds, and values at their points, shared by tests, benchmarks and examples.
 //!
-//! The unit tests inside the library include this file too (src/testing.rs). So it knows nothing but `Cloud`, under
-//! the name that others have for it, and the random numbers beside it.
+//! The unit tests inside the library include this file too (src/testing.rs). It therefore uses only `Cloud`,
+//! by its public path, and the random numbers beside it.
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 
@@ -11,7 +11,7 @@ use gramian_numerics::points::cloud::Cloud;
 
 use super::random::Random;
 
-/// Points as a cloud.
+/// Makes a cloud of points.
 pub fn cloud<const D: usize>(points: &[[f64; D]]) -> Cloud {
     Cloud::new(points.concat(), D).unwrap()
 }
@@ -21,12 +21,13 @@ pub fn rows<const D: usize>(cloud: &Cloud) -> Vec<[f64; D]> {
     cloud.points().map(|x| <[f64; D]>::try_from(x).unwrap()).collect()
 }
 
-/// n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i (errata.md, "Settled").
+/// A Fibonacci lattice of n points on the unit sphere: z_i = 1 − (2i+1)/n, angle
+/// π(1+√5)i (errata.md, "Settled").
 pub fn fibonacci_sphere(n: usize) -> Cloud {
     turned_fibonacci_sphere(n, 0.0)
 }
 
-/// The same turned about z by an angle, so that the points of two clouds differ.
+/// A Fibonacci lattice on the unit sphere, turned about z by an angle. The points of two such clouds differ.
 pub fn turned_fibonacci_sphere(n: usize, angle: f64) -> Cloud {
     let golden = PI * (1.0 + 5f64.sqrt());
     let point = |i: usize| {
@@ -47,7 +48,7 @@ pub fn circle(n: usize) -> Cloud {
     turned_circle(n, 0.0)
 }
 
-/// The same turned by a number of steps from one point to the next.
+/// n equidistant points on the unit circle, turned by a number of steps from one point to the next.
 pub fn turned_circle(n: usize, steps: f64) -> Cloud {
     let point = |i: usize| {
         let t = 2.0 * PI * (i as f64 + steps) / n as f64;
@@ -59,7 +60,7 @@ pub fn turned_circle(n: usize, steps: f64) -> Cloud {
 /// Radii of the ring torus of the paper: R₁ of the ring, R₂ of the tube.
 pub const TORUS: [f64; 2] = [2.0, 0.5];
 
-/// The point of that torus at two angles, v = 0 on the outside.
+/// The point of the torus [`TORUS`] at two angles, v = 0 on the outside.
 pub fn torus_point(u: f64, v: f64) -> [f64; 3] {
     let [r1, r2] = TORUS;
     let r = r1 + r2 * v.cos();
@@ -67,7 +68,8 @@ pub fn torus_point(u: f64, v: f64) -> [f64; 3] {
     [r * u.cos(), r * u.sin(), r2 * v.sin()]
 }
 
-/// Uniform in area on that torus: angles accepted with probability `(R₁ + R₂ cos v)/(R₁ + R₂)` (Foley et al. 1996).
+/// n points on the torus [`TORUS`], uniform in area: angles are accepted with probability
+/// `(R₁ + R₂ cos v)/(R₁ + R₂)` (Foley et al. 1996).
 pub fn random_torus(n: usize, random: &mut Random) -> Cloud {
     let [r1, r2] = TORUS;
     let mut points = Vec::with_capacity(n);
@@ -80,25 +82,25 @@ pub fn random_torus(n: usize, random: &mut Random) -> Cloud {
     cloud(&points)
 }
 
-/// n points in the cube [−1, 1]^d.
+/// n points in the cube [−1, 1]^d, uniform in volume.
 pub fn random_cube(n: usize, d: usize, random: &mut Random) -> Cloud {
     Cloud::new((0..n * d).map(|_| 2.0 * random.uniform() - 1.0).collect(), d).unwrap()
 }
 
-/// side² points of the square [−1, 1]², boundary included, one row of equal y after the other.
+/// side² points of the square [−1, 1]², boundary included, ordered by rows of equal y.
 pub fn square_grid(side: usize) -> Cloud {
     let at = |i: usize| 2.0 * i as f64 / (side - 1) as f64 - 1.0;
     Cloud::new((0..side * side).flat_map(|i| [at(i % side), at(i / side)]).collect(), 2).unwrap()
 }
 
-/// The paper's closed curve `(sin t, sin³t + ½ cos t)`, with four inflections: a point and the direction outwards there, not of
-/// length 1. The curve runs clockwise, so outward is left of the tangent.
+/// A point of the paper's closed curve `(sin t, sin³t + ½ cos t)`, which has four inflections, and the
+/// outward direction there, not of length 1. The curve runs clockwise, so outward is left of the tangent.
 pub fn closed_curve_point(t: f64) -> ([f64; 2], [f64; 2]) {
     let (sin, cos) = t.sin_cos();
     ([sin, sin.powi(3) + 0.5 * cos], [-(3.0 * sin * sin * cos - 0.5 * sin), cos])
 }
 
-/// Multiplies the coordinates of every point by one factor each.
+/// Multiplies the coordinates of every point by one factor per axis.
 pub fn stretched(cloud: &Cloud, factors: &[f64]) -> Cloud {
     let stretch = |(x, f): (&f64, &f64)| x * f;
     let coordinates = cloud.coordinates().iter().zip(factors.iter().cycle()).map(stretch).collect();
@@ -116,7 +118,7 @@ pub fn wave(x: &[f64]) -> f64 {
     (0.3 + x.iter().enumerate().map(|(c, x)| (1.0 + 0.4 * c as f64) * x).sum::<f64>()).sin()
 }
 
-/// Its values at the points.
+/// Values of [`wave`] at the points.
 pub fn waves(cloud: &Cloud) -> Vec<f64> {
     cloud.points().map(wave).collect()
 }

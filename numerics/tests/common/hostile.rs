@@ -6,11 +6,12 @@ use gramian_numerics::points::cloud::Cloud;
 
 use super::random::Random;
 
-/// A cloud by name, of any number of points.
+/// A named cloud with any number of points.
 pub struct Hostile {
     pub name: &'static str,
     pub dimension: usize,
-    /// Writes the coordinates of the point of this index, of so many points.
+    /// Writes the coordinates of one point. Arguments: its index, the number of points,
+    /// random numbers, coordinates.
     point: fn(usize, usize, &mut Random, &mut [f64]),
 }
 
@@ -32,7 +33,7 @@ impl Hostile {
         Cloud::new(coordinates, self.dimension).unwrap()
     }
 
-    /// What it is compared with: as many random points of the unit cube of its dimension.
+    /// Random points in the unit cube of the same dimension, for comparison.
     pub fn ordinary(&self) -> Self {
         hostile("random", self.dimension, |_, _, random, x| uniform(random, x))
     }
@@ -42,7 +43,7 @@ fn uniform(random: &mut Random, x: &mut [f64]) {
     x.iter_mut().for_each(|x| *x = random.uniform());
 }
 
-/// One of `n_positions` random positions, each as often as the others.
+/// A position out of `n_positions` random ones, each taken equally often.
 fn repeated(n_positions: usize, at: usize, x: &mut [f64]) {
     uniform(&mut Random((at % n_positions) as u64), x);
 }
@@ -56,7 +57,7 @@ fn lattice(side: usize, at: usize, x: &mut [f64]) {
     }
 }
 
-/// The side of a cube of at least n points.
+/// The side of the smallest cubic lattice of at least n points.
 fn side_of(n: usize) -> usize {
     (1..).find(|side| side * side * side >= n).unwrap_or(1)
 }

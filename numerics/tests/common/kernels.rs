@@ -1,10 +1,10 @@
-//! Kernels for all tests.
+//! Kernel families that several tests run over.
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 use gramian_numerics::kernel::{Family, MAX_MATERN_ORDER, WendlandSmoothness};
 
-/// Every family at parameters that a user might choose: 17 kernels.
+/// All families, at parameters that a user might choose: 17 kernels.
 pub fn all_families() -> Vec<Family> {
     let mut families = vec![
         Family::Gauss,

@@ -1,4 +1,4 @@
-//! What tests, benchmarks and examples share: random numbers, clouds, kernels, and fits of them.
+//! Code shared by tests, benchmarks and examples: random numbers, clouds, kernels, and fits.
 
 pub mod clouds;
 pub mod fits;

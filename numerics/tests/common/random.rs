@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-/// SplitMix64 (Steele, Lea and Flood 2014) from a seed.
+/// A SplitMix64 generator (Steele, Lea and Flood 2014). The field is the seed, then the state.
 pub struct Random(pub u64);
 
 impl Random {
@@ -28,7 +28,7 @@ impl Random {
         radius * self.angle().cos()
     }
 
-    /// A point of the unit sphere, uniform in area: so is its height (Archimedes).
+    /// A point of the unit sphere, uniform in area. Its height is therefore uniform in [−1, 1] (Archimedes).
     pub fn on_sphere(&mut self) -> [f64; 3] {
         let (z, angle) = (2.0 * self.uniform() - 1.0, self.angle());
         let r = (1.0 - z * z).sqrt();

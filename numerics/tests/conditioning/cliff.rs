@@ -1,4 +1,4 @@
-//! No cliff: as α grows from 0 to 1e-6 the answer changes smoothly, also where the method does.
+//! Continuity in α: as α grows from 0 to 1e-6 the answer changes smoothly, even where the method switches.
 
 use std::f64::consts::PI;
 
@@ -8,18 +8,22 @@ use gramian_numerics::solver::Method;
 
 use crate::support::*;
 
-/// 0, then 60 values of α from 1e-20 to 1e-6: four a decade, so that several fall on both sides of every switch.
+/// The α of a walk: 0, then 60 values from 1e-20 to 1e-6. Four a decade put several on
+/// both sides of every switch.
 fn alphas() -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain((0..60).map(|k| 10f64.powf(-20.0 + 14.0 * f64::from(k) / 59.0)))
 }
 
-/// Follows one fit as α grows and compares each answer with the last one.
+/// A fit that is followed as α grows: each answer is compared with the previous one.
 ///
-/// In exact arithmetic a step from α₁ to α₂ changes u at the points by at most `α₂|Λ|`, the misfit of α₂: in the eigenvectors
-/// of K the change is `(α₂/(λ+α₂) − α₁/(λ+α₁)) y`, componentwise between 0 and the misfit `α₂/(λ+α₂) y`. Queries lie among
-/// the points and each answer is measured against its own size, so the bound serves u, ∇u and Δu.
-/// Beside it stands the scatter that rounding leaves at α = 0, `floor` in u, and h⁻¹ or h⁻² times that in ∇u and Δu, since
-/// scatter changes from point to point; the points are h ≥ 0.1 apart. A cliff would be larger.
+/// In exact arithmetic a step from α₁ to α₂ changes u at the points by at most `α₂|Λ|`, the misfit of α₂. In
+/// the eigenvectors of K the change is `(α₂/(λ+α₂) − α₁/(λ+α₁)) y`. Each component lies between 0 and that of
+/// the misfit, `α₂/(λ+α₂) y`. Queries lie among the points and each answer is measured against its own size,
+/// so the bound serves u, ∇u and Δu.
+///
+/// Added to it is the scatter that rounding leaves at α = 0: `floor` in u, `floor`/h in ∇u and `floor`/h²
+/// in Δu. The powers of h arise because scatter changes from point to point, and the points are h ≥ 0.1
+/// apart. A cliff would be larger.
 struct Walk {
     points: Cloud,
     kernel: Kernel,
@@ -51,7 +55,7 @@ impl Walk {
         }
         let n_pivoted = methods.iter().filter(|&&method| method == Method::PivotedCholesky).count();
         println!("{:?}: {n_pivoted} pivoted, scatter {scatter:?}", self.kernel.family());
-        // One switch, and both methods take part: else this test would say nothing.
+        // Exactly one switch, and both methods take part. Otherwise the test would show nothing.
         assert!(methods.is_sorted_by_key(|&method| method == Method::Cholesky), "{methods:?}");
         assert!(n_pivoted > 5 && n_pivoted < methods.len() - 5, "{n_pivoted}");
     }
@@ -86,7 +90,7 @@ fn analytic_kernels_on_a_sphere() {
 fn a_filled_cube() {
     let mut random = Random(3);
     let points = random_cube(400, 3, &mut random);
-    // Not in the corners, where no point may be near: extrapolation multiplies every rounding by hundreds.
+    // Corners are left out: no point may be near, and extrapolation multiplies every rounding by hundreds.
     let queries = stretched(&random_cube(20, 3, &mut random), &[0.8; 3]);
     let (values, kernel) = (waves(&points), kernel(Family::Gauss, 2.5));
     Walk { points, kernel, values, queries, floor: 1e-5 }.check();

@@ -1,5 +1,5 @@
-//! tests/reference/hard.json (60-digit arithmetic, ill-conditioned fits): every array, to ten times what plain float64
-//! reached in its README.
+//! Ill-conditioned fits against 60-digit arithmetic (tests/reference/hard.json). Every array may be off by
+//! ten times the error that plain float64 reached according to the README there.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::support::{jets as fit_jets, *};
 
-/// What numpy reached, relative to each array's maximum, the variance absolute.
+/// Errors that numpy reached, relative to the maximum of each array. Those of variances are absolute.
 struct Reached {
     case: &'static str,
     value: f64,
@@ -28,7 +28,7 @@ struct Reached {
     variance: f64,
 }
 
-/// The table of the README, in the order of the file.
+/// The README's table, in the order of the file.
 #[rustfmt::skip]
 const REACHED: [Reached; 4] = [
     Reached { case: "ellipse 32, gauss", value: 8e-14, gradient: 2e-13, normals: 7e-14, curvatures: 3e-13, laplacian: 4e-13, matrix: 2e-9, variance: 1e-16 },
@@ -37,10 +37,10 @@ const REACHED: [Reached; 4] = [
     Reached { case: "sphere 64, laplace", value: 5e-14, gradient: 2e-13, normals: 4e-15, curvatures: 4e-14, laplacian: 7e-13, matrix: 1e-10, variance: 2e-16 },
 ];
 
-/// How much worse than that an array may be.
+/// Factor by which an error may exceed the one that was reached.
 const ALLOWED: f64 = 10.0;
 
-/// A case with its fit.
+/// A case of the reference with its fit.
 struct Case<'a> {
     expected: &'a Value,
     reached: &'a Reached,
@@ -72,12 +72,12 @@ impl<'a> Case<'a> {
         Self { expected, reached, kernel, alpha, points, values, queries, factor, failures: Vec::new() }
     }
 
-    /// Compares an array to `tolerance` times its own maximum.
+    /// Compares an array to `ALLOWED` times `reached`, relative to the maximum of the expected array.
     fn check(&mut self, what: &str, found: &[f64], expected: &Value, reached: f64) {
         self.check_within(what, found, expected, reached * largest(&numbers(expected)));
     }
 
-    /// Compares an array to `tolerance`, absolute.
+    /// Compares an array to `ALLOWED` times `reached`, an absolute error.
     fn check_within(&mut self, what: &str, found: &[f64], expected: &Value, reached: f64) {
         let error = distance(found, &numbers(expected));
         let line = format!("{}: {what} {:.1} times what was reached", self.reached.case, error / reached);
@@ -96,7 +96,8 @@ impl<'a> Case<'a> {
         let hessians: Vec<f64> = (0..m).flat_map(|query| jets.hessian(query).to_vec()).collect();
         self.check("signature value", &jets.values(), &expected["signature"]["value"], reached.value);
         self.check("signature gradient", &gradients, &expected["signature"]["gradient"], reached.gradient);
-        // The README has no line for Hessians; Δ applied is a sum of their entries.
+        // The README has no line for Hessians. They are held to the error of Δ, which
+        // is a sum of their entries.
         self.check("signature Hessian", &hessians, &expected["signature"]["hessian"], reached.laplacian);
         self.check_norm("signature norm", &signature, &expected["signature_norm_squared"]);
 
@@ -108,12 +109,12 @@ impl<'a> Case<'a> {
         u
     }
 
-    /// The README has no line for norms. A backward stable solve has weights for K + δ, |δ| about ε‖K‖₂ ≤ ε n k₀, which moves
-    /// `YᵀΛ` by ΛᵀδΛ.
+    /// Compares ‖u‖² = YᵀΛ to a derived bound, since the README has no line for norms. A backward stable
+    /// solve has the weights of K + δ, where |δ| is about ε‖K‖₂ ≤ ε n k₀. This moves `YᵀΛ` by ΛᵀδΛ.
     fn check_norm(&mut self, what: &str, u: &Interpolant, expected: &Value) {
         let weights: f64 = u.solution.weights.iter().map(|w| w * w).sum();
         let n = self.points.n_points() as f64;
-        // Where the weights are small, the sum of n products rounds more than the kernel does.
+        // Where the weights are small, rounding of the sum of n products exceeds that of the kernel.
         let sum = u.solution.native_norm_squared;
         let rounding = EPS * (weights * n * self.kernel.at_zero() + n.sqrt() * sum) / ALLOWED;
         self.check_within(what, &[u.solution.native_norm_squared], expected, rounding);
@@ -125,7 +126,7 @@ impl<'a> Case<'a> {
         assert!(geometry.is_null().iter().all(|is_null| !is_null), "{}", reached.case);
         let curvatures = geometry.curvatures(&Unobserved).unwrap();
         self.check("gradient norm", geometry.gradient_norms(), &expected["gradient_norm"], reached.gradient);
-        // Orientation::Outward keeps ν = −∇u/|∇u| or repairs it; these clouds are closed and need no repair.
+        // Orientation::Outward keeps ν = −∇u/|∇u| or repairs it. These clouds are closed and need no repair.
         self.check("normals", geometry.normals(), &expected["normals"], reached.normals);
         let principal = &expected["principal_curvatures"];
         self.check("principal curvatures", &curvatures.principal, principal, reached.curvatures);
@@ -155,12 +156,12 @@ impl<'a> Case<'a> {
         let found = covariance(&self.factor, &self.queries, &Unobserved).unwrap();
         self.check_within("covariance", &found.latent, &posterior["covariance"], reached.variance);
         let found = log_marginal_likelihood(&self.factor, &u.solution, 1.0).unwrap();
-        // ln det adds up n ln L_ii², where the smallest L_ii² have lost what the condition takes.
+        // ln det sums n terms ln L_ii². The smallest L_ii² have lost as many digits as the condition takes.
         let rounding = EPS / self.factor.reciprocal_condition();
         self.check("likelihood", &[found], &expected["log_marginal_likelihood"], rounding);
     }
 
-    /// Each point predicted by a fit of the others: the definition, against the closed form of the reference.
+    /// Predicts each point by a fit of the others: the definition, against the closed form of the reference.
     fn check_leave_one_out(&mut self) {
         let (n, d) = (self.points.n_points(), self.points.dimension());
         let (mut means, mut found) = (Vec::new(), Vec::new());
@@ -176,8 +177,9 @@ impl<'a> Case<'a> {
         }
         let expected = &self.expected["leave_one_out"];
         self.check("leave-one-out mean", &means, &expected["mean"], self.reached.value);
-        // The README's variances are those at the queries. Here k₀ − kᵀA⁻¹k moves by wᵀδw, |δ| about n ε k₀ and w the weights
-        // by which the others predict a point, |w|² up to 2 at the ends of these clouds.
+        // The README's variances are those at the queries, so the bound is derived here. k₀ − kᵀA⁻¹k moves by
+        // wᵀδw, where |δ| is about n ε k₀ and w are the weights by which the others predict a point. |w|² is
+        // up to 2 at the ends of these clouds.
         let rounding = 2.0 * EPS * n as f64 * self.kernel.at_zero() / ALLOWED;
         self.check_within("leave-one-out variance", &found, &expected["variance"], rounding);
     }

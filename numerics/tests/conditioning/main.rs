@@ -1,7 +1,7 @@
-//! Ill-conditioned problems: the answer is right, flagged or refused, never finite and wrong in silence.
+//! Ill-conditioned problems: the answer is right, flagged or refused, but never silently wrong.
 //!
-//! Through the public API of the numerics alone. Clouds and random numbers are seeded; every tolerance says where it comes
-//! from.
+//! Tests use only the public API of the numerics. Clouds and random numbers are seeded. Every
+//! tolerance states its origin.
 
 #[path = "../common/mod.rs"]
 mod common;

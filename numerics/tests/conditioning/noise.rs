@@ -1,4 +1,4 @@
-//! Noise variances that differ from point to point, zeros among them.
+//! Noise variances that differ from point to point, some of them zero.
 
 use std::sync::Arc;
 
@@ -10,7 +10,8 @@ use gramian_numerics::sums::regularization::Regularization;
 
 use crate::support::*;
 
-/// Every third point has noise; the others are known exactly, and more of them than the kernel can tell apart.
+/// Fits a wave at 512 points, every third with noise. The others are exact, and more than
+/// the kernel can tell apart.
 fn mixed(variance: f64) -> Interpolant {
     let points = fibonacci_sphere(512);
     let variances = (0..512).map(|i: usize| if i.is_multiple_of(3) { variance } else { 0.0 }).collect();
@@ -19,7 +20,7 @@ fn mixed(variance: f64) -> Interpolant {
         .and_then(|system| Solver::dense(system, &Unobserved));
     let factor = Arc::new(factor.unwrap());
     assert_eq!(factor.method(), Method::PivotedCholesky);
-    // Only the noisy points are off the wave, by less than their standard deviation.
+    // Only the noisy points deviate from the wave, by less than their standard deviation.
     let error = |i: usize| if i.is_multiple_of(3) { variance.sqrt() * (1.7 * i as f64).sin() } else { 0.0 };
     let values: Vec<f64> = points.points().enumerate().map(|(i, x)| wave(x) + error(i)).collect();
     Interpolant::fit(factor, &values, &Unobserved).unwrap()
@@ -27,17 +28,18 @@ fn mixed(variance: f64) -> Interpolant {
 
 #[test]
 fn exact_points_are_met_and_noisy_ones_smoothed() {
-    // On the sphere: beside it even exact values determine u only as far as its norm does.
+    // Queries lie on the sphere: off it even exact values determine u only as far as its norm does.
     let queries = random_sphere(40, &mut Random(3));
     let expected = waves(&queries);
     for variance in [1e-10, 1e-4, 1.0, 1e6] {
         let u = mixed(variance);
-        // 341 exact points determine the wave to 1e-7 of its size, as they would alone; noise has no say beside them.
+        // 341 exact points determine the wave to 1e-7 of its size, as they would alone. The
+        // noisy ones change nothing.
         let error = relative_distance(&jets(&u, &queries)[0], &expected);
         println!("variance {variance:e}: error {error:.1e}, residual {:.1e}", u.solution.relative_residual);
         assert!(error < 1e-6, "variance {variance:e}: {error:e}");
         assert!(u.solution.relative_residual < 1e-9);
-        // D Λ is the misfit: the noisy points are missed by just what the fit says.
+        // The exact points are met as closely, whatever the noise of the others.
         let misfit = jets(&u, u.solver.cloud())[0].clone();
         let exact: Vec<f64> = (0..512).filter(|i: &usize| !i.is_multiple_of(3)).map(|i| misfit[i]).collect();
         let wanted: Vec<f64> = (0..512)

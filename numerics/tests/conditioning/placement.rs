@@ -1,4 +1,4 @@
-//! Far from the origin, tiny and huge: only differences of coordinates against ℓ count.
+//! Clouds far from the origin, tiny and huge ones: only coordinate differences relative to ℓ matter.
 
 use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
@@ -10,7 +10,7 @@ use crate::support::*;
 
 const N: usize = 120;
 
-/// Everything that is answered of a fit, one list each, with the power of the length unit it is measured in.
+/// All answers of a fit, one list each, with the power of the length unit in which each is measured.
 fn answers(
     points: &Cloud,
     queries: &Cloud,
@@ -40,7 +40,7 @@ fn mapped(cloud: &Cloud, f: impl Fn(f64) -> f64) -> Cloud {
     Cloud::new(cloud.coordinates().iter().map(|&x| f(x)).collect(), cloud.dimension()).unwrap()
 }
 
-/// Kernels that Cholesky answers and, at α = 0, one that needs the fallback.
+/// Kernels that Cholesky handles and, at α = 0, one that needs the fallback: family, ℓ and α.
 fn cases() -> impl Iterator<Item = (Family, f64, f64)> {
     FAMILIES.into_iter().filter(|&family| !kernel(family, 1.0).has_kink()).flat_map(|family| {
         let length_scale = if matches!(family, Family::Wendland { .. }) { 2.0 } else { 0.6 };
@@ -50,8 +50,9 @@ fn cases() -> impl Iterator<Item = (Family, f64, f64)> {
 
 #[test]
 fn a_cloud_at_a_million_is_answered_as_at_the_origin() {
-    // Rounding moves coordinates near 1e6 by up to 6e-11. Both clouds are made of the rounded coordinates, whose differences
-    // are exact in float64 (all are multiples of 2^-33 below 2^21), and so the answers agree in every bit.
+    // Rounding moves coordinates near 1e6 by up to 6e-11. Both clouds are made of the rounded
+    // coordinates, which are multiples of 2^-33 below 2^21. Their differences are exact in float64, so
+    // the answers agree in every bit.
     let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 5));
     let values = waves(&points);
     let far = [&points, &queries].map(|cloud| mapped(cloud, |x| x + 1e6));
@@ -90,8 +91,9 @@ fn powers_of_two_as_unit_change_nothing() {
 fn any_unit_from_a_millionth_to_a_million_changes_rounding_alone() {
     let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 7));
     let values = waves(&points);
-    // α = 1e-6: the condition is at most ‖K‖₁/α = 1e8. Rounding of the coordinates moves entries of K by a few ε, weights by
-    // n ε times the condition, and what is summed from them by no more; the two derivatives lose two digits.
+    // With α = 1e-6 the condition is at most ‖K‖₁/α = 1e8. Rounding of the coordinates moves entries of K by
+    // a few ε, weights by n ε times the condition, and sums over them by no more. Derivatives lose two
+    // further digits, hence the factor 100.
     for (family, length_scale, alpha) in cases().filter(|case| case.2 > 0.0) {
         let expected = answers(&points, &queries, kernel(family, length_scale), alpha, &values);
         let condition = 1.0 / factorize(&points, kernel(family, length_scale), alpha).reciprocal_condition();

@@ -1,4 +1,4 @@
-//! `minimum_alpha` is an α that helps: with it Cholesky succeeds and what needs its factor is answered.
+//! The remedy `minimum_alpha`: with it Cholesky succeeds, and answers that need its factor are given.
 
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::function::posterior::{log_marginal_likelihood, variances};
@@ -9,7 +9,7 @@ use gramian_numerics::solver::Method;
 
 use crate::support::*;
 
-/// The least α that the refusal of variances names, and the check that it suffices.
+/// Fits without α, takes the α that the refusal of variances names, and checks that it suffices.
 fn check_remedy(points: &Cloud, kernel: Kernel, what: &str) {
     let factor = factorize(points, kernel.clone(), 0.0);
     assert_eq!(factor.method(), Method::PivotedCholesky, "{what}");
@@ -20,13 +20,13 @@ fn check_remedy(points: &Cloud, kernel: Kernel, what: &str) {
         panic!("{what}: {refusal}");
     };
     assert!(point < points.n_points(), "{what}: point {point}");
-    // 4 n ε ‖K‖₁, which is at most 4 n² ε k₀.
+    // The named α is 4 n ε ‖K‖₁, which is at most 4 n² ε k₀.
     let n = points.n_points() as f64;
     assert!(minimum_alpha > 0.0 && minimum_alpha <= 4.01 * n * n * EPS * kernel.at_zero(), "{what}");
     let remedied = factorize(points, kernel.clone(), minimum_alpha);
     assert_eq!(remedied.method(), Method::Cholesky, "{what}");
     let latent = variances(&remedied, points, &Unobserved).unwrap().latent;
-    // At a point known to within α the variance is at most α, beside the rounding of k₀.
+    // The variance at a point known to within α is at most α, plus the rounding of k₀.
     assert!(largest(&latent) <= minimum_alpha + 4.0 * n * EPS * kernel.at_zero(), "{what}");
     let values = vec![1.0; points.n_points()];
     let u = fit(&remedied, &values);

@@ -12,7 +12,7 @@ fn smooth_families() -> impl Iterator<Item = Family> {
     FAMILIES.into_iter().filter(|&family| !kernel(family, 1.0).has_kink())
 }
 
-/// Finite at regular queries, unit normals, nothing but flags elsewhere.
+/// Checks that queries with an answer have unit normals and finite curvatures.
 fn assert_finite(geometry: &Geometry, what: &str) {
     let curvatures = geometry.curvatures(&Unobserved).unwrap();
     let d = geometry.dimension();
@@ -41,9 +41,10 @@ fn one_point_is_met_and_its_level_surfaces_are_spheres() {
                 if d == 1 {
                     continue;
                 }
-                // The gradient vanishes at the maximum of u, and no surface passes there.
+                // The gradient vanishes at the maximum of u, so no surface passes there.
                 assert_eq!(geometry(&factor, &point).is_null(), [true], "{family:?} in dimension {d}");
-                // Around it the level surfaces are spheres: normal outwards, all curvatures 1/distance.
+                // Around the point the level surfaces are spheres: normal outwards,
+                // all curvatures 1/distance.
                 let sphere = geometry(&factor, &at(0.5));
                 let curvatures = sphere.curvatures(&Unobserved).unwrap();
                 assert!((sphere.normal(0)[d - 1] - 1.0).abs() < 8.0 * EPS, "{family:?}");
@@ -67,7 +68,8 @@ fn as_many_points_as_dimensions_are_met() {
     }
 }
 
-/// 40 points without thickness, in the unit square or on a segment of it; as queries the points, then points beside them.
+/// 40 points without thickness, in the unit square or on a segment of it. Queries are the points, then points
+/// displaced from them by `off`.
 fn flat(point: impl Fn(f64, f64) -> [f64; 3], off: [f64; 3]) -> (Cloud, Cloud) {
     let mut random = Random(11);
     let points: Vec<[f64; 3]> = (0..40).map(|_| point(random.uniform(), random.uniform())).collect();
@@ -76,7 +78,7 @@ fn flat(point: impl Fn(f64, f64) -> [f64; 3], off: [f64; 3]) -> (Cloud, Cloud) {
     (cloud(&points), cloud(&queries))
 }
 
-/// Fits waves and the constant at several α; `off` is the unit vector from the points to the queries beside them.
+/// Fits waves at several α. `off` is the unit vector from the points to the queries beside them.
 fn check_flat(points: &Cloud, queries: &Cloud, off: [f64; 3]) {
     let values = waves(points);
     for family in smooth_families() {
@@ -85,7 +87,7 @@ fn check_flat(points: &Cloud, queries: &Cloud, off: [f64; 3]) {
             let what = format!("{family:?}, α = {alpha}");
             let factor = factorize(points, kernel(family, length_scale), alpha);
             let u = fit(&factor, &values);
-            // α moves u at the points by α|Λ|; what Cholesky and the fallback leave is far less than 1e-6.
+            // α moves u at the points by α|Λ|. Cholesky and the fallback leave far less than 1e-6.
             let weights = u.solution.weights.iter().map(|w| w * w).sum::<f64>().sqrt();
             let error = distance(&jets(&u, points)[0], &values);
             assert!(error < 1e-6 + alpha * weights, "{what}: {error:e}");
@@ -94,9 +96,11 @@ fn check_flat(points: &Cloud, queries: &Cloud, off: [f64; 3]) {
     }
 }
 
-/// u is even across the points: its gradient there lies in the line or plane and is no normal of anything. By itself, without
-/// the offset model, u has no answer there. Beside the points level surfaces wrap the cloud, and normals point away from
-/// it, turned by less than 66° at its ends.
+/// Checks the geometry of a cloud without thickness, by the signature function without the offset model.
+///
+/// u is even across the points, so its gradient there lies in the line or plane and is no normal: all
+/// are null. Beside the points level surfaces wrap the cloud. Normals point away from it, turned by
+/// less than 66° at its ends.
 fn check_flat_geometry(geometry: &Geometry, off: [f64; 3], what: &str) {
     assert_finite(geometry, what);
     let (on, beside) = geometry.is_null().split_at(geometry.n_queries() / 2);

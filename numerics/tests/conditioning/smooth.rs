@@ -1,4 +1,5 @@
-//! Gauss on 512 points of the sphere at α = 0: condition 1e19, far beyond what Cholesky can do (numerics.md, Fit 2).
+//! Gauss on 512 points of the sphere at α = 0: a condition of 1e19, where Cholesky
+//! fails (numerics.md, Fit 2).
 
 use std::f64::consts::PI;
 
@@ -10,10 +11,11 @@ use gramian_numerics::surface::operators::{laplace_beltrami, surface_gradient};
 
 use crate::support::*;
 
-/// What the issue asks for; numpy reached 8e-7, 9e-7 and 4e-6 over five orders, this code 5e-7, 7e-7 and 3e-6.
+/// Required relative error of value, gradient and Laplacian. Over five orders of the points numpy reached
+/// 8e-7, 9e-7 and 4e-6. This code reached 5e-7, 7e-7 and 3e-6.
 const TOLERANCE: f64 = 5e-6;
 
-/// `f = sin π(1 + 2x₃)` with its surface gradient and Laplace–Beltrami on the unit sphere (errata.md, 4).
+/// `f = sin π(1 + 2x₃)`, its surface gradient and its Laplace–Beltrami on the unit sphere (errata.md, 4).
 fn exact(x: &[f64]) -> (f64, [f64; 3], f64) {
     let (sin, cos) = (PI * (1.0 + 2.0 * x[2])).sin_cos();
     let gradient = [-x[0] * x[2], -x[1] * x[2], 1.0 - x[2] * x[2]].map(|g| 2.0 * PI * cos * g);
@@ -62,7 +64,7 @@ fn the_fallback_keeps_the_memory_of_cholesky_or_beyond_a_quarter_of_the_rank_all
         let factor = factorize(&points, kernel(Family::Gauss, length_scale), 0.0);
         assert_eq!(factor.method(), Method::PivotedCholesky);
         assert!(ranks.contains(&factor.rank()), "{} of {n}", factor.rank());
-        // The order of the points comes on top, and what the allocator rounds up: two slices of 64 KiB.
+        // Added are the order of the points and the rounding of the allocator: two slices of 64 KiB.
         let needed = if factor.rank() > n / 4 {
             choose(n, 3, usize::MAX).at_most.n_bytes
         } else {

@@ -1,4 +1,4 @@
-//! Clouds, fits and comparisons that the tests of conditioning share.
+//! Clouds and comparisons shared by the tests of conditioning.
 
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
@@ -14,7 +14,7 @@ pub use crate::common::random::Random;
 
 pub const EPS: f64 = f64::EPSILON;
 
-/// One kernel of every smoothness, from a kink to analytic.
+/// Kernels of every smoothness, from a kink to analytic.
 pub const FAMILIES: [Family; 7] = [
     Family::Matern { order: 0 },
     Family::Matern { order: 1 },
@@ -39,7 +39,7 @@ pub fn jets(u: &Interpolant, queries: &Cloud) -> [Vec<f64>; 3] {
 }
 
 impl Random {
-    /// Fisher–Yates.
+    /// Shuffles by Fisher–Yates.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, (self.uniform() * (i + 1) as f64) as usize);
@@ -47,7 +47,7 @@ impl Random {
     }
 }
 
-/// Points of the sphere moved inwards and outwards: off every cloud on it.
+/// Random points at radii from 0.9 to 1.1, off every cloud on the unit sphere.
 pub fn around_sphere(n: usize, seed: u64) -> Cloud {
     let mut random = Random(seed);
     let mut point = || {
@@ -57,12 +57,12 @@ pub fn around_sphere(n: usize, seed: u64) -> Cloud {
     Cloud::new((0..n).flat_map(|_| point()).collect(), 3).unwrap()
 }
 
-/// Largest magnitude; NaN if there is one, so that no comparison with a tolerance passes it.
+/// Largest magnitude, or NaN if any entry is NaN, so that no comparison with a tolerance passes it.
 pub fn largest(a: &[f64]) -> f64 {
     a.iter().fold(0.0, |a, &b| if b.is_nan() || b.abs() > a { b.abs() } else { a })
 }
 
-/// Largest difference of two lists of one length.
+/// Largest difference of two lists of equal length.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     largest(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>())

@@ -1,7 +1,7 @@
 //! Two points 1e-9 apart: smooth kernels cannot tell them apart in float64, kernels with a kink can.
 //!
-//! With `δ = 1e-9` a kernel that is `1 − c r^s` near 0 keeps `2c δ^s` of the second point's diagonal entry: 1e-9 for a kink
-//! (s = 1), 1e-18 and so nothing for all others (s = 2).
+//! Near 0 such a kernel is `1 − c r^s`. With `δ = 1e-9` the diagonal entry of the second point keeps
+//! `2c δ^s`: 1e-9 for a kink (s = 1), but 1e-18, below rounding, for all others (s = 2).
 
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::function::interpolant::Interpolant;
@@ -16,7 +16,7 @@ use crate::support::*;
 const N: usize = 150;
 const TWINS: [usize; 2] = [70, N];
 
-/// The sphere, and the sphere with a second point 1e-9 beside point 70, along the surface.
+/// The sphere alone, and the sphere with a second point 1e-9 from point 70, along the surface.
 fn clouds() -> (Cloud, Cloud) {
     let alone = fibonacci_sphere(N);
     let mut points = rows::<3>(&alone);
@@ -45,8 +45,9 @@ fn values_of_a_smooth_function_give_the_answer_of_one_point() {
         assert_eq!(factor.method() == Method::Cholesky, has_kink(family), "{family:?}");
         let u = fit(&factor, &vec![1.0; N + 1]);
         let found = jets(&u, &queries);
-        // u of one point is 1 to 1e-9 |∇u| at the other. What that moves elsewhere is the same multiplied by the cardinal
-        // function of the twin, at most 1 for a kink; derivatives scale with the distance of the queries, 0.01 and more.
+        // u of one point is 1 to 1e-9 |∇u| at the other. Elsewhere this moves u by the same, times the
+        // cardinal function of the twin, which is at most 1 for a kink. Derivatives scale with the distance
+        // of the queries, at least 0.01.
         let change: Vec<f64> =
             (0..3).map(|order| relative_distance(&found[order], &expected[order])).collect();
         assert!(change[0] < 1e-8 && change[1] < 1e-7 && change[2] < 1e-5, "{family:?}: {change:?}");
@@ -65,7 +66,7 @@ fn values_that_differ_are_met_by_a_kink_and_refused_by_smooth_kernels() {
             match try_fit(&factor, &values) {
                 Ok(u) => {
                     assert!(has_kink(family), "{what}: a slope of {:e}", difference / 1e-9);
-                    // Weights of difference/δ, and their rounding.
+                    // Weights are difference/δ, and this is their rounding.
                     let rounding = 100.0 * EPS * (1.0 + difference * 1e9);
                     assert!(distance(&at_points(&u), &values) < rounding, "{what}");
                 }
@@ -78,7 +79,8 @@ fn values_that_differ_are_met_by_a_kink_and_refused_by_smooth_kernels() {
     }
 }
 
-/// The residual is the reason, and `minimum_alpha` is a remedy: between two values that disagree lies their mean.
+/// Checks that the residual is the reason, and that `minimum_alpha` is a remedy: with it, u at two points
+/// whose values disagree is the mean of these values.
 fn check_refusal(twins: &Cloud, kernel: Kernel, values: &[f64], error: &NumericsError) {
     use NotDefinite::{BackwardError, Residual};
     let NumericsError::NotPositiveDefinite { reason: Residual { .. } | BackwardError { .. }, minimum_alpha } =
@@ -106,8 +108,9 @@ fn a_whole_cloud_twice_has_the_rank_of_one() {
     let kernel = kernel(Family::Matern { order: 2 }, 0.7);
     let factor = factorize(&cloud(&twice), kernel, 0.0);
     assert_eq!((factor.method(), factor.rank()), (Method::PivotedCholesky, 100));
-    // The twins lie 1e-9 off the surface u = 1 of the others. No function of the kernel meets both layers: that would need
-    // a gradient of zero at 100 points. It is refused, or it is 1 to 1e-8 on both.
+    // The twins lie 1e-9 off the surface u = 1 of the others. No function of the kernel meets
+    // both layers, since that would need a gradient of zero at 100 points. So the fit is refused,
+    // or it is 1 to 1e-8 on both.
     match try_fit(&factor, &vec![1.0; 200]) {
         Ok(u) => assert!(u.solution.misfit < 1e-7),
         Err(error) => assert!(matches!(error, NumericsError::NotPositiveDefinite { .. }), "{error}"),

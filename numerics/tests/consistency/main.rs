@@ -1,10 +1,13 @@
-//! Every solver against the dense one: over every kernel that it accepts, every verb that it serves (after tinygp's "consistent
-//! with direct"), and the refusal of every verb that it does not.
+//! Consistency of solvers: each is compared with the dense one over every kernel that it accepts
+//! and every verb that it serves (after tinygp's "consistent with direct"). Every verb that it does
+//! not serve must be refused.
 //!
-//! A solver is one line of [`solvers`]. The dense one is held against itself on the same points in another order, so that
-//! no two numbers come from the same operations. The local solver has no function that it could be asked for here: a cloud of its
-//! neighbours alone has the dense answers for every kernel (src/function/moving/tests.rs), and what larger clouds lose is in
-//! moving.rs.
+//! [`solvers`] lists them, one line each. The dense solver is compared with itself on the same points in
+//! another order, so that no two numbers come from the same operations.
+//!
+//! The local solver is not listed, because it has no single function to evaluate here. On a cloud of its
+//! neighbours alone it gives the dense answers for every kernel (src/function/moving/tests.rs). Its error on
+//! larger clouds is tested in moving.rs.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -23,7 +26,7 @@ use gramian_numerics::solver::{Solver, System};
 use gramian_numerics::sums::regularization::Regularization;
 use verbs::{Setting, VERBS};
 
-/// A solver, how far its answers may lie from the dense one's beyond rounding, and the verbs that it refuses.
+/// A solver, the difference from the dense answers allowed beyond rounding, and the verbs that it refuses.
 struct Candidate {
     name: &'static str,
     make: fn(System) -> Result<Solver, NumericsError>,
@@ -38,7 +41,7 @@ fn solvers() -> Vec<Candidate> {
 
 const N_POINTS: usize = 150;
 
-/// Where point i of the first order stands in the second: a permutation, since 149 is coprime to 150.
+/// The index in the second order of point i of the first: a permutation, since 149 is coprime to 150.
 fn shuffled(i: usize) -> usize {
     (i * 149 + 7) % N_POINTS
 }
@@ -51,7 +54,7 @@ fn every_solver_answers_as_the_dense_one() {
     let other = Cloud::new(other, 3).unwrap();
     for family in all_families() {
         let dense = (solvers()[0].make)(system(&cloud, family)).unwrap();
-        // What is lost in a solve: digits of the weights, and those of an answer that is small against its terms.
+        // A solve loses digits of the weights, and digits of answers that are small against their terms.
         let rounding = 100.0 * N_POINTS as f64 * f64::EPSILON / dense.reciprocal_condition();
         let dense = Setting { solver: Arc::new(dense), values: cloud.points().map(wave).collect() };
         for candidate in solvers() {
@@ -65,7 +68,7 @@ fn every_solver_answers_as_the_dense_one() {
                     continue;
                 }
                 let (Ok(expected), Ok(found)) = (&expected, &found) else {
-                    // Kernels with a kink have no derivatives at the points: both refuse, and alike.
+                    // Kernels with a kink have no derivatives at the points, so both solvers refuse.
                     assert!(is_kink(&expected) && is_kink(&found), "{context}: {expected:?}, {found:?}");
                     continue;
                 };
@@ -81,13 +84,13 @@ fn every_solver_answers_as_the_dense_one() {
     }
 }
 
-/// α of 1e-6 leaves half of the digits of the smoothest kernels.
+/// The system of a cloud with α = 1e-6, which leaves half of the digits of the smoothest kernels.
 fn system(cloud: &Cloud, family: Family) -> System {
     let kernel = Kernel::new(family, 0.9, 1.7).unwrap();
     System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-6)).unwrap()
 }
 
-/// Rows of one column per point, as the first order has the points.
+/// Reorders the columns of rows, one per point, to the first order of the points.
 fn in_first_order(rows: &[f64]) -> Vec<f64> {
     rows.chunks_exact(N_POINTS).flat_map(|row| (0..N_POINTS).map(|i| row[shuffled(i)])).collect()
 }

@@ -1,5 +1,5 @@
-//! The local solver against the dense one where neighbours are not all points: it has an error, and that is held to the deviation
-//! that the posterior has there anyway.
+//! The local solver against the dense one where neighbours are only some of the points. Its error must be
+//! small against the deviation that the posterior has anyway.
 
 use std::sync::Arc;
 
@@ -69,7 +69,7 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         assert!(means < tolerance, "{family:?}: means are off by {means} deviations");
         assert!(widths < 0.01, "{family:?}: deviations by {widths}");
         assert!(slopes < 0.03, "{family:?}: gradients by {slopes}");
-        // Fewer observations say less.
+        // Fewer observations leave a larger variance.
         assert!((0..m).all(|q| latent[q] >= deviations[q].powi(2) * (1.0 - 1e-9)), "{family:?}");
         assert_eq!(found.n_dependent, 0);
     }
@@ -78,10 +78,11 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
 #[test]
 fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
     let mut random = Random(12);
-    // As many points as a neighbourhood has at most: both posteriors are given the same values.
+    // A neighbourhood holds at least as many points as the cloud, so both posteriors
+    // condition on the same values.
     let cloud = Arc::new(random_cube(100, 3, &mut random));
     let values = noisy_values(&cloud, 0.1, &mut random);
-    // Among the points, and so far away that nothing but the mean is left.
+    // Queries among the points, and one so far away that only the mean is left.
     let mut queries = random_cube(20, 3, &mut random).coordinates().to_vec();
     queries.extend([9.0, -7.0, 8.0]);
     let queries = Cloud::new(queries, 3).unwrap();
@@ -105,7 +106,7 @@ fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
         let bars = JetDeviations::of(&dense, 1.0, &queries, 2, &Unobserved).unwrap();
         let jets = dense.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
         let near = |found: &[f64], expected: &[f64]| {
-            // Both lose some digits of what is left of a variance.
+            // Both solvers lose some digits where a variance is a small difference.
             assert_eq!(found.len(), expected.len());
             for (found, expected) in found.iter().zip(expected) {
                 assert!(
@@ -120,7 +121,7 @@ fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
         near(&deviations.values, &bars.values);
         near(&deviations.gradients, &bars.gradients);
         near(&deviations.hessians, &bars.hessians);
-        // Far away a mean that were known would leave the deviation of the process.
+        // With a known mean the deviation far away would be that of the process. The unknown mean adds to it.
         assert!(deviations.values[20] > 1.01 * 1.7f64.sqrt(), "{mean:?}");
     }
 }

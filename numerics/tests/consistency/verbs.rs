@@ -1,4 +1,4 @@
-//! What a solver is asked for, as numbers in an order that does not depend on that of the points.
+//! Verbs: questions to a solver, answered as numbers whose order does not depend on that of the points.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ type Outcome = Result<Vec<f64>, NumericsError>;
 pub struct Verb {
     pub name: &'static str,
     pub ask: fn(&Setting) -> Outcome,
-    /// Whether the answer has rows of one column per point.
+    /// Whether the answer consists of rows with one column per point.
     pub has_column_per_point: bool,
 }
 
@@ -66,7 +66,7 @@ pub const VERBS: [Verb; 13] = [
     }),
 ];
 
-/// On the sphere between the points, inside and outside.
+/// Three queries among the points: on the unit sphere, at radius 0.9 and at radius 1.2.
 fn queries() -> Cloud {
     let on_sphere = [[0.6, 0.8, 0.0], [0.0, -0.6, 0.8], [-0.48, 0.64, 0.6]];
     let scaled = [1.0, 0.9, 1.2].into_iter().zip(on_sphere);

@@ -4,7 +4,7 @@ use crate::common::random::Random;
 
 type Point = [f64; 3];
 
-/// A name, f, which grows outward, and half the sides of a box that holds the surface.
+/// A closed surface f = 0: its name, f, which grows outward, and the half sides of a box that holds it.
 pub type ClosedSurface = (&'static str, fn(Point) -> f64, Point);
 
 pub const CLOSED_SURFACES: [ClosedSurface; 22] = [
@@ -40,7 +40,7 @@ pub const CLOSED_SURFACES: [ClosedSurface; 22] = [
     ("bells", |x| 0.5 - bells(x), [1.0; 3]),
 ];
 
-/// n points of a surface by Newton's method from random places near it.
+/// n points of a surface, by Newton's method from random starts near it.
 pub fn sample(f: fn(Point) -> f64, half_sides: Point, n: usize, random: &mut Random) -> Vec<Point> {
     let mut points = Vec::with_capacity(n);
     while points.len() < n {
@@ -52,7 +52,7 @@ pub fn sample(f: fn(Point) -> f64, half_sides: Point, n: usize, random: &mut Ran
             (0..3).for_each(|c| x[c] -= value / square * g[c]);
         }
         let moved = norm([x[0] - start[0], x[1] - start[1], x[2] - start[2]]);
-        // Not a number where f has no gradient.
+        // NaN where f has no gradient fails both comparisons.
         if f(x).abs() < 1e-10 && moved < 0.04 {
             points.push(x);
         }
@@ -60,7 +60,7 @@ pub fn sample(f: fn(Point) -> f64, half_sides: Point, n: usize, random: &mut Ran
     points
 }
 
-/// The outward unit normal, right to 1e-8.
+/// The outward unit normal, accurate to 1e-8.
 pub fn outward_normal(f: fn(Point) -> f64, x: Point) -> Point {
     let g = gradient(f, x);
     let length = norm(g);
@@ -95,7 +95,7 @@ fn torus([x, y, z]: Point, radius: f64, tube: f64) -> f64 {
     (x.hypot(y) - radius).hypot(z) - tube
 }
 
-/// Radius of a body of revolution along x.
+/// Radius at x of a body of revolution about the x axis.
 fn neck(x: f64) -> f64 {
     (1.0 - x * x).max(0.0).sqrt() * (0.12 + 0.5 * x * x)
 }

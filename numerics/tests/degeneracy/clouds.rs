@@ -33,7 +33,7 @@ pub fn closed_curve(n: usize) -> Oriented {
 pub fn dumbbell(n: usize) -> Oriented {
     let square = |z: f64| 4.0 * (1.0 - z * z) * (z * z + 0.1);
     let slope = |z: f64| 8.0 * z * (0.9 - 2.0 * z * z);
-    // Area per dz is 2π √(r² + (r r′)²): equal shares of it.
+    // Area per dz is 2π √(r² + (r r′)²). Each point gets an equal share of it.
     let cells = 20_000;
     let middle = |i: usize| -1.0 + 2.0 * (i as f64 + 0.5) / cells as f64;
     let area = |z: f64| (square(z) + 0.25 * slope(z).powi(2)).sqrt();
@@ -53,7 +53,7 @@ pub fn dumbbell(n: usize) -> Oriented {
     }))
 }
 
-/// Points of a graph over [−1, 1]², on a grid of side², with upward normals.
+/// Points of a graph over [−1, 1]², on a grid of side² points, with upward normals.
 pub fn graph(side: usize, height: impl Fn(f64, f64) -> f64) -> Oriented {
     let step = 1e-5;
     Oriented::new(rows::<2>(&square_grid(side)).into_iter().map(|[x, y]| {
@@ -83,14 +83,14 @@ pub fn half_sphere(n: usize) -> Oriented {
     }))
 }
 
-/// A closed plate `[−1, 1]² × [0, thickness]` without its rim: two grids of side² points, normals away from one another.
+/// A plate `[−1, 1]² × [0, thickness]` without its rim: two grids of side² points, normals pointing apart.
 pub fn plate(side: usize, thickness: f64) -> Oriented {
     let square = rows::<2>(&square_grid(side));
     let layer = |z: f64, normal: f64| square.iter().map(move |&[x, y]| ([x, y, z], [0.0, 0.0, normal]));
     Oriented::new(layer(0.0, -1.0).chain(layer(thickness, 1.0)))
 }
 
-/// A flat square at a general position, and its unit normal.
+/// A flat square in general position with its unit normal: a grid, or as many random points.
 pub fn flat_square(side: usize, random: Option<&mut Random>) -> Oriented {
     let (u, v) = ([0.36, 0.48, -0.8], [-0.8, 0.6, 0.0]);
     let normal = [0.48, 0.64, 0.6];

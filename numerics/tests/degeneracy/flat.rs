@@ -1,4 +1,5 @@
-//! Surfaces without mean curvature, and open ones: the signature function has no gradient there, the offset model has.
+//! Open surfaces and those without mean curvature. The signature function has no gradient
+//! there, the offset model has.
 
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 use gramian_numerics::observer::Unobserved;
@@ -21,7 +22,7 @@ const FAMILIES: [(Family, f64); 6] = [
     (Family::InverseMultiquadric, 1.0),
 ];
 
-/// Either sign: an open surface has no outside.
+/// Smallest magnitude of the cosines. The sign does not count, since an open surface has no outside.
 fn smallest_cosine(found: &[Option<f64>]) -> f64 {
     found.iter().map(|cosine| cosine.map_or(0.0, f64::abs)).fold(1.0, f64::min)
 }
@@ -35,7 +36,7 @@ fn a_flat_square_has_no_curvature_and_one_normal() {
             assert!(surface.orientation().is_open, "{family:?}");
             let geometry = geometry(&surface, &CURVATURES);
             let found = cosines(&geometry, &cloud.normals);
-            // The plane passes through the points to rounding, and no term of the model prefers a side.
+            // The plane passes through the points to rounding, and no term of the model bends it to one side.
             assert!(smallest_cosine(&found) > 1.0 - 1e-9, "{family:?}: {}", smallest_cosine(&found));
             let wrong = n_wrong(&found);
             assert!(wrong == 0 || wrong == found.len(), "{family:?}: normals on both sides");
@@ -47,7 +48,7 @@ fn a_flat_square_has_no_curvature_and_one_normal() {
     }
 }
 
-/// On a square the normals of the signature function itself are null, not tangential.
+/// Normals of the signature function alone would lie in the plane of a square. They must be null instead.
 #[test]
 fn the_signature_function_alone_gives_no_normals_of_a_flat_square() {
     let cloud = flat_square(15, Some(&mut Random(8)));
@@ -74,7 +75,7 @@ fn a_plane_with_a_bump_has_normals_on_one_side() {
     }
 }
 
-/// Unflagged curvatures of a cloud against the exact ones for outward normals, relative to the larger of them.
+/// Compares curvatures without a flag to exact ones for outward normals, relative to the larger exact one.
 fn check_curvatures(cloud: &Oriented, exact: [f64; 2], share_unflagged: f64, label: &str) {
     for (family, length_scale) in FAMILIES {
         let surface = surface_of(cloud, family, length_scale);
@@ -104,7 +105,7 @@ fn cylinders_and_half_spheres_are_right_or_flagged() {
     check_curvatures(&half_sphere(500), [1.0, 1.0], 0.8, "half sphere");
 }
 
-/// Curvatures do not depend on the unit, nor on where the cloud is.
+/// Rescued answers depend neither on the unit nor on the position of the cloud.
 #[test]
 fn rescued_answers_scale_and_move_with_the_cloud() {
     let cloud = flat_square(12, Some(&mut Random(9)));
@@ -117,7 +118,8 @@ fn rescued_answers_scale_and_move_with_the_cloud() {
             let surface = surface(&points, 3, Family::Gauss, scale, 1e-10);
             let geometry = Geometry::of(&surface, &query, &CURVATURES, &Unobserved).unwrap();
             let principal = geometry.curvatures(&Unobserved).unwrap().principal;
-            // At 1e4 coordinates have 12 digits, second differences over a spacing of 0.1 ten.
+            // Shifted by 1e4, coordinates have 12 digits left, and second differences over
+            // a spacing of 0.1 have ten.
             let tolerance = if shift == 0.0 { 5e-3 } else { 2e-2 };
             let along = geometry.normal(0)[2].signum() * oriented.normals[middle][2].signum();
             for (k, sign) in principal.iter().zip([-1.0, 1.0]) {
@@ -139,7 +141,7 @@ fn beyond_the_admitted_work_answers_are_null() {
     assert_eq!(reasons, [DegeneracyReason::UnaffordableRescue; 134]);
 }
 
-/// The gradient of the signature function points inward, whichever function answers.
+/// Normals of `Orientation::Gradient` point inward here, whichever function answers.
 #[test]
 fn the_gradient_side_of_the_offset_model_is_that_of_the_signature_function() {
     let cloud = half_sphere(300);

@@ -1,4 +1,4 @@
-//! Where geometry is doubtful: right, or flagged.
+//! Geometry in doubtful cases: answers are right, or flagged.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! Normals of closed surfaces: right, or flagged.
+//! Normals of closed surfaces: they are right, or flagged.
 
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::observer::Unobserved;
@@ -11,18 +11,18 @@ use super::common::fits::{factorize, kernel};
 use super::common::random::Random;
 use super::sweep::KERNELS;
 
-/// Cosine of 30°.
+/// Cosine of 30°, beyond which a normal counts as off.
 const OFF: f64 = 0.866;
 
-/// How normals at the points turned out.
+/// Counts of normals at the points, by accuracy and flag.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NormalTally {
     pub n_points: usize,
     pub n_flagged: usize,
-    /// Lines off by 30°, with a flag and without.
+    /// Normals off by more than 30° as lines, with a flag (here) and without (`n_off`).
     pub n_off_flagged: usize,
     pub n_off: usize,
-    /// Opposite to the truth without a flag, as lines right to 30°.
+    /// Normals without a flag that are right to 30° as lines but point inward.
     pub n_flipped: usize,
 }
 
@@ -42,7 +42,8 @@ impl NormalTally {
     }
 }
 
-/// The normals of n random points of one surface, moved by noise, with one of the kernels at `scale` times its length scale.
+/// Counts normals at n random points of one surface, moved by noise of this deviation per coordinate. The
+/// kernel is number `at` of [`KERNELS`], with `scale` times its length scale.
 pub fn tally(surface: ClosedSurface, at: usize, scale: f64, n: usize, noise: f64) -> NormalTally {
     let (_, f, half_sides) = surface;
     let mut random = Random(77 + n as u64);

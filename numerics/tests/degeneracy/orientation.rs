@@ -45,7 +45,7 @@ fn the_dumbbell_has_no_wrong_sign() {
                 assert!(!surface.orientation().is_open);
             }
         }
-        // There is something to repair.
+        // The repair has something to do: more than a twentieth of the points were flipped.
         let narrow = surface_of(&cloud, Family::Gauss, 0.3);
         assert!(narrow.orientation().n_flipped * 20 > n, "{:?}", narrow.orientation());
     }
@@ -53,7 +53,7 @@ fn the_dumbbell_has_no_wrong_sign() {
 
 #[test]
 fn the_sides_of_a_thin_plate_point_apart() {
-    // Thickness from half of the spacing (0.1) up to three spacings.
+    // Thickness from half a spacing (0.1) up to three spacings.
     for thickness in [0.05, 0.1, 0.3] {
         let cloud = plate(21, thickness);
         for family in [Family::Gauss, Family::Laplace { epsilon: 1.0 }] {

@@ -27,7 +27,7 @@ const AXES: [f64; 3] = [1.0, 0.7, 0.5];
 const TUBE: f64 = 0.4;
 
 impl Shape {
-    /// n points, at random or regular: Fibonacci lattices, and a grid of the next smaller square number.
+    /// n points at random, or regular: Fibonacci lattices, and grids of the largest square number up to n.
     pub fn sample(self, n: usize, random: Option<&mut Random>) -> Vec<[f64; 3]> {
         match self {
             Self::Sphere => rows(&sphere(n, random)),
@@ -74,8 +74,8 @@ impl Shape {
         g.map(|c| c / length)
     }
 
-    /// Principal curvatures for the outward normal, ascending: from mean and Gaussian curvature of an implicit surface
-    /// (Goldman 2005).
+    /// Principal curvatures for the outward normal, ascending, from the mean and Gaussian curvature of an
+    /// implicit surface (Goldman 2005).
     pub fn curvatures(self, x: [f64; 3]) -> [f64; 2] {
         let (g, h) = self.differential(x);
         let square: f64 = g.iter().map(|c| c * c).sum();
@@ -125,7 +125,7 @@ fn on_torus(turn: f64, v: f64) -> [f64; 3] {
     [rho * u.cos(), rho * u.sin(), TUBE * v.sin()]
 }
 
-/// The angle around the tube below which this share of the area lies: `v + R₂ sin v = 2π share`.
+/// The angle around the tube below which the given share of the area lies: `v + R₂ sin v = 2π share`.
 fn angle_of_share(share: f64) -> f64 {
     let mut v = 2.0 * PI * share;
     for _ in 0..60 {

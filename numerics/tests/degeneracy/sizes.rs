@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::defaults::Purpose;
 use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
@@ -31,7 +31,7 @@ fn geometry(surface: &Surface, cloud: &Cloud, has_deviations: bool) -> Geometry 
     Geometry::of(surface, cloud, &request, &Unobserved).unwrap()
 }
 
-/// Curvatures, normals and deviations in units of the size, and the queries with a flag.
+/// Curvatures, normals and deviations in units of `size`, and the queries with a flag.
 fn answers(geometry: &Geometry, size: f64) -> (Vec<f64>, Vec<usize>) {
     let curvatures = geometry.curvatures(&Unobserved).unwrap();
     let lengths = curvatures.principal.iter().map(|kappa| kappa * size);
@@ -52,14 +52,15 @@ fn the_unit_of_length_changes_neither_answers_nor_flags() {
         let scaled = Arc::new(Cloud::new(scaled, 3).unwrap());
         answers(&geometry(&surface(&scaled), &scaled, has_deviations), size)
     };
-    // Squares of second derivatives, and fourth powers, leave float64 below 1e-77 and 1e-38. By powers of 2 nothing is rounded otherwise.
+    // Squares of second derivatives overflow float64 at sizes below 1e-77, and fourth powers below 1e-38.
+    // The sizes are powers of 2, which change no other rounding.
     for (surface, has_deviations) in [(dense as fn(&Arc<Cloud>) -> Surface, false), (local, true)] {
         let (expected, flags) = at(1.0, surface, has_deviations);
         for size in [-360, -260, -130, 200].map(|power| 2f64.powi(power)) {
             let (found, found_flags) = at(size, surface, has_deviations);
             assert_eq!(flags, found_flags, "{size}");
             for (expected, found) in expected.iter().zip(found) {
-                // Rounding, times the condition of a fit.
+                // Rounding times the condition of a fit.
                 assert!(
                     (expected - found).abs() < 1e-7 * (1.0 + expected.abs()),
                     "{size}: {expected} {found}"
@@ -69,7 +70,7 @@ fn the_unit_of_length_changes_neither_answers_nor_flags() {
     }
 }
 
-/// A unit sphere, and beside it one of another radius, 400 points each.
+/// Two spheres of 400 points each: the unit sphere, and one of another radius beside it.
 fn two_spheres(radius: f64) -> Arc<Cloud> {
     let sphere = fibonacci_sphere(400);
     let other = sphere.points().flat_map(|x| [1.5 + radius * x[0], radius * x[1], radius * x[2]]);
@@ -91,7 +92,7 @@ fn two_sizes_in_one_cloud_are_right_from_the_nearest_points_and_flagged_from_all
                 let x = cloud.point(i);
                 let normal = geometry.normal(i);
                 let along = (normal[0] * (x[0] - centre) + normal[1] * x[1] + normal[2] * x[2]) / size;
-                // 30°, and half.
+                // 30° for normals, and half of a curvature.
                 assert!(along > 0.866, "{radius} {i}: {along}");
                 for kappa in &curvatures.principal[2 * i..2 * i + 2] {
                     assert!(

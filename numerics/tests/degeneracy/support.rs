@@ -1,4 +1,4 @@
-//! The library's answers for a cloud.
+//! Surfaces and geometry of test clouds, by the library.
 
 use gramian_numerics::kernel::Family;
 use gramian_numerics::observer::Unobserved;
@@ -23,7 +23,7 @@ pub fn geometry(surface: &Surface, request: &GeometryRequest) -> Geometry {
     Geometry::of(surface, surface.cloud(), request, &Unobserved).unwrap()
 }
 
-/// Cosines of the normals with the true ones, `None` where there is no answer.
+/// Cosines between the found and the true normals, `None` where the answer is null.
 pub fn cosines(geometry: &Geometry, truth: &[Vec<f64>]) -> Vec<Option<f64>> {
     let cosine = |(query, normal): (usize, &Vec<f64>)| {
         let found = geometry.normal(query);
@@ -32,7 +32,7 @@ pub fn cosines(geometry: &Geometry, truth: &[Vec<f64>]) -> Vec<Option<f64>> {
     truth.iter().enumerate().map(cosine).collect()
 }
 
-/// How many answers point inward.
+/// Counts the answers that point inward.
 pub fn n_wrong(cosines: &[Option<f64>]) -> usize {
     cosines.iter().flatten().filter(|&&cosine| cosine <= 0.0).count()
 }

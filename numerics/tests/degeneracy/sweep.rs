@@ -1,9 +1,10 @@
-//! Curvatures of every shape, kernel, size and sampling against the exact ones, and how many of the wrong ones are flagged.
+//! Curvatures of every shape, kernel, size and sampling against exact ones, with
+//! counts of wrong ones and flags.
 
 use std::sync::Arc;
 
-use gramian_numerics::defaults::Purpose;
 use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
@@ -19,7 +20,7 @@ use super::common::fits::{default_kernel_and_alpha, factorize, kernel, surface};
 use super::common::random::Random;
 use super::shapes::Shape;
 
-/// Seven kernels, each with the length scale at which it is about as wide as the Gauss kernel at 1.
+/// Seven kernels, each with the length scale at which it is about as wide as the Gauss kernel with ℓ = 1.
 pub const KERNELS: [(&str, Family, f64); 7] = [
     ("gauss", Family::Gauss, 1.0),
     ("laplace, epsilon 1", Family::Laplace { epsilon: 1.0 }, 1.0),
@@ -32,7 +33,7 @@ pub const KERNELS: [(&str, Family, f64); 7] = [
 
 pub const SIZES: [usize; 3] = [100, 300, 1000];
 
-/// One cloud with one kernel.
+/// A shape, its sampling, and a kernel.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     pub shape: Shape,
@@ -41,21 +42,21 @@ pub struct Case {
     pub is_random: bool,
 }
 
-/// How the answers of some queries turned out.
+/// Counts of answers by accuracy and flag.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tally {
     pub queries: usize,
     pub null: usize,
     pub flagged: usize,
     pub offset: usize,
-    /// Served without a flag, and off by more than 10 % or 50 %.
+    /// Answers without a flag that are off by more than 10 %.
     pub missed_10: usize,
     pub missed_50: usize,
-    /// Flagged numbers that are off by more than 50 %.
+    /// Flagged answers that are off by more than 50 %.
     pub caught_50: usize,
-    /// Flagged numbers that are right to 10 %.
+    /// Flagged answers that are right to 10 %.
     pub false_alarms: usize,
-    /// Greatest error without a flag.
+    /// Greatest error of an answer without a flag.
     pub worst: f64,
 }
 
@@ -93,7 +94,7 @@ pub fn cases() -> Vec<Case> {
 }
 
 impl Case {
-    /// Queries are 60 points of the cloud, and 60 other points of the surface.
+    /// Counts answers at 60 points of the cloud and at 60 other points of the surface.
     pub fn run(&self, model: SurfaceModel, scale: f64) -> Tally {
         let (points, mut random) = self.sample();
         let factor = factorize(&cloud(&points), kernel(self.kernel.1, self.kernel.2 * scale), 1e-10);
@@ -108,8 +109,8 @@ impl Case {
         self.tally(&surface, &cloud(&queries), &queries, &request)
     }
 
-    /// The points of the cloud with noise, by the default kernel and what confirms curvatures (T3, T4), and by local regressions
-    /// with their deviations.
+    /// Counts answers at the points of the noisy cloud, twice: curvatures of the default kernel, confirmed by
+    /// T3 and T4, and curvatures of local regressions with their deviations.
     pub fn run_with_noise(&self, noise: f64) -> [Tally; 2] {
         let (points, mut random) = self.sample();
         let moved = points.iter().map(|x| x.map(|x| x + noise * random.normal())).collect::<Vec<_>>();
@@ -128,7 +129,7 @@ impl Case {
         (self.shape.sample(self.n_points, self.is_random.then_some(&mut random)), random)
     }
 
-    /// Answers at queries against the surface at the places they belong to.
+    /// Compares answers at queries with the surface at the places to which the queries belong.
     fn tally(
         &self,
         surface: &Surface,
@@ -145,7 +146,7 @@ impl Case {
         for (query, &x) in places.iter().enumerate() {
             let (normal, exact) = (self.shape.normal(x), self.shape.curvatures(x));
             let found = &curvatures.principal[query * 2..][..2];
-            // Open shapes have no outside: compare for the normal that was answered.
+            // Open shapes have no outside: compare with the curvatures for the normal that was answered.
             let along: f64 = geometry.normal(query).iter().zip(&normal).map(|(a, b)| a * b).sum();
             let is_open = matches!(self.shape, Shape::Saddle | Shape::Plane);
             let exact = if is_open && along < 0.0 { [-exact[1], -exact[0]] } else { exact };

@@ -1,4 +1,4 @@
-//! The sweep of docs/degeneracy.md holds its promises.
+//! Bounds of docs/degeneracy.md, checked by its sweep.
 
 use gramian_numerics::surface::geometry::SurfaceModel;
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use super::closed::CLOSED_SURFACES;
 use super::normals::{NormalTally, tally};
 use super::sweep::{KERNELS, Tally, cases};
 
-/// 24,000 queries at each length scale and model: the bounds are those of docs/degeneracy.md.
+/// Over 24,000 queries at each length scale and model. The bounds are those of docs/degeneracy.md.
 #[test]
 fn no_curvature_is_off_by_half_without_a_flag() {
     for (model, scale) in [(SurfaceModel::Signature, 0.4), (SurfaceModel::Auto, 1.0)] {
@@ -20,13 +20,13 @@ fn no_curvature_is_off_by_half_without_a_flag() {
         assert!(total.queries > 24_000);
         let share = total.missed_10 as f64 / total.unflagged() as f64;
         assert!(share < 0.03, "{model:?} at {scale}: {total:?}");
-        // Flagging everything would pass the above.
+        // Flagging everything would pass the assertions above.
         assert!(total.false_alarms * 5 < total.queries && total.unflagged() * 3 > total.queries, "{total:?}");
     }
 }
 
-/// With noise, deviations leave several times as much without a flag as what confirms curvatures, and less than one in a hundred of it is off by
-/// half (docs/degeneracy.md has 25 of 9,423).
+/// Deviations, once there is noise, leave more than three times as many curvatures without a flag as T3 and
+/// T4 do. Fewer than one in a hundred of them are off by half (docs/degeneracy.md: 25 of 9,423).
 #[test]
 fn deviations_know_more_than_confirmations_once_there_is_noise() {
     let cases = cases().into_iter().filter(|case| case.kernel.0 == KERNELS[0].0).collect::<Vec<_>>();
@@ -37,7 +37,7 @@ fn deviations_know_more_than_confirmations_once_there_is_noise() {
     assert!(100 * after.missed_50 < after.unflagged(), "{after:?}");
 }
 
-/// The walls of the bowl and of the plate with two holes are as thin as the points are apart.
+/// Surfaces whose walls are as thin as the spacing of the points: sides of normals are not checked there.
 const UNRESOLVED: [&str; 2] = ["bowl", "two holes"];
 
 #[test]
@@ -54,7 +54,8 @@ fn normals_of_closed_surfaces_are_right_or_flagged_and_outward() {
             }
         }
         assert!(2000 * all.n_off <= all.n_unflagged(), "{kernel}: {all:?}");
-        // Flagging everything would pass the above. 500 random points know a twentieth of the normals of these shapes, edges and all, not to 0.4 rad.
+        // Flagging everything would pass the assertion above. 500 random points leave a twentieth of the
+        // normals of these shapes, edges included, uncertain by more than 0.4 rad.
         assert!(15 * all.n_flagged <= all.n_points, "{kernel}: {all:?}");
     }
 }

@@ -1,8 +1,8 @@
-//! Numbers of three variables that carry their first and second derivatives, so that a surface is written once, as its equation.
+//! Forward differentiation to second order in three variables: a surface is written once, as its equation.
 
 use std::ops::{Add, Mul, Sub};
 
-/// Value, gradient and Hessian.
+/// A value with its gradient and Hessian.
 #[derive(Debug, Clone, Copy)]
 pub struct Jet {
     pub value: f64,
@@ -15,7 +15,7 @@ impl Jet {
         Self { value, gradient: [0.0; 3], hessian: [[0.0; 3]; 3] }
     }
 
-    /// The coordinates of a place.
+    /// The coordinates of a point, as jets.
     pub fn coordinates(x: [f64; 3]) -> [Self; 3] {
         std::array::from_fn(|axis| {
             let mut jet = Self::constant(x[axis]);
@@ -24,7 +24,7 @@ impl Jet {
         })
     }
 
-    /// f(self) by the value, the first and the second derivative of f there.
+    /// Applies f, given by its value, first and second derivative at `self.value`.
     fn through(self, [value, first, second]: [f64; 3]) -> Self {
         let g = self.gradient;
         Self {

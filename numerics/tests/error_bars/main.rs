@@ -1,4 +1,4 @@
-//! Whether error bars of normals and curvatures hold: rows of docs/error-bars.md, and clouds that are hard in other ways.
+//! Coverage of the error bars of normals and curvatures: rows of docs/error-bars.md, and harder clouds.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,5 @@
-//! A coarse selection of the rows of docs/error-bars.md: every shape, sampling and noise comes several times.
+//! A coarse selection of the rows of docs/error-bars.md. Every shape, sampling and
+//! noise occurs several times.
 
 use rayon::prelude::*;
 
@@ -6,13 +7,15 @@ use crate::sampling::SAMPLINGS;
 use crate::shapes::{HELD_OUT, SHAPES};
 use crate::sweep::{Case, NOISES, Row};
 
-/// Points of each row: a share of 95 % then has a standard error of 0.7 %, were points independent; a few neighbours are not.
+/// Points of each row. The standard error of a share of 95 % is 0.7 % if points are independent,
+/// which near neighbours are not.
 const N_POINTS: usize = 1000;
 
-/// What a row may be beyond the bounds of the whole sweep for its few points: three of those standard errors.
+/// Percentage points by which a row may miss the bounds of the whole sweep: three standard
+/// errors of its few points.
 const MARGIN: f64 = 2.0;
 
-/// A third of all: the sum of the indices decides, so that any two of shape, sampling and noise meet.
+/// A third of all cases: the sum of the indices decides, so that any two of shape, sampling and noise meet.
 fn selection() -> Vec<Case> {
     let mut cases = Vec::new();
     for (i, shape) in SHAPES.into_iter().chain(HELD_OUT).enumerate() {
@@ -34,7 +37,8 @@ fn true_values_lie_within_the_error_bars() {
         let coverages = row.coverages();
         assert!(coverages.iter().all(|&c| c >= least - MARGIN), "{case:?}: {coverages:.1?}");
     }
-    // Bars that are too long hold everywhere. Over all rows with noise they leave out what they should: 95 % were they exact.
+    // Bars that are too long cover everything. Over all noisy rows the mean coverage must
+    // be near the nominal 95 %.
     let noisy = || cases.iter().zip(&rows).filter(|(case, _)| case.noise > 0.0).map(|(_, row)| row);
     for quantity in 0..4 {
         let n_rows = noisy().count() as f64;
@@ -51,7 +55,7 @@ fn of_curvatures_without_a_flag_one_in_a_hundred_is_off_by_half_at_most() {
         let of_noise = || rows.iter().filter(|(of_row, _)| *of_row == noise).map(|(_, row)| row);
         let n_off: usize = of_noise().map(|row| row.n_off).sum();
         let n_unflagged: usize = of_noise().map(Row::n_unflagged).sum();
-        // Three standard errors of a count beyond one in a hundred.
+        // The count may exceed one in a hundred by three of its standard errors.
         let expected = 0.01 * n_unflagged as f64;
         assert!((n_off as f64) < expected + 3.0 * expected.sqrt(), "{noise}: {n_off} of {n_unflagged}");
     }

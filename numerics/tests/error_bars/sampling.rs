@@ -1,4 +1,4 @@
-//! Points on a surface, taken evenly, at random, or more of them on one side.
+//! Points on a surface: evenly spaced, random, or denser on one side.
 
 #![allow(dead_code, reason = "every sweep asks for some of it")]
 
@@ -19,13 +19,14 @@ pub enum Sampling {
 
 pub const SAMPLINGS: [Sampling; 3] = [Sampling::Regular, Sampling::Random, Sampling::Biased];
 
-/// Half the thickness of the shell in which points are drawn before they are moved onto the surface.
+/// Half the thickness, in f/|∇f|, of the shell in which points are drawn before they
+/// are moved onto the surface.
 const SHELL: f64 = 0.01;
 
-/// Points drawn for each that keeps its distance.
+/// Random points drawn for each point that is kept at a distance from the others.
 const DRAWN_PER_KEPT: usize = 6;
 
-/// n points of a surface, exactly on it.
+/// At least n points of a surface, exactly on it.
 pub fn sample(shape: Shape, sampling: Sampling, n: usize, random: &mut Random) -> Vec<[f64; 3]> {
     match sampling {
         Sampling::Regular => keep_apart(&drawn(shape, n * DRAWN_PER_KEPT, &|_| 1.0, random), n),
@@ -45,7 +46,7 @@ fn drawn(shape: Shape, n: usize, share: &dyn Fn(&[f64; 3]) -> f64, random: &mut 
         let x = shape.half_sides().map(|half| (2.0 * random.uniform() - 1.0) * half);
         let f = shape.level(x);
         let slope = f.gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-        // Not a number where f has no gradient.
+        // NaN where f has no gradient counts as far.
         let is_near = f.value.abs() < SHELL * slope;
         if !is_near {
             continue;
@@ -59,7 +60,7 @@ fn drawn(shape: Shape, n: usize, share: &dyn Fn(&[f64; 3]) -> f64, random: &mut 
     points
 }
 
-/// At least n of the points, any two of them at a distance that is as large as allows that.
+/// At least n of the points, with the largest distance between any two that still leaves so many.
 fn keep_apart(points: &[[f64; 3]], n: usize) -> Vec<[f64; 3]> {
     let (mut near, mut far) = (0.0, 4.0);
     let mut kept = points.to_vec();
@@ -75,7 +76,7 @@ fn keep_apart(points: &[[f64; 3]], n: usize) -> Vec<[f64; 3]> {
     kept
 }
 
-/// Points one after the other, unless one before is nearer than a distance.
+/// Points that are at least a distance from all points kept before them.
 fn apart_by(points: &[[f64; 3]], distance: f64) -> Vec<[f64; 3]> {
     let mut cells = HashMap::<[i64; 3], Vec<[f64; 3]>>::new();
     let mut kept = Vec::new();

@@ -12,32 +12,32 @@ pub enum Shape {
     /// Dupin's ring cyclide, its tube three times as thick on one side as on the other.
     Cyclide,
     Superellipsoid,
-    /// A level of four bells of Gauss: a rounded tetrapod.
+    /// A level surface of the sum of four Gaussian bells: a rounded tetrapod.
     Blob,
     FatTorus,
     RoundedCube,
     Pebble,
-    /// A wave over a square, with a rim.
+    /// A wave over a square. The surface is open and has a rim.
     Wave,
 }
 
 pub const SHAPES: [Shape; 6] =
     [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Superellipsoid, Shape::Blob];
 
-/// Shapes that were not looked at when the model and the calibration of its deviations were chosen.
+/// Shapes that were not used to choose the model and the calibration of its deviations.
 pub const HELD_OUT: [Shape; 3] = [Shape::FatTorus, Shape::RoundedCube, Shape::Pebble];
 
-/// What is to be found at a point.
+/// Exact normal and curvatures at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Truth {
-    /// Outward.
+    /// Outward unit normal.
     pub normal: [f64; 3],
-    /// Ascending for that normal; a unit sphere has 1.
+    /// Principal curvatures for the outward normal, ascending. A unit sphere has 1 and 1.
     pub curvatures: [f64; 2],
 }
 
 impl Shape {
-    /// f, which grows outward.
+    /// The function f whose zeros are the surface. It grows outward.
     pub fn level(self, x: [f64; 3]) -> Jet {
         let [x, y, z] = Jet::coordinates(x);
         match self {
@@ -70,7 +70,7 @@ impl Shape {
         }
     }
 
-    /// Half the sides of a box about the origin that holds the surface.
+    /// Half sides of a box about the origin that holds the surface.
     pub fn half_sides(self) -> [f64; 3] {
         match self {
             Self::Sphere => [1.01; 3],
@@ -86,7 +86,7 @@ impl Shape {
         }
     }
 
-    /// The point of the surface on the way down f from x, by Newton's method.
+    /// The point of the surface reached from x along the gradient of f, by Newton's method.
     pub fn project(self, mut x: [f64; 3]) -> [f64; 3] {
         for _ in 0..8 {
             let f = self.level(x);
@@ -109,7 +109,7 @@ impl Shape {
 
 const BELLS: [[f64; 3]; 4] = [[0.45, 0.0, 0.0], [-0.3, 0.35, 0.1], [-0.2, -0.4, -0.1], [0.1, 0.1, 0.45]];
 
-/// `(|x|² + a² − c² − r²)² = 4(ax − cr)² + 4(a² − c²)y²`.
+/// Dupin's cyclide: `(|x|² + a² − c² − r²)² = 4(ax − cr)² + 4(a² − c²)y²`.
 fn cyclide(x: Jet, y: Jet, z: Jet) -> Jet {
     let (a, c, r): (f64, f64, f64) = (1.0, 0.3, 0.45);
     let b2 = a * a - c * c;
@@ -121,7 +121,7 @@ fn sum_of_squares(x: Jet, y: Jet, z: Jet) -> Jet {
     x.squared() + y.squared() + z.squared()
 }
 
-/// Ascending eigenvalues of a symmetric form on the plane across a unit normal.
+/// Eigenvalues, ascending, of a symmetric form on the plane orthogonal to a unit normal.
 pub fn principal_curvatures(form: &[[f64; 3]; 3], normal: [f64; 3]) -> [f64; 2] {
     let smallest = (0..3).min_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap();
     let mut along = [0.0; 3];

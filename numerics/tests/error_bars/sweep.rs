@@ -1,4 +1,4 @@
-//! How many true values lie within the error bars: rows of a table.
+//! Coverage of error bars: the share of true values within them, row by row of a table.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
@@ -16,10 +16,11 @@ use crate::shapes::{Shape, Truth, cross, dot, principal_curvatures};
 
 pub const NOISES: [f64; 5] = [0.0, 0.002, 0.005, 0.01, 0.02];
 
-/// Deviations within which 95 % of the errors lie, were they normal.
+/// Deviations within which 95 % of normally distributed errors lie.
 const BAND: f64 = 1.96;
 
-/// What a row asks: a surface, how it is sampled, and the deviation of the noise of its points over its radius.
+/// A surface, its sampling, and the standard deviation of the noise per coordinate,
+/// relative to a radius of about 1.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     pub shape: Shape,
@@ -28,22 +29,22 @@ pub struct Case {
     pub noise: f64,
 }
 
-/// What the error bars of a row turned out to be.
+/// Errors, error bars and flags of all points of a row.
 #[derive(Debug, Clone, Default)]
 pub struct Row {
-    /// Errors over bounds, by point: of the normal, the mean and both principal curvatures.
+    /// Errors over 1.96 deviations, by point: of the normal, the mean and both principal curvatures.
     pub ratios: [Vec<f64>; 4],
-    /// Larger error of a principal curvature over the larger curvature.
+    /// Larger error of a principal curvature over the larger true curvature, by point.
     pub errors: Vec<f64>,
-    /// Angles of the normals, radians.
+    /// Angles between found and true normals, radians, by point.
     pub angles: Vec<f64>,
     pub n_flagged: usize,
-    /// Of the points that are not flagged, those whose curvatures are off by half.
+    /// Points without a flag whose curvatures are off by more than half.
     pub n_off: usize,
 }
 
 impl Case {
-    /// The sums over `n_clouds` clouds.
+    /// Runs the case on `n_clouds` clouds and collects all their points.
     pub fn run(&self, n_clouds: usize) -> Row {
         let mut row = Row::default();
         for cloud in 0..n_clouds {
@@ -53,7 +54,7 @@ impl Case {
     }
 
     fn run_once(&self, cloud: usize, row: &mut Row) {
-        // The points beneath are the same for every noise.
+        // The seed ignores the noise, so the underlying points are the same for every noise.
         let seed = 31 * self.n_points + 7 * self.sampling as usize + 1001 * cloud;
         let mut random = Random(seed as u64);
         let points = sample(self.shape, self.sampling, self.n_points, &mut random);
@@ -69,7 +70,7 @@ impl Row {
     pub fn take(&mut self, patches: &Patches, cloud: &Cloud, truths: &[Truth]) {
         let found = patches.at(cloud, true, true, &Unobserved).unwrap();
         let deviations = found.curvatures.as_ref().unwrap();
-        // What is not known, or bent, is not sure either.
+        // Points that are unknown or bent keep the ratio 0: they count as unsure.
         let mut ratios = vec![0.0; truths.len()];
         let first = self.errors.len();
         for (i, truth) in truths.iter().enumerate().filter(|&(i, _)| found.is_known[i]) {
@@ -110,13 +111,13 @@ impl Row {
         self.errors.push(error);
     }
 
-    /// Shares of true values within the bars, per cent: normal, mean and principal curvatures.
+    /// Percentages of true values within the bars: normal, mean and both principal curvatures.
     pub fn coverages(&self) -> [f64; 4] {
         let share = |ratios: &Vec<f64>| ratios.iter().filter(|&&ratio| ratio <= 1.0).count() as f64;
         self.ratios.each_ref().map(|ratios| 100.0 * share(ratios) / ratios.len().max(1) as f64)
     }
 
-    /// Share of points with a flag, per cent.
+    /// Percentage of points with a flag.
     pub fn flagged(&self) -> f64 {
         100.0 * self.n_flagged as f64 / self.errors.len().max(1) as f64
     }
@@ -125,12 +126,12 @@ impl Row {
         self.errors.len() - self.n_flagged
     }
 
-    /// Share of those without a flag that are off by half, per cent.
+    /// Percentage of the points without a flag whose curvatures are off by half.
     pub fn off(&self) -> f64 {
         100.0 * self.n_off as f64 / self.n_unflagged().max(1) as f64
     }
 
-    /// What the bars are to keep: 90 to 99.5 % of the true values with noise, 85 % without.
+    /// Whether all coverages are as required: 90 to 99.5 % with noise, at least 85 % without.
     pub fn holds(&self, noise: f64) -> bool {
         let range = if noise > 0.0 { 90.0..=99.5 } else { 85.0..=100.0 };
         self.coverages().iter().all(|coverage| range.contains(coverage))
@@ -146,7 +147,7 @@ pub fn patches(cloud: &Arc<Cloud>) -> Patches {
     Patches::of(cloud.clone(), spacings, &Unobserved).unwrap()
 }
 
-/// Of numbers, the one below which a share of them lies.
+/// The quantile of numbers below which the given share of them lies.
 pub fn quantile(numbers: &[f64], share: f64) -> f64 {
     let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);

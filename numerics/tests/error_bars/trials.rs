@@ -1,4 +1,4 @@
-//! Clouds that are hard in other ways: other dimensions, far away, tiny, repeated, flat.
+//! Error bars of hard clouds: other dimensions, far from the origin, tiny, repeated, flat.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ fn geometry(cloud: Cloud) -> PatchGeometry {
     patches(&cloud).at(&cloud, true, true, &Unobserved).unwrap()
 }
 
-/// Trace of the shape operator over d − 1, of either sign.
+/// Trace of the shape operator over d − 1. The sign depends on the side of the normal.
 fn mean_curvature(found: &PatchGeometry, i: usize, d: usize) -> f64 {
     (0..d).map(|a| found.shapes[i * d * d + a * (d + 1)]).sum::<f64>() / (d as f64 - 1.0)
 }
@@ -34,7 +34,7 @@ fn is_finite(found: &PatchGeometry) -> bool {
     lists.into_iter().flatten().all(|x| x.is_finite())
 }
 
-/// Share of points whose mean curvature has the magnitude that it should have, to 1.96 deviations.
+/// Share of points whose mean curvature is right in magnitude to 1.96 deviations.
 fn share_within(found: &PatchGeometry, d: usize, truth: &dyn Fn(usize) -> f64) -> f64 {
     let bars = &found.curvatures.as_ref().unwrap().mean;
     let holds = |i: &usize| (mean_curvature(found, *i, d).abs() - truth(*i).abs()).abs() <= 1.96 * bars[*i];
@@ -77,7 +77,7 @@ fn bars_of_a_sphere_in_four_dimensions_hold() {
         let found = geometry(noisy(&cloud, noise, &mut random));
         assert!(is_finite(&found) && found.is_known.iter().all(|&known| known));
         let share = share_within(&found, 4, &|_| 1.0);
-        // Fewer than for surfaces in space: 70 neighbours for ten coefficients reach far.
+        // Coverage is lower than for surfaces in space, since 70 neighbours for ten coefficients reach far.
         assert!(share > 0.75, "{noise}: {share}");
     }
 }

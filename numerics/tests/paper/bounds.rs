@@ -1,9 +1,9 @@
-//! What the tests ask of tables.
+//! Access to tables, and bounds on their errors, for the tests.
 
 use super::table::{Cell, Paper, Row, Table};
 
 impl Table {
-    /// The row of a label.
+    /// The row with a label.
     pub fn row(&self, label: &str) -> &Row {
         self.rows.iter().find(|row| row.label == label).expect("a label of this table")
     }
@@ -21,10 +21,10 @@ impl Row {
     }
 }
 
-/// Every error within 3 times the paper's and most below it.
+/// Asserts that every error is below 3 times the paper's, and that most are below the paper's.
 ///
-/// The factor leaves room for what the paper drew at random once and for what it leaves open: the definition of the relative
-/// error, and of the average.
+/// The factor 3 allows for the paper's single random draw, and for definitions that the paper leaves open: of
+/// the relative error, and of the average.
 pub fn assert_errors_are_the_papers_or_smaller(rows: &[Row]) {
     let ratios: Vec<f64> = rows.iter().flat_map(|row| &row.cells).map(ratio).collect();
     assert!(ratios.iter().all(|&ratio| ratio < 3.0), "{ratios:?}");

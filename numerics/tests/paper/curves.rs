@@ -1,4 +1,4 @@
-//! Plane curves with their exact normals, and how far a level line of u lies from them.
+//! Plane curves with exact normals, and distances of level lines of u from them.
 
 use super::support::{Cloud, Surface, cloud};
 
@@ -10,13 +10,13 @@ pub struct Station {
 }
 
 impl Station {
-    /// A point of the curve, of which `outward` need not have length 1.
+    /// A point with its normal, from an outward vector of any length.
     pub fn new(point: [f64; 2], outward: [f64; 2]) -> Self {
         let length = outward[0].hypot(outward[1]);
         Self { point, normal: outward.map(|x| x / length) }
     }
 
-    /// The point at a distance along the normal.
+    /// The point at a signed distance along the normal.
     pub fn at(&self, distance: f64) -> [f64; 2] {
         [0, 1].map(|c| self.point[c] + distance * self.normal[c])
     }
@@ -27,19 +27,20 @@ pub fn ellipse(t: f64) -> Station {
     Station::new([t.cos(), 0.5 * t.sin()], [0.5 * t.cos(), t.sin()])
 }
 
-/// Their points alone.
+/// The points of stations as a cloud.
 pub fn points(stations: &[Station]) -> Cloud {
     cloud(&stations.iter().map(|station| station.point).collect::<Vec<_>>())
 }
 
-/// Steps of the search on either side of a curve.
+/// Steps of the search on each side of a curve.
 const STEPS: i32 = 30;
-/// Halvings of a step: to 1e-9 of the reach.
+/// Number of bisections, which locate the crossing to 1e-9 of the reach.
 const HALVINGS: usize = 25;
 
-/// Signed distance along each normal to the nearest crossing of `u = level`; `None` if there is none within `reach`.
+/// Signed distance along each normal to the nearest crossing of `u = level`, `None`
+/// if none is within `reach`.
 ///
-/// Steps of reach/30 outwards from the curve, then bisection.
+/// Samples u in steps of reach/30 on both sides of the curve, then bisects.
 pub fn crossings(surface: &Surface, stations: &[Station], level: f64, reach: f64) -> Vec<Option<f64>> {
     let offsets: Vec<f64> = (-STEPS..=STEPS).map(|i| reach * f64::from(i) / f64::from(STEPS)).collect();
     let scan: Vec<[f64; 2]> = stations.iter().flat_map(|s| offsets.iter().map(|&at| s.at(at))).collect();
@@ -52,7 +53,7 @@ pub fn crossings(surface: &Surface, stations: &[Station], level: f64, reach: f64
     brackets.into_iter().map(|bracket| bracket.map(|[a, _]| a)).collect()
 }
 
-/// Neighbouring offsets with `u ≥ level` at the first and `u < level` at the second.
+/// The pair of adjacent offsets nearest to 0 with `u ≥ level` at the first and `u < level` at the second.
 fn nearest_bracket(offsets: &[f64], u: &[f64], level: f64) -> Option<[f64; 2]> {
     (1..offsets.len())
         .filter(|&i| (u[i - 1] >= level) != (u[i] >= level))
@@ -71,8 +72,10 @@ fn halve(surface: &Surface, stations: &[Station], level: f64, brackets: &mut [Op
     }
 }
 
-/// Angle between the served outward normal and the exact one at the level line that passes each station at a distance, in
-/// degrees; NaN where there is no level line or no normal.
+/// Angles in degrees between served outward normals and the normals of the stations.
+///
+/// Normals are asked at the level line, which passes each station at the given distance. NaN where there is
+/// no level line or no normal.
 pub fn angles(surface: &Surface, stations: &[Station], distances: &[Option<f64>]) -> Vec<f64> {
     let crossing = |(s, d): (&Station, &Option<f64>)| s.at(d.unwrap_or(0.0));
     let queries: Vec<[f64; 2]> = stations.iter().zip(distances).map(crossing).collect();
@@ -84,7 +87,7 @@ pub fn angles(surface: &Surface, stations: &[Station], distances: &[Option<f64>]
     stations.iter().zip(distances).zip(&normals).map(angle).collect()
 }
 
-/// Angles of the normals at the stations themselves.
+/// Angles in degrees of the normals at the stations themselves.
 pub fn angles_on_curve(surface: &Surface, stations: &[Station]) -> Vec<f64> {
     angles(surface, stations, &vec![Some(0.0); stations.len()])
 }
@@ -94,16 +97,17 @@ fn degrees_between(a: &[f64], b: &[f64]) -> f64 {
     cross.abs().atan2(dot).to_degrees()
 }
 
-/// Distances without their sign; NaN where there is none.
+/// Magnitudes of distances, NaN where there is none.
 pub fn lengths(distances: &[Option<f64>]) -> Vec<f64> {
     distances.iter().map(|distance| distance.map_or(f64::NAN, f64::abs)).collect()
 }
 
-/// Rays of [`rays_crossed_once`], half a degree off the axes: none meets a corner.
+/// Number of rays in [`rays_crossed_once`]. Each is half a degree off whole degrees, so none meets a corner.
 pub const N_RAYS: u32 = 360;
 
-/// How many of 360 rays from the origin level 1 crosses just once within `reach`: all of them if it is a simple closed curve,
-/// star-shaped around the origin, and nothing else.
+/// Counts the rays from the origin, of [`N_RAYS`], that level 1 crosses exactly once within `reach`.
+///
+/// All are counted if level 1 is a simple closed curve, star-shaped around the origin, and nothing else.
 pub fn rays_crossed_once(surface: &Surface, reach: f64) -> usize {
     const STEPS_PER_RAY: usize = 200;
     let ray = |i: u32| {

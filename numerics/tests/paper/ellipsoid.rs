@@ -1,7 +1,8 @@
 //! Table "Gauss curvature error for an ellipsoid": axes 2, ½, 1, Fibonacci points, Laplace ε = 1, α = 0.
 //!
-//! Errors at 32 random points (uniform on the sphere, then stretched), averaged over 20 draws. The paper does not define its
-//! relative error; both `max|K − K*|/max|K*|` and the mean of `|K − K*|/K*` stand beside it.
+//! Errors are taken at 32 random points, uniform on the sphere and then stretched, and averaged over
+//! 20 draws. The paper does not define its relative error, so both `max|K − K*|/max|K*|` and the mean
+//! of `|K − K*|/K*` are shown.
 
 use super::common::clouds::{fibonacci_sphere, stretched};
 use super::errors::{mean, means, relative_max};
@@ -13,7 +14,7 @@ const AXES: [f64; 3] = [2.0, 0.5, 1.0];
 const PAPER: [(usize, f64); 5] =
     [(64, 2.428e-1), (128, 8.408e-2), (256, 1.186e-2), (512, 5.439e-4), (1024, 4.995e-5)];
 
-/// m = 64 … 1,024.
+/// The table for m = 64 … 1,024.
 pub fn table() -> Table {
     let row = |&(m, paper): &(usize, f64)| Row::beside(format!("m = {m}"), &[paper; 2], &errors(m));
     Table {
@@ -37,7 +38,7 @@ fn errors_at(surface: &Surface, seed: u64) -> [f64; 2] {
     [relative_max(&found, &exact), mean(&relative)]
 }
 
-/// `K = 1/(a²b²c² (x₁²/a⁴ + x₂²/b⁴ + x₃²/c⁴)²)`.
+/// Exact Gaussian curvatures of the ellipsoid, `K = 1/(a²b²c² (x₁²/a⁴ + x₂²/b⁴ + x₃²/c⁴)²)`.
 fn exact(points: &Cloud) -> Vec<f64> {
     let product: f64 = AXES.iter().map(|a| a * a).product();
     let sum = |x: &[f64]| x.iter().zip(AXES).map(|(x, a)| x * x / a.powi(4)).sum::<f64>();

@@ -1,8 +1,9 @@
 //! Figure "Implied curve of an exact sample consisting of m points along half of an ellipse".
 //!
-//! The upper half of the ellipse with semi-axes 1 and ½, equidistant parameters, both ends included, α = 0. Analytic
-//! continuation: level 1 goes on along the ellipse beyond the ends of the sample. Measured from one end in degrees of the
-//! parameter, until it is 0.01 away; 180 would be the whole ellipse. The paper does not name the kernel.
+//! The sample is the upper half of the ellipse with semi-axes 1 and ½, at equidistant parameters, both ends
+//! included, α = 0. By analytic continuation level 1 follows the ellipse beyond the ends of the sample. The
+//! continuation is measured from one end, in degrees of the parameter, until level 1 is 0.01 from the
+//! ellipse. The whole ellipse would be 180. The paper does not name the kernel.
 
 use std::f64::consts::PI;
 
@@ -11,10 +12,10 @@ use super::errors::largest;
 use super::support::{Family, GAUSS, LAPLACE, Surface};
 use super::table::{Paper, Row, Table};
 
-/// How far off the ellipse level 1 still counts as its continuation.
+/// Largest distance from the ellipse at which level 1 counts as its continuation.
 const TOLERANCE: f64 = 0.01;
 
-/// m = 16 and 256.
+/// The table for m = 16 and 256, with two kernels.
 pub fn table() -> Table {
     let row = |label: &str, m, family| Row::of(label, Paper::Figure, &facts(m, family));
     Table {
@@ -44,8 +45,8 @@ fn facts(m: u32, family: Family) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Between 16 points, 0.15 apart on average, both kernels are right to 1e-4; between 256 to rounding times the slope of an
-    /// ill-conditioned fit, 1e-7 at the most.
+    /// 16 points are 0.15 apart on average, and both kernels are right to 1e-4 between them. Between 256
+    /// points the error is rounding times the slope of an ill-conditioned fit, at most 1e-7.
     #[test]
     fn level_1_is_the_ellipse_between_the_points() {
         let table = table();
@@ -55,8 +56,8 @@ mod tests {
         }
     }
 
-    /// How far analytic continuation goes is a matter of the precision of the data: a quarter of the angle is lost if that is
-    /// 1e-10 instead of rounding (α = 1e-10), so that much is left to other roundings.
+    /// The reach of analytic continuation depends on the precision of the data. A precision of 1e-10 (α =
+    /// 1e-10) instead of rounding costs a quarter of the angle. The bounds leave as much to other roundings.
     #[test]
     fn level_1_continues_the_ellipse_beyond_the_points_and_further_from_more_of_them() {
         let continued: Vec<f64> = table().rows.iter().map(|row| row.ours()[1]).collect();

@@ -1,9 +1,11 @@
 //! Figure "Reconstruction of a closed curve": (sin t, sin³t + ½ cos t), Laplace ε = 1, α = 0.
 //!
-//! Left: 64 points at equidistant parameters. Right: 24 neighbouring ones of them; the paper does not say which. The printed
-//! "two inflection points" are four: the curvature vanishes where `12 sin t cos³t = 1`, twice in every half turn. The piece here,
-//! −1.67 ≤ t ≤ 0.59, contains the one at t = 0.084. (The one at t = 1.10 is next to the sharp turn at π/2, which outweighs it:
-//! around it the normals keep to one side.)
+//! Left: 64 points at equidistant parameters. Right: 24 neighbouring ones of them. The
+//! paper does not say which.
+//!
+//! The printed "two inflection points" are four: the curvature vanishes where `12 sin t cos³t = 1`, twice in
+//! every half turn. The piece here, −1.67 ≤ t ≤ 0.59, contains the one at t = 0.084. The one at t = 1.10 is
+//! not used: the sharp turn at π/2 next to it outweighs it, so the normals around it keep to one side.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +15,7 @@ use super::errors::{largest, median};
 use super::support::{LAPLACE, Surface};
 use super::table::Table;
 
-/// Parameter of the point `i` of 64.
+/// Parameter of point `i` of 64. Fractions lie between points.
 fn parameter(i: f64) -> f64 {
     TAU * i / 64.0
 }
@@ -29,7 +31,7 @@ fn convexity(t: f64) -> f64 {
     0.5 - 6.0 * sin * cos.powi(3)
 }
 
-/// The inflection within the subsample, by bisection of the convexity.
+/// Parameter of the inflection within the subsample, by bisection of the convexity.
 fn inflection() -> f64 {
     let [mut concave, mut convex] = [0.5, 0.0];
     for _ in 0..60 {
@@ -46,10 +48,10 @@ const GRADIENT: &str = "24 points: smallest |grad u| over the median of the piec
 const OFFSET: &str = "24 points: parameter from there to the inflection";
 const CONVEX_SIDE: &str = "24 points: normals that point to the locally convex side, %";
 
-/// First point of the incomplete subsample.
+/// Index of the first point of the incomplete subsample.
 const FIRST: i32 = -17;
 
-/// Both halves of the figure.
+/// The table of both halves of the figure.
 pub fn table() -> Table {
     let title = "Curve with inflections, Laplace eps = 1, alpha = 0";
     Table::of_figure(title, &[closed_curve(), incomplete_subsample()].concat())
@@ -67,7 +69,7 @@ fn closed_curve() -> [(&'static str, f64); 3] {
     ]
 }
 
-/// Points −17 … 6 of the 64.
+/// Facts of the subsample: points −17 … 6 of the 64.
 fn incomplete_subsample() -> [(&'static str, f64); 3] {
     let sample: Vec<Station> = (FIRST..FIRST + 24).map(|i| curve(parameter(f64::from(i)))).collect();
     let surface = Surface::of(&points(&sample), LAPLACE, 0.0);
@@ -97,8 +99,9 @@ mod tests {
     fn level_1_of_64_points_is_the_curve_with_its_outward_normals() {
         let table = table();
         println!("{table}");
-        // The spacing, 0.1, against the kernel's width, 1, leaves a distance of 2e-6 where the curve turns sharply (its radius of
-        // curvature is 0.08 there), and its slope, the angle, is larger by 1/spacing: 1e-3 degrees. Five times that is asked.
+        // The largest distance is 2e-6, at the sharp turn with a radius of curvature of 0.08. It comes from a
+        // spacing of 0.1 against a kernel of width 1. The angle is the slope of this distance, larger by
+        // 1/spacing: 1e-3 degrees. The bounds are five times these.
         assert!(table.fact(DISTANCE_BETWEEN) < 1e-5);
         assert!(table.fact(ANGLE_BETWEEN) < 5e-3 && table.fact(ANGLE_AT_POINTS) < 3e-2);
     }
@@ -108,9 +111,9 @@ mod tests {
         let table = table();
         println!("{table}");
         assert!(table.fact(GRADIENT) < 0.01);
-        // The sample knows the inflection to its spacing.
+        // The sample determines the inflection to its spacing.
         assert!(table.fact(OFFSET) < parameter(1.0));
-        // All of the piece but what lies between the flip and the inflection, at most a spacing in 23.
+        // All of the piece except between the flip and the inflection, which is at most one spacing of 23.
         assert!(table.fact(CONVEX_SIDE) > 100.0 * (1.0 - 1.0 / 23.0));
     }
 }

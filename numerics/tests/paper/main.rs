@@ -1,7 +1,8 @@
-//! The paper's experiments, one file each, with its figures beside ours; `examples/paper_tables.rs` prints them.
+//! The paper's experiments, one file each, with the paper's figures beside ours.
 //!
-//! Patrick Guidotti, "Geometric Kernel Interpolation and Regression", section "Numerical Experiments", with the corrected
-//! formulas of docs/errata.md. Seeds are fixed; what the paper draws at random once is drawn 20 times here.
+//! `examples/paper_tables.rs` prints the tables. The paper is Patrick Guidotti, "Geometric Kernel
+//! Interpolation and Regression", section "Numerical Experiments", with the corrected formulas of
+//! docs/errata.md. Seeds are fixed. What the paper draws at random once is drawn 20 times here.
 
 #[path = "../common/mod.rs"]
 mod common;

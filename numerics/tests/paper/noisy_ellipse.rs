@@ -1,9 +1,13 @@
-//! Figures "Reconstruction of an ellipse from a randomly perturbed sample": α = 0.1 as noise variance recovers the shape.
+//! Figures "Reconstruction of an ellipse from a randomly perturbed sample": α = 0.1 as noise variance
+//! recovers the shape.
 //!
-//! 32 points of the ellipse with semi-axes 1 and ½, at equidistant parameters, each moved in a random direction by a uniform
-//! distance up to `noise`. The surface is the level ū, the mean of u over the cloud. At 128 points of the true ellipse: the
-//! distance along the true normal to the nearest crossing of u = ū, and the angle there between the served normal and the
-//! true one. Both averaged over the ellipse, for each of 100 seeds.
+//! The sample is 32 points of the ellipse with semi-axes 1 and ½, at equidistant parameters. Each is
+//! moved in a random direction by a uniform distance up to `noise`. The surface is the level ū, the
+//! mean of u over the cloud.
+//!
+//! Two quantities are taken at 128 points of the true ellipse: the distance along the true normal to the
+//! nearest crossing of u = ū, and the angle there between the served and the true normal. Both are averaged
+//! over the ellipse, for each of 100 seeds.
 
 use std::f64::consts::TAU;
 
@@ -17,10 +21,10 @@ use super::table::{Paper, Row, Table};
 
 const ALPHA: f64 = 0.1;
 const SEEDS: u64 = 100;
-/// How far from the ellipse its level line is searched: less than its smaller semi-axis.
+/// Distance within which the level line is searched, less than the smaller semi-axis of the ellipse.
 const REACH: f64 = 0.45;
 
-/// Gauss and Laplace ε = 1, noise 0.1; Laplace with the noise 0.25 of the second figure.
+/// The table: Gauss and Laplace ε = 1 with noise 0.1, and Laplace with the noise 0.25 of the second figure.
 pub fn table() -> Table {
     Table {
         title: "Noisy ellipse, 32 points, alpha = 0.1: level line of the mean of u against the true ellipse, 100 seeds",
@@ -33,7 +37,7 @@ pub fn table() -> Table {
     }
 }
 
-/// Mean over the seeds and the worst seed.
+/// A row with the mean over the seeds and the worst seed.
 fn row(label: &str, family: Family, noise: f64) -> Row {
     let runs: Vec<[f64; 2]> = (0..SEEDS).into_par_iter().map(|seed| run(family, noise, seed)).collect();
     let column = |n: usize| runs.iter().map(|run| run[n]).collect::<Vec<f64>>();
@@ -58,9 +62,9 @@ fn moved(station: Station, noise: f64, random: &mut Random) -> [f64; 2] {
     [station.point[0] + distance * direction.cos(), station.point[1] + distance * direction.sin()]
 }
 
-/// The points are moved by 0.05 on average, 0.032 of it along the normal, with a spacing of 0.15: a curve through them is off by
-/// 0.032 and its normals by tens of degrees. What is left at α = 0.1 is mostly the pull of the regularization, of which the
-/// Laplace kernel has more; the worst of 2,000 seeds has 0.046 and 7.9°.
+/// Points are moved by 0.05 on average, 0.032 of it along the normal, with a spacing of 0.15. A curve through
+/// them is off by 0.032, and its normals by tens of degrees. At α = 0.1 the rest is mostly the pull of the
+/// regularization, stronger with the Laplace kernel. The worst of 2,000 seeds has 0.046 and 7.9°.
 #[test]
 fn the_level_line_recovers_the_ellipse_and_its_normals_for_every_seed() {
     let table = table();
@@ -70,6 +74,6 @@ fn the_level_line_recovers_the_ellipse_and_its_normals_for_every_seed() {
         assert!(distance <= worst_distance && worst_distance <= 0.045, "{}: {worst_distance}", row.label);
         assert!(angle <= worst_angle && worst_angle <= 8.0, "{}: {worst_angle}", row.label);
     }
-    // Half the mean displacement, 0.125: regularization averages the noise of neighbouring points.
+    // Half of 0.125, the mean displacement: regularization averages the noise of neighbouring points.
     assert!(table.rows[2].ours()[0] <= 0.0625);
 }

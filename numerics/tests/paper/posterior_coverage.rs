@@ -1,8 +1,8 @@
 //! The posterior as the paper's Gaussian process: its 95 % band covers held-out observations.
 //!
-//! For each of 200 seeds: 60 + 40 random points of [0, 3]², values drawn from the prior (Matérn 5/2, ℓ = 0.8, variance 1.7)
-//! plus noise of variance 0.09. The band around the mean is 1.96 √(variance + noise) (errata.md, 7: the printed variance
-//! is that of an observation).
+//! For each of 200 seeds 60 + 40 random points of [0, 3]² are drawn. Values are drawn from the prior (Matérn
+//! 5/2, ℓ = 0.8, variance 1.7) plus noise of variance 0.09. The band around the mean is 1.96 √(variance +
+//! noise): the variance that the paper prints is that of an observation (errata.md, 7).
 
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ const NOISE_VARIANCE: f64 = 0.09;
 /// Quantile of the normal distribution for a band of 95 %.
 const QUANTILE: f64 = 1.959_963_984_540_054;
 
-/// Percentages of held-out points within the band.
+/// The table of percentages of held-out points within the band.
 pub fn table() -> Table {
     let counts: Vec<[usize; 2]> = (0..SEEDS).into_par_iter().map(covered).collect();
     let percent = |n: usize| {
@@ -32,7 +32,7 @@ pub fn table() -> Table {
     }
 }
 
-/// Held-out observations within the band of observations, held-out latent values within the band of the latent function.
+/// Counts of held-out observations and of held-out latent values within their bands.
 fn covered(seed: u64) -> [usize; 2] {
     let mut random = Random::of_seed(4000 + seed);
     let points: Vec<[f64; 2]> =
@@ -47,14 +47,15 @@ fn covered(seed: u64) -> [usize; 2] {
     [within(&observations, NOISE_VARIANCE), within(&latent, 0.0)]
 }
 
-/// Means and variances at the held-out points.
+/// Posterior means and latent variances at the held-out points.
 fn posterior_of(points: &[[f64; 2]], observations: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let kernel = Kernel::new(Family::Matern { order: 2 }, LENGTH_SCALE, VARIANCE).unwrap();
     let (observed, held_out) = points.split_at(OBSERVED);
     posterior(&cloud(observed), kernel, NOISE_VARIANCE, observations, &cloud(held_out))
 }
 
-/// `L z` with `LLᵀ = K` and z standard normal; kernel and Cholesky are written out here, apart from the library's.
+/// A draw `L z` from the prior, with `LLᵀ = K` and z standard normal. Kernel and Cholesky are written out
+/// here, independent of the library's.
 fn draw_from_prior(points: &[[f64; 2]], random: &mut Random) -> Vec<f64> {
     let n = points.len();
     let mut l = vec![0.0; n * n];
@@ -69,20 +70,20 @@ fn draw_from_prior(points: &[[f64; 2]], random: &mut Random) -> Vec<f64> {
     (0..n).map(|i| (0..=i).map(|j| l[i * n + j] * z[j]).sum()).collect()
 }
 
-/// `σ_f² (1 + √5 r + 5r²/3) e^{−√5 r}`.
+/// The kernel Matérn 5/2: `σ_f² (1 + √5 r + 5r²/3) e^{−√5 r}`.
 fn matern_5_2(a: [f64; 2], b: [f64; 2]) -> f64 {
     let s = 5f64.sqrt() * (a[0] - b[0]).hypot(a[1] - b[1]) / LENGTH_SCALE;
     VARIANCE * (1.0 + s + s * s / 3.0) * (-s).exp()
 }
 
-/// 8,000 held-out observations, of which those of one seed are correlated: the standard deviation of the share is about
-/// 0.3 %, and the band is right only with the noise in it.
+/// 8,000 observations are held out, correlated within each seed, so the standard deviation of the share is
+/// about 0.3 %. The band is right only with the noise in it.
 #[test]
 fn the_95_percent_band_covers_94_to_96_percent_of_held_out_observations() {
     let table = table();
     println!("{table}");
     let [observations, latent] = table.rows[0].ours()[..] else { unreachable!() };
     assert!((94.0..=96.0).contains(&observations), "{observations}");
-    // Latent values of one seed are correlated over a length scale: fewer independent ones.
+    // Latent values of one seed are correlated over a length scale, so fewer are independent.
     assert!((93.0..=97.0).contains(&latent), "{latent}");
 }

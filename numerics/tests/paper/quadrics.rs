@@ -1,7 +1,9 @@
-//! Tables "Quadratic surface": z = ax²/2 − by²/2 over [−½, ½]², 256 points, principal curvatures at the origin, α = 1e-10.
+//! Tables "Quadratic surface": z = ax²/2 − by²/2 over [−½, ½]², 256 points, principal curvatures at the
+//! origin, α = 1e-10.
 //!
-//! κ for ν = +∇u/|∇u|, as in the paper: a and −b. For a = b the symmetry leaves the signature function no gradient at the origin:
-//! the paper divides by its rounding, the library says null if it may use nothing else, and asks the offset model if it may.
+//! Curvatures are for ν = +∇u/|∇u|, as in the paper: a and −b. For a = b the symmetry leaves the signature
+//! function no gradient at the origin. The paper divides by its rounding. The library answers null by the
+//! signature function alone, and by the offset model where that is allowed.
 
 use super::errors::medians;
 use super::random::Random;
@@ -10,7 +12,7 @@ use super::table::{Cell, Paper, Row, Table};
 
 const ALPHA: f64 = 1e-10;
 
-/// a = 1, b = 2 and a = b = 1, on the grid and on random points.
+/// The table: a = 1, b = 2 and a = b = 1, on the grid and on random points.
 pub fn table() -> Table {
     let nothing = [Paper::Nothing; 2];
     let (asymmetric, saddle) = ([grids(2.0), random_patches(2.0)], [grids(1.0), random_patches(1.0)]);
@@ -43,7 +45,7 @@ fn numbers(a: f64, b: f64) -> [Paper; 2] {
     [Paper::Number(a), Paper::Number(b)]
 }
 
-/// The median over the clouds, null where most of them have no answer, and how many those are.
+/// A row with the median over the clouds and the number of nulls. The median is null if most clouds are.
 fn row(label: &str, clouds: &[Cloud], paper: [Paper; 2], answer: impl Fn(&Cloud) -> Option<[f64; 2]>) -> Row {
     let found: Vec<Option<[f64; 2]>> = clouds.iter().map(answer).collect();
     let regular: Vec<[f64; 2]> = found.iter().copied().flatten().collect();
@@ -54,14 +56,14 @@ fn row(label: &str, clouds: &[Cloud], paper: [Paper; 2], answer: impl Fn(&Cloud)
     Row { label: label.to_owned(), cells: vec![cell(0), cell(1), count] }
 }
 
-/// The answer of a model, the larger curvature first; `None` where there is none.
+/// The curvatures at the origin by a model, the larger one first, or `None` without an answer.
 fn curvatures(cloud: &Cloud, family: Family, model: SurfaceModel) -> Option<[f64; 2]> {
     let origin = Cloud::new(vec![0.0; 3], 3).unwrap();
     let surface = Surface::with_model(cloud, family, ALPHA, model);
     surface.curvatures(&origin, Orientation::Gradient)[0].as_ref().map(|k| [k[1], k[0]])
 }
 
-/// The patch over the paper's regular 16 × 16 discretization, which contains the boundary.
+/// The patch over the paper's regular 16 × 16 grid, which contains the boundary.
 fn grids(b: f64) -> Vec<Cloud> {
     let coordinate = |i: usize| i as f64 / 15.0 - 0.5;
     vec![patch(b, (0..256).map(|i| [coordinate(i / 16), coordinate(i % 16)]))]
@@ -75,7 +77,7 @@ fn random_patches(b: f64) -> Vec<Cloud> {
     (0..20).map(patch_of).collect()
 }
 
-/// a = 1.
+/// The patch over points of the plane, with a = 1.
 fn patch(b: f64, points: impl Iterator<Item = [f64; 2]>) -> Cloud {
     cloud(&points.map(|[x, y]| [x, y, (x * x - b * y * y) / 2.0]).collect::<Vec<_>>())
 }
@@ -84,8 +86,9 @@ fn patch(b: f64, points: impl Iterator<Item = [f64; 2]>) -> Cloud {
 mod tests {
     use super::*;
 
-    /// The random patches have holes twice the grid's spacing and still resolve the curvatures, of radius ½ at least, to the
-    /// paper's own error on the grid, 0.003 and 0.008 (Laplace); half of it is asked.
+    /// The paper's own errors on the grid are 0.003 and 0.008 (Laplace), and the bounds are half of
+    /// these. The random patches have holes of twice the grid's spacing, but still resolve curvatures
+    /// with radii of at least ½.
     #[test]
     fn both_kernels_find_the_curvatures_of_the_asymmetric_saddle() {
         let table = table();
@@ -104,8 +107,8 @@ mod tests {
         }
     }
 
-    /// 1e-3 in every cloud, not only in the median: which side of a saddle is outward is arbitrary, but with a = b both sides
-    /// have the same curvatures.
+    /// The bound 1e-3 holds in every cloud, not only in the median. Which side of a saddle is outward is
+    /// arbitrary, but with a = b both sides have the same curvatures.
     #[test]
     fn the_symmetric_saddle_is_right_with_the_offset_model() {
         for cloud in grids(1.0).iter().chain(&random_patches(1.0)) {

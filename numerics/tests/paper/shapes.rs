@@ -1,4 +1,4 @@
-//! The paper's samples (errata.md, "Settled by reproducing the tables") beside those that other tests have too.
+//! The paper's samples (errata.md, "Settled by reproducing the tables"), with those that other tests share.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use super::common::clouds::{TORUS, cloud, torus_point};
 use super::random::Random;
 use super::support::Cloud;
 
-/// n random directions.
+/// n random points of the unit sphere.
 pub fn directions(n: usize, seed: u64) -> Cloud {
     let mut random = Random::of_seed(seed);
     cloud(&(0..n).map(|_| random.direction()).collect::<Vec<_>>())
@@ -21,7 +21,8 @@ pub fn fibonacci_torus(m: usize) -> Cloud {
     cloud(&(0..m).map(point).collect::<Vec<_>>())
 }
 
-/// The v below which a fraction of the torus' area lies, by Newton's method: the slope is at least R₁ − R₂ > 0.
+/// The v below which a fraction of the torus' area lies, by Newton's method. The
+/// slope is at least R₁ − R₂ > 0.
 fn angle_of_area(fraction: f64) -> f64 {
     let [r1, r2] = TORUS;
     (0..50).fold(TAU * fraction, |v: f64, _| {

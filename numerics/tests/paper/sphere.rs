@@ -1,7 +1,8 @@
 //! Table "Average relative L∞-error": f, ∇f and Δf on the unit sphere, Laplace ε = 1, α = 0.
 //!
-//! `f(x) = sin(π(1+2x₃))` on Fibonacci points. Each entry is the largest error at 32 random points over the largest exact value
-//! there (of a vector, its length), averaged over 20 draws of the 32 points.
+//! `f(x) = sin(π(1+2x₃))` on Fibonacci points. Each entry is the largest error at 32 random
+//! points over the largest exact value there, averaged over 20 draws of these points. Errors and
+//! values of a vector are lengths.
 
 use std::f64::consts::PI;
 
@@ -19,7 +20,7 @@ const PAPER: [(usize, [f64; 3]); 4] = [
 ];
 const DRAWS: u64 = 20;
 
-/// m = 64 … 512.
+/// The table for m = 64 … 512.
 pub fn table() -> Table {
     let row = |&(m, paper): &(usize, [f64; 3])| Row::beside(format!("m = {m}"), &paper, &errors(m));
     Table {
@@ -47,7 +48,7 @@ fn errors_at(surface: &Surface, queries: &Cloud) -> [f64; 3] {
     ]
 }
 
-/// A function at every point.
+/// Values of a function at every point.
 pub fn at(points: &Cloud, f: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     points.points().map(f).collect()
 }
@@ -57,13 +58,13 @@ pub fn value(x: &[f64]) -> f64 {
     (PI * (1.0 + 2.0 * x[2])).sin()
 }
 
-/// Not as printed: errata.md, 4.
+/// The surface gradient of the test function. The printed formula is wrong (errata.md, 4).
 fn gradient(x: &[f64]) -> [f64; 3] {
     let slope = 2.0 * PI * (PI * (1.0 + 2.0 * x[2])).cos();
     [-x[0] * x[2], -x[1] * x[2], 1.0 - x[2] * x[2]].map(|c| slope * c)
 }
 
-/// Not as printed: errata.md, 4.
+/// The Laplace–Beltrami of the test function. The printed formula is wrong (errata.md, 4).
 pub fn laplacian(x: &[f64]) -> f64 {
     let (sin, cos) = (PI * (1.0 + 2.0 * x[2])).sin_cos();
     4.0 * PI * PI * (x[2] * x[2] - 1.0) * sin - 4.0 * PI * x[2] * cos

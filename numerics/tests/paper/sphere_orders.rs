@@ -1,8 +1,9 @@
 //! Convergence orders on the unit sphere, Matérn 3/2 and 5/2, ℓ = 1, α = 0.
 //!
-//! The order is that in the spacing h ~ m^{−1/2}: each doubling of m divides the error by 2^{order/2}. Relative L² errors at
-//! 4,000 random points, the same for every m (Fibonacci points come close to the cloud where m is close to their number).
-//! The paper's theorem bounds orders from below; smooth data converge about twice as fast (errata.md, 11).
+//! Orders are in the spacing h ~ m^{−1/2}: each doubling of m divides the error by 2^{order/2}. Relative L²
+//! errors are taken at 4,000 random points, the same for every m. Fibonacci points as queries would come
+//! close to the cloud where m is near their number. The paper's theorem bounds orders from below. Smooth data
+//! converge about twice as fast (errata.md, 11).
 
 use super::common::clouds::fibonacci_sphere;
 use super::errors::relative_l2;
@@ -13,7 +14,7 @@ use super::table::{Paper, Row, Table};
 
 const COUNTS: [usize; 4] = [128, 256, 512, 1024];
 
-/// Orders from one m to the next.
+/// The table of orders from one m to the next.
 pub fn table() -> Table {
     Table {
         title: "Sphere, alpha = 0: orders of convergence in L2 of f, of its Laplace-Beltrami, and of rough values",
@@ -22,7 +23,7 @@ pub fn table() -> Table {
     }
 }
 
-/// Matérn ν = order + ½.
+/// Rows of the Matérn kernel with ν = order + ½.
 fn rows(order: u8) -> Vec<Row> {
     let errors = COUNTS.map(|m| errors(m, Family::Matern { order }));
     let row = |(m, pair): (&[usize], &[[f64; 3]])| {
@@ -46,7 +47,7 @@ fn errors(m: usize, family: Family) -> [f64; 3] {
     ]
 }
 
-/// `|x₃ − 0.1|^{3/2}`: two weak derivatives short of ε in L², hence order 2 whatever the kernel.
+/// The function `|x₃ − 0.1|^{3/2}`. It has 2 − ε weak derivatives in L², so the order is 2 for any kernel.
 fn rough_value(x: &[f64]) -> f64 {
     (x[2] - 0.1).abs().powf(1.5)
 }

@@ -1,18 +1,22 @@
 //! Figure "Implied curve of an exact sample of points of a full square and one with a corner removed", α = 0.
 //!
-//! [−1, 1]², 16 points per side, corners included; without the points with x, y > ½ in the second half. The share of the middles
-//! between neighbouring points that have level 1 within 0.01; the rays from the centre that level 1 crosses once; and where the
-//! ray towards (1, 1) crosses it (the corner is at 1.4142, the chord across the gap at 1.0607).
+//! The sample has 16 points per side of [−1, 1]², corners included. The second half of the figure leaves out
+//! the points with x, y > ½. Three quantities are measured:
 //!
-//! The paper: the level lines of an analytic function only try to follow a square; less regular kernels all but resolve that.
-//! Gauss' level 1 contains the lines through the sides: it goes on beyond the corners, and the diagonal touches it there without
-//! changing sides, hence null.
+//! - the share of midpoints between neighbouring points that have level 1 within 0.01,
+//! - the rays from the centre that level 1 crosses once,
+//! - the distance at which the ray towards (1, 1) crosses level 1. The corner is at 1.4142, the chord across
+//!   the gap at 1.0607.
+//!
+//! According to the paper, level lines of an analytic function only try to follow a square, and less regular
+//! kernels all but resolve it. The level 1 of Gauss contains the lines through the sides, so it goes on
+//! beyond the corners. The diagonal touches it at the corner without changing sides, hence null.
 
 use super::curves::{Station, crossings, lengths, points, rays_crossed_once};
 use super::support::{Family, GAUSS, Surface};
 use super::table::{Cell, Paper, Row, Table};
 
-/// Both halves of the figure, Gauss and a Laplace kernel with hardly any regularization.
+/// The table of both halves of the figure: Gauss, and a Laplace kernel with hardly any regularization.
 pub fn table() -> Table {
     let laplace = Family::Laplace { epsilon: 1e-5 };
     Table {
@@ -27,7 +31,7 @@ pub fn table() -> Table {
     }
 }
 
-/// Where the search along the diagonal starts, both ways: nearer to the gap than to the opposite corner.
+/// Coordinate of the start of the search along the diagonal, nearer to the gap than to the opposite corner.
 const BASE: f64 = 0.6;
 
 fn is_outside_the_gap(x: &[f64; 2]) -> bool {
@@ -50,7 +54,7 @@ fn row(label: &str, family: Family, keeps: impl Fn(&[f64; 2]) -> bool) -> Row {
     Row { label: label.to_owned(), cells: ours.map(|ours| Cell { paper: Paper::Figure, ours }).to_vec() }
 }
 
-/// The point at a parameter in [0, 4), one per side, with the normal of its side.
+/// The point at a parameter in [0, 4), one unit per side, with the normal of its side.
 fn square(s: f64) -> Station {
     let along = 2.0 * s.fract() - 1.0;
     match s as usize {
@@ -71,11 +75,11 @@ mod tests {
         println!("{table}");
         let full = table.row("Laplace eps = 1e-5").ours();
         assert_eq!(full[..2], [100.0, 360.0]);
-        // The corner is a point of the cloud, on level 1 but for the sag of √ε = 0.003.
+        // The corner is a point of the cloud, on level 1 except for the sag of √ε = 0.003.
         assert!((full[2] - 2f64.sqrt()).abs() < 0.003, "{}", full[2]);
         let bridged = table.row("Laplace eps = 1e-5, without a corner").ours();
         assert_eq!(bridged[..2], [100.0, 360.0]);
-        // Between the centre's side of the chord, by a quarter of the gap's width 0.707, and the missing corner.
+        // Between the missing corner and a point inside the chord by a quarter of the gap's width, 0.707.
         let chord = 1.5 / 2f64.sqrt();
         assert!(bridged[2] > chord - 0.707 / 4.0 && bridged[2] < 2f64.sqrt(), "{}", bridged[2]);
     }
@@ -85,7 +89,8 @@ mod tests {
         let table = table();
         for label in ["Gauss", "Gauss, without a corner"] {
             let row = table.row(label);
-            // Next to two corners of the second square the line leaves the sides, the only middles to fail.
+            // The only midpoints that fail are next to two corners of the second square, where
+            // the line leaves the sides.
             assert!(row.cells[0].ours.unwrap() > 85.0, "{label}");
             assert!(row.cells[1].ours.unwrap() < 180.0, "{label}");
         }

@@ -1,4 +1,4 @@
-//! Every call of the experiments into the library.
+//! Calls of the experiments into the library.
 
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::function::posterior;
@@ -16,7 +16,7 @@ use super::common::fits::{self, factorize, fit};
 
 /// The regularised Laplace kernel of the paper's tables.
 pub const LAPLACE: Family = Family::Laplace { epsilon: 1.0 };
-/// exp(−|x|²).
+/// The Gauss kernel exp(−|x|²).
 pub const GAUSS: Family = Family::Gauss;
 
 /// A cloud with its signature function u_X.
@@ -26,12 +26,12 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Fits the constant 1, ℓ = 1; the answers are those of the signature function alone, as the paper's.
+    /// Fits the constant 1 with ℓ = 1. Answers are those of the signature function alone, as in the paper.
     pub fn of(cloud: &Cloud, family: Family, alpha: f64) -> Self {
         Self::with_model(cloud, family, alpha, SurfaceModel::Signature)
     }
 
-    /// The same, answered by another model.
+    /// Fits the constant 1 with ℓ = 1. Answers are those of the given model.
     pub fn with_model(cloud: &Cloud, family: Family, alpha: f64, model: SurfaceModel) -> Self {
         // The paper's kernels have length scale 1 and variance 1.
         let factor = factorize(cloud, fits::kernel(family, 1.0), alpha);
@@ -54,20 +54,20 @@ impl Surface {
         (0..jets.n_queries()).map(|query| jets.gradient(query).to_vec()).collect()
     }
 
-    /// ū, the mean of u over the cloud: the level of the surface at α > 0.
+    /// The mean ū of u over the cloud: the level of the surface at α > 0.
     pub fn mean_level(&self) -> f64 {
         let levels = self.levels(self.cloud());
         levels.iter().sum::<f64>() / levels.len() as f64
     }
 
-    /// Outward normals; `None` where the gradient vanishes.
+    /// Outward normals, `None` where the gradient vanishes.
     pub fn normals(&self, queries: &Cloud) -> Vec<Option<Vec<f64>>> {
         let geometry = self.geometry(queries, Orientation::Outward);
         let normal = |query: usize| (!geometry.is_null()[query]).then(|| geometry.normal(query).to_vec());
         (0..geometry.n_queries()).map(normal).collect()
     }
 
-    /// Principal curvatures, ascending by value; `None` where the gradient vanishes.
+    /// Principal curvatures, ascending by value, `None` where the gradient vanishes.
     pub fn curvatures(&self, queries: &Cloud, orientation: Orientation) -> Vec<Option<Vec<f64>>> {
         let geometry = self.geometry(queries, orientation);
         let principal = geometry.curvatures(&Unobserved).unwrap().principal;
@@ -78,7 +78,7 @@ impl Surface {
             .collect()
     }
 
-    /// Values sampled at the points of the cloud.
+    /// The interpolant of values at the points of the cloud.
     pub fn function(&self, values: &[f64]) -> Function<'_> {
         Function { surface: self, interpolant: fit(&self.surface.signature().unwrap().solver, values) }
     }
@@ -106,12 +106,12 @@ pub struct Function<'a> {
 }
 
 impl Function<'_> {
-    /// f, `[m]`.
+    /// Values of f at the queries, `[m]`.
     pub fn values(&self, queries: &Cloud) -> Vec<f64> {
         self.interpolant.at(queries, JetOrder::Value, &Unobserved).unwrap().values()
     }
 
-    /// ∇_M f, `[m, d]`, and Δ_M f, `[m]`.
+    /// Surface gradients ∇_M f, `[m, d]`, and Laplace–Beltrami Δ_M f, `[m]`.
     pub fn surface_derivatives(&self, queries: &Cloud) -> (Vec<f64>, Vec<f64>) {
         let geometry = self.surface.geometry(queries, Orientation::Outward);
         assert!(geometry.degenerate().is_empty());

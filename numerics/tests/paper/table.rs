@@ -1,4 +1,4 @@
-//! Tables that put the paper's figure beside ours.
+//! Tables of the paper's numbers beside ours.
 
 use std::fmt;
 
@@ -9,39 +9,39 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
-/// One row of results.
+/// A row of results.
 pub struct Row {
     pub label: String,
     pub cells: Vec<Cell>,
 }
 
-/// One result.
+/// A result, beside the paper's.
 #[derive(Clone, Copy)]
 pub struct Cell {
     pub paper: Paper,
-    /// `None` where there is no answer: the gradient vanishes and the library says so, or no level line is found.
+    /// The number found, `None` where there is no answer: the gradient vanishes, or no level line is found.
     pub ours: Option<f64>,
 }
 
-/// What the paper prints.
+/// The kind of result that the paper prints.
 #[derive(Clone, Copy)]
 pub enum Paper {
     Number(f64),
     /// A picture without numbers.
     Figure,
-    /// Nothing: the result is ours alone.
+    /// Nothing: the result is only ours.
     Nothing,
 }
 
 impl Row {
-    /// Joins the numbers that the paper prints to ours.
+    /// A row of the paper's numbers beside ours.
     pub fn beside(label: impl Into<String>, paper: &[f64], ours: &[f64]) -> Self {
         assert_eq!(paper.len(), ours.len());
         let cell = |(&paper, &ours): (&f64, &f64)| Cell { paper: Paper::Number(paper), ours: Some(ours) };
         Self { label: label.into(), cells: paper.iter().zip(ours).map(cell).collect() }
     }
 
-    /// Numbers of ours, where the paper has something else.
+    /// A row of our numbers beside a picture or nothing.
     pub fn of(label: impl Into<String>, paper: Paper, ours: &[f64]) -> Self {
         let cell = |&ours: &f64| Cell { paper, ours: Some(ours) };
         Self { label: label.into(), cells: ours.iter().map(cell).collect() }
@@ -49,14 +49,14 @@ impl Row {
 }
 
 impl Table {
-    /// Measurements where the paper has pictures alone, one column without a name.
+    /// A table of measurements where the paper has only pictures: one column without a name.
     pub fn of_figure(title: &'static str, facts: &[(&str, f64)]) -> Self {
         let row = |&(label, ours): &(&str, f64)| Row::of(label, Paper::Figure, &[ours]);
         Self { title, columns: vec![""], rows: facts.iter().map(row).collect() }
     }
 }
 
-/// Under each column of the table, the paper's figure and ours.
+/// Prints the paper's number and ours under each column.
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let label_width = self.rows.iter().map(|row| row.label.chars().count()).max().unwrap_or(0);
@@ -89,7 +89,7 @@ impl fmt::Display for Cell {
     }
 }
 
-/// Counts as they are, four or five digits of moderate numbers, three of others.
+/// Formats whole numbers below 1e4 as they are, moderate numbers with four or five digits, others with three.
 fn short(number: f64) -> String {
     match number.abs() {
         x if x < 1e4 && x.fract() == 0.0 => format!("{number:.0}"),

@@ -7,7 +7,7 @@ use super::support::{Family, GAUSS, LAPLACE, Surface};
 use super::table::{Row, Table};
 use super::torus::{ALPHA, COLUMNS, errors};
 
-/// L∞ of both curvatures, then L² of both, as the paper orders them (by size).
+/// The paper's rows: m, L∞ of both curvatures, then L² of both, in the paper's order ("by size").
 type Paper = [(usize, [f64; 4]); 5];
 
 const PAPER_GAUSS: Paper = [
@@ -25,14 +25,14 @@ const PAPER_LAPLACE: Paper = [
     (1024, [1.16e-6, 7.40e-7, 4.79e-7, 1.85e-7]),
 ];
 
-/// The Gauss kernel.
+/// The table of the Gauss kernel.
 pub fn table_gauss() -> Table {
     let title =
         "Fibonacci torus, Gauss, alpha = 1e-10: relative error of the curvatures, median of 20 circles";
     table(title, GAUSS, &PAPER_GAUSS)
 }
 
-/// The Laplace kernel, ε = 1.
+/// The table of the Laplace kernel, ε = 1.
 pub fn table_laplace() -> Table {
     let title = "Fibonacci torus, Laplace eps = 1, alpha = 1e-10: relative error of the curvatures, median of 20 circles";
     table(title, LAPLACE, &PAPER_LAPLACE)
@@ -52,8 +52,8 @@ mod tests {
     use super::super::bounds::assert_errors_are_the_papers_or_smaller;
     use super::*;
 
-    /// α shifts the level of the surface by about α/λ along each eigenvector of K: errors of 1e-8 in second derivatives, at
-    /// which the paper's own L² entry stands.
+    /// The bound at m = 1,024. α shifts the level of the surface by about α/λ along each eigenvector of K.
+    /// This leaves errors of 1e-8 in second derivatives, where the paper's own L² entry stands.
     const LIMIT_OF_ALPHA: f64 = 3e-8;
 
     #[test]

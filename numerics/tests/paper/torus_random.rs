@@ -9,7 +9,7 @@ use super::support::{Family, GAUSS, LAPLACE, Surface};
 use super::table::{Row, Table};
 use super::torus::{ALPHA, COLUMNS, errors};
 
-/// L∞ of both curvatures, then L² of both, as the paper orders them (by size).
+/// The paper's rows: m, L∞ of both curvatures, then L² of both, in the paper's order ("by size").
 type Paper = [(usize, [f64; 4]); 5];
 
 const PAPER_GAUSS: Paper = [
@@ -27,13 +27,13 @@ const PAPER_LAPLACE: Paper = [
     (1024, [8.51e-6, 4.18e-6, 3.78e-6, 1.39e-6]),
 ];
 
-/// The Gauss kernel. Its entry for m = 256 cannot be right: errata.md, 12.
+/// The table of the Gauss kernel. The paper's entry for m = 256 cannot be right (errata.md, 12).
 pub fn table_gauss() -> Table {
     let title = "Random torus, Gauss, alpha = 1e-10: relative error of the curvatures, median of 20 clouds";
     table(title, GAUSS, &PAPER_GAUSS)
 }
 
-/// The Laplace kernel, ε = 1.
+/// The table of the Laplace kernel, ε = 1.
 pub fn table_laplace() -> Table {
     let title =
         "Random torus, Laplace eps = 1, alpha = 1e-10: relative error of the curvatures, median of 20 clouds";
@@ -58,8 +58,9 @@ fn run(m: usize, family: Family, seed: u64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// Bounds at m = 1,024 alone: below it the largest hole of a cloud rules its errors, which differ by more than a decade from
-    /// cloud to cloud. At 1,024 Gauss is at the limit of α, 1e-8, in every cloud: 10 times that.
+    /// Bounds are set only at m = 1,024. Below it the largest hole of a cloud determines its errors, which
+    /// differ by more than a decade from cloud to cloud. At 1,024 Gauss is at the limit of α, 1e-8, in every
+    /// cloud. The bound is 10 times that.
     #[test]
     fn with_1024_points_gauss_curvatures_are_right_to_1e_7() {
         let table = table_gauss();
@@ -68,7 +69,7 @@ mod tests {
         assert_errors_fall(&table);
     }
 
-    /// 7 times the paper's entry: its cloud is one of those that differ by a decade.
+    /// The bound is 7 times the paper's entry, whose cloud is one of those that differ by a decade.
     #[test]
     fn with_1024_points_laplace_curvatures_are_right_to_6e_5() {
         let table = table_laplace();
@@ -77,7 +78,7 @@ mod tests {
         assert_errors_fall(&table);
     }
 
-    /// Convergence: twice the points at least halve the median error.
+    /// Asserts convergence: doubling the points at least halves the median error.
     fn assert_errors_fall(table: &Table) {
         for pair in table.rows.windows(2) {
             let falls =

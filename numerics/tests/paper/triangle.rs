@@ -1,8 +1,9 @@
 //! Figure "Reconstruction of a triangle from 48 sample points": Gauss and Laplace ε = 1e-5, α = 0.
 //!
-//! Equilateral, vertices on the unit circle, 16 points per edge, the vertices among them. Normals are compared with those of the
-//! edges at the 45 points that are no vertices, the level line half way between neighbouring points. The paper: Gauss has
-//! useful normals but "complicated level lines", Laplace takes the abrupt turns.
+//! The triangle is equilateral with vertices on the unit circle, 16 points per edge, vertices included.
+//! Normals are compared with those of the edges at the 45 points that are no vertices. The level line is
+//! compared half way between neighbouring points. According to the paper, Gauss has useful normals but
+//! "complicated level lines", and Laplace takes the abrupt turns.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +12,7 @@ use super::errors::{largest, median};
 use super::support::{Family, GAUSS, Surface};
 use super::table::{Paper, Row, Table};
 
-/// Both halves of the figure.
+/// The table of both halves of the figure.
 pub fn table() -> Table {
     Table {
         title: "Triangle, 48 points, alpha = 0: normals at the points, level 1 half way between, rays it crosses once",
@@ -34,7 +35,7 @@ fn facts(family: Family) -> [f64; 4] {
     [median(angles.clone()), largest(&angles), largest(&distances), rays]
 }
 
-/// The point at a parameter in [0, 3), one per edge, with the normal of its edge.
+/// The point at a parameter in [0, 3), one unit per edge, with the normal of its edge.
 fn triangle(s: f64) -> Station {
     let vertex = |i: f64| [(TAU * i / 3.0).cos(), (TAU * i / 3.0).sin()];
     let (edge, along) = (s.floor(), s.fract());
@@ -47,8 +48,8 @@ fn triangle(s: f64) -> Station {
 mod tests {
     use super::*;
 
-    /// Edges are analytic: Gauss is right on them to what rounding leaves of an ill-conditioned fit. But its level 1 contains their
-    /// extensions beyond the vertices, which rays cross a second time.
+    /// Edges are analytic, so Gauss is right on them up to the rounding of an ill-conditioned fit. But its
+    /// level 1 contains the extensions of the edges beyond the vertices, and rays cross these a second time.
     #[test]
     fn gauss_has_useful_normals_and_complicated_level_lines() {
         let table = table();
@@ -58,7 +59,8 @@ mod tests {
         assert!(rays < 330.0, "{rays}");
     }
 
-    /// Between the points level 1 sags by at most 5 % of their distance, 0.108; next to the vertices that tilts the normals.
+    /// Level 1 sags between the points by at most 5 % of their distance, 0.108. Next to the
+    /// vertices this tilts the normals.
     #[test]
     fn laplace_takes_the_turns_with_one_simple_curve() {
         let table = table();

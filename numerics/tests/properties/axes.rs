@@ -1,4 +1,4 @@
-//! A length scale for each axis: the kernel of a stretched cloud, whose derivatives follow by the chain rule.
+//! Kernels with a length scale for each axis: those of a stretched cloud, with derivatives by the chain rule.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::common::fits::{factorize, fit, geometry};
 use crate::common::random::Random;
 use crate::support::{distance, families, families_without_kink, kernel, largest, norm, rounding};
 
-/// Factors without rounding: in stretched coordinates everything is the same to the last bits.
+/// Length scales that are powers of two, as are the factors ℓ/ℓ_c: stretching rounds nothing.
 const LENGTH_SCALES: [f64; 3] = [1.0, 4.0, 0.5];
 const FACTORS: [f64; 3] = [0.5, 0.125, 1.0];
 
@@ -34,7 +34,7 @@ fn of_one(family: Family) -> Kernel {
     Kernel::new(family, 0.5, 1.7).unwrap()
 }
 
-/// Derivatives in coordinates of those in stretched ones, query by query.
+/// Gradients and Hessians in coordinates from those in stretched coordinates, query by query.
 fn by_chain_rule(jets: &Jets) -> (Vec<f64>, Vec<f64>) {
     let gradients = jets.gradients().iter().enumerate().map(|(at, g)| g * FACTORS[at % 3]).collect();
     let factor = |at: usize| FACTORS[at / 3 % 3] * FACTORS[at % 3];
@@ -51,7 +51,7 @@ fn are_equal(found: &[f64], expected: &[f64], family: Family, what: &str) {
 #[test]
 fn functions_and_their_error_bars_are_those_of_the_stretched_cloud() {
     let random = &mut Random(3);
-    // Enough points for the pass over half of the pairs, and for the plain one.
+    // 1,200 points take the pass over half of the pairs, 40 the plain one.
     for n in [40, 1200] {
         let (cloud, queries) = (random_cube(n, 3, random), random_cube(9, 3, random));
         let [far_cloud, far_queries] = [&cloud, &queries].map(|points| stretched(points, &FACTORS));
@@ -82,7 +82,7 @@ fn functions_and_their_error_bars_are_those_of_the_stretched_cloud() {
     }
 }
 
-/// Of derivatives in coordinates and in stretched ones.
+/// Asserts that deviations in coordinates follow from those in stretched coordinates.
 fn have_equal_deviations(a: &JetDeviations, b: &JetDeviations, family: Family) {
     let first = |at: usize| FACTORS[at % 3];
     let gradients: Vec<f64> = b.gradients.iter().enumerate().map(|(at, g)| g * first(at)).collect();
@@ -127,7 +127,7 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
 
 #[test]
 fn matrices_of_operators_are_the_operators() {
-    // The surface has a kernel of its own: its normals have nothing to do with the stretching.
+    // The surface has a kernel of its own, so its normals are independent of the stretching.
     let axes = [1.3, 1.0, 0.8];
     let (cloud, queries) =
         (stretched(&fibonacci_sphere(100), &axes), stretched(&fibonacci_sphere(23), &axes));
@@ -152,7 +152,7 @@ fn matrices_of_operators_are_the_operators() {
         let applied = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
         let matrices =
             surface_gradient_matrices(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
-        // The matrices are one for each component, the gradients one for each query.
+        // Matrices come one for each component, gradients one for each query.
         let by_component = product(&matrices);
         let m = queries.n_points();
         let found: Vec<f64> = (0..3 * m).map(|at| by_component[at % 3 * m + at / 3]).collect();

@@ -1,5 +1,5 @@
-//! What is chosen for a cloud, sites, means of points, groups of values, is chosen by distances: neither the
-//! order of the points nor the axes matter.
+//! Choices that are made for a cloud: sites, means of points, groups of values. They depend on distances
+//! only, so neither the order of the points nor the axes matter.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use gramian_numerics::solver::trend::Mean;
 use crate::common::random::Random;
 use crate::support::rotation;
 
-/// Random points of a circle or a sphere that is pressed together, with noise of 1 %.
+/// Random points of a flattened circle or sphere with noise of 1 %.
 fn noisy(n: usize, d: usize) -> Cloud {
     let mut random = Random(11);
     let mut point = || {
@@ -25,13 +25,12 @@ fn noisy(n: usize, d: usize) -> Cloud {
     Cloud::new((0..n).flat_map(|_| point()).collect(), d).unwrap()
 }
 
-/// Where point i of n comes in another order: 1,009 is a prime, and none of the sizes here is a multiple of
-/// it.
+/// The index of point i of n in another order. 1,009 is a prime that divides none of the sizes here.
 fn place(i: usize, n: usize) -> usize {
     i * 1009 % n
 }
 
-/// The cloud turned and in another order.
+/// The cloud rotated and in another order.
 fn moved(cloud: &Cloud) -> Cloud {
     let (n, d) = (cloud.n_points(), cloud.dimension());
     let turned = rotation(d, &[0.3, 1.1, 2.0]);
@@ -74,7 +73,7 @@ fn parts_with_the_same_sites_learn_the_same() {
         let points = whole.points().filter(|x| x[2] > least);
         Cloud::new(points.flatten().copied().collect(), 3).unwrap()
     };
-    // Neighbourhoods reach 0.2 at most.
+    // Neighbourhoods have a radius of at most 0.2, so those of the sites lie within the part.
     let (part, sites) = (above(-0.4), above(0.9));
     let at_sites = |cloud: &Cloud| {
         let cloud = Arc::new(cloud.clone());
@@ -104,7 +103,8 @@ fn what_values_decide_changes_by_rounding_alone() {
         values.iter().enumerate().for_each(|(i, value)| others[place(i, n)] = *value);
         let (a, b) = (learned(&cloud, &values), learned(&moved(&cloud), &others));
         assert_eq!(a.family, b.family);
-        // Searches end where the likelihood is flat to rounding, which leaves half of the digits.
+        // Searches end where the likelihood is flat to rounding, which leaves half of the
+        // digits: 1e-6 allows for more.
         for (x, y) in [(a.length_scale, b.length_scale), (a.ratio, b.ratio), (a.variance, b.variance)] {
             assert!((x / y - 1.0).abs() < 1e-6, "{n}, {d}: {x} {y}");
         }

@@ -1,4 +1,4 @@
-//! Fits: interpolation, the proposition on regularization, derivatives, the Gaussian process.
+//! Fits: interpolation, the proposition on regularization, derivatives, and the Gaussian process.
 
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::function::posterior::{covariance, log_marginal_likelihood, variances};
@@ -24,8 +24,8 @@ fn absolute_sum(weights: &[f64]) -> f64 {
 
 #[test]
 fn without_regularization_the_fit_interpolates() {
-    // The scattered points on a line drive the smooth kernels into the fallback, those in R⁴ leave Wendland
-    // out.
+    // The scattered points on a line drive the smooth kernels into the fallback.
+    // Those in R⁴ exclude Wendland.
     let line = (random_cube(20, 1, &mut Random(2)), 0.7);
     for (cloud, length_scale) in [
         (fibonacci_sphere(150), 1.0),
@@ -41,8 +41,8 @@ fn without_regularization_the_fit_interpolates() {
             let factor = factorize(&cloud, kernel.clone(), 0.0);
             let u = fit(&factor, &values);
             let error = distance(&jets(&u, &cloud, JetOrder::Value).values(), &values);
-            // Cholesky is backward stable: n ε k₀ Σ|λ|. The fallback leaves out directions of power below
-            // √(64 ε k₀).
+            // Cholesky is backward stable: n ε k₀ Σ|λ|. The fallback drops directions
+            // of power below √(64 ε k₀).
             let solved = cloud.n_points() as f64 * EPS * kernel.at_zero() * absolute_sum(&u.solution.weights);
             let left_out = match factor.method() {
                 Method::Cholesky => 0.0,
@@ -91,7 +91,7 @@ fn the_loss_of_norm_is_the_distance_plus_twice_the_misfit_over_alpha() {
             let distance = dot(&difference, &times(&gram, &difference));
             let lost = interpolant.native_norm_squared - smoothed.native_norm_squared;
             let error = lost - distance - 2.0 / alpha * smoothed.misfit.powi(2);
-            // Weights are right to n ε cond, and every term is at most 2‖u⁰‖².
+            // Weights are right to n ε cond, and each of the terms is at most 2‖u⁰‖².
             let tolerance = 4.0 * rounding(&exact) * interpolant.native_norm_squared;
             assert!(error.abs() <= tolerance, "{family:?} alpha {alpha:e}: {error:e} against {tolerance:e}");
         }
@@ -100,14 +100,14 @@ fn the_loss_of_norm_is_the_distance_plus_twice_the_misfit_over_alpha() {
 
 #[test]
 fn derivatives_agree_with_central_differences_off_the_cloud() {
-    // Off the cloud also the kernels with a kink are smooth.
+    // Off the cloud kernels with a kink are smooth as well.
     let (cloud, queries, h) = (fibonacci_sphere(60), random_cube(15, 3, &mut Random(4)), 1e-5);
     let values = waves(&cloud);
     for family in families() {
         let u = fit(&factorize(&cloud, kernel(family, 1.1), 1e-4), &values);
         let here = jets(&u, &queries, JetOrder::Hessian);
-        // Truncation h²/6 · derivative of order ≤ 4, at most 1e3 for √ε = 0.1 and at this distance from the
-        // kinks; rounding ε/h is far below.
+        // Truncation is h²/6 times a derivative of order at most 4. This is at most 1e3 for √ε = 0.1 and at
+        // this distance from the kinks. Rounding, ε/h, is far below.
         let tolerance = 200.0 * h * h * u.solver.kernel().at_zero() * absolute_sum(&u.solution.weights);
         for axis in 0..3 {
             let below = jets(&u, &shifted(&queries, axis, -h), JetOrder::Gradient);
@@ -142,7 +142,7 @@ fn the_posterior_and_its_likelihood_are_those_of_a_direct_computation() {
         let expected = -0.5 * (quadratic + log_determinant + normalization);
         let solution = fit(&factor, &values).solution;
         let found = log_marginal_likelihood(&factor, &solution, 1.0).unwrap();
-        // Both factors are off by n ε cond relative to what they stand for.
+        // Both factors are off by n ε cond relative to the matrices that they factorize.
         let tolerance = rounding(&factor);
         let error = (found - expected).abs();
         assert!(error <= tolerance * (quadratic + 12.0), "{family:?}: likelihood {found} not {expected}");
@@ -164,7 +164,7 @@ fn covariances_are_symmetric_and_positive_semidefinite_with_the_variances_on_the
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
         let found = covariance(&factor, &queries, &Unobserved).unwrap().latent;
         let mut lifted = found.clone();
-        // Rounding of k₀ − |L⁻¹k|², by n ε cond, may cost the smallest eigenvalues their sign.
+        // The smallest eigenvalues may turn negative by the rounding of k₀ − |L⁻¹k|², n ε cond.
         let tolerance = rounding(&factor) * factor.kernel().at_zero();
         lifted.iter_mut().step_by(21).for_each(|diagonal| *diagonal += tolerance);
         assert!(cholesky(&lifted).is_some(), "{family:?}: not positive semidefinite");
@@ -186,13 +186,13 @@ fn variances_lie_between_zero_and_the_prior_and_fall_with_every_point() {
             let factor = factorize(&cloud, kernel.clone(), 1e-4);
             let now = latent(&factor, &queries);
             assert!(now.iter().all(|&variance| variance >= 0.0), "{family:?}");
-            // Without rounding no variance grows; φ(0) itself is right to 4 ε.
+            // In exact arithmetic no variance grows. φ(0) itself is right to 4 ε.
             let tolerance = kernel.at_zero() * (4.0 * EPS + rounding(&factor));
             let growth = now.iter().zip(&before).map(|(now, before)| now - before).fold(0.0, f64::max);
             assert!(growth <= tolerance, "{family:?}: {growth:e} at {n} points");
             before = now;
         }
-        // Among the queries are some within ℓ/4 of a point: they have lost at least a tenth.
+        // Some queries lie within ℓ/4 of a point: their variance has fallen by at least a tenth.
         assert!(before.iter().any(|&variance| variance < 0.9 * kernel.at_zero()), "{family:?}");
         assert!(largest(latent(&factorize(&all, kernel.clone(), 0.0), &all)) <= 1e-9 * kernel.at_zero());
     }

@@ -1,4 +1,4 @@
-//! Similarities of space and renumberings of the cloud carry over to every answer.
+//! Invariance: similarities of space and renumberings of the cloud carry over to every answer.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -15,8 +15,8 @@ use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle, 
 use crate::common::fits::{factorize, fit, geometry};
 use crate::support::{distance, families, largest, rotation, rounding, width};
 
-/// `x ↦ s R x + t` together with a new order of the points: point i of the image is the image of point
-/// `order[i]`.
+/// A similarity `x ↦ s R x + t` with a new order of the points. Point i of the image is the
+/// image of point `order[i]`.
 struct Similarity {
     scale: f64,
     rotation: Vec<f64>,
@@ -34,14 +34,14 @@ impl Similarity {
         }
     }
 
-    /// R applied to each of the vectors `[m, d]`.
+    /// The vectors `[m, d]`, each multiplied by R.
     fn rotate(&self, vectors: &[f64]) -> Vec<f64> {
         let d = self.translation.len();
         let entry = |x: &[f64], row: usize| (0..d).map(|c| self.rotation[row * d + c] * x[c]).sum::<f64>();
         vectors.chunks(d).flat_map(|x| (0..d).map(move |row| entry(x, row))).collect()
     }
 
-    /// `R S Rᵀ` for each of the symmetric matrices `[m, d, d]`.
+    /// The symmetric matrices `[m, d, d]`, each turned to `R S Rᵀ`.
     fn rotate_both_sides(&self, matrices: &[f64]) -> Vec<f64> {
         let d = self.translation.len();
         let rotate_and_transpose = |matrix: &[f64]| {
@@ -60,15 +60,15 @@ impl Similarity {
         Cloud::new(moved.collect(), cloud.dimension()).unwrap()
     }
 
-    /// The entries of each row, one per point, in the new order.
+    /// Rows of one entry per point, with entries in the new order.
     fn reorder(&self, rows: &[f64]) -> Vec<f64> {
         rows.chunks(self.order.len()).flat_map(|row| self.order.iter().map(|&i| row[i])).collect()
     }
 }
 
-/// What the numerics says of a cloud, values at its points and queries.
+/// All answers for a cloud, values at its points, and queries.
 struct Answers {
-    /// n ε cond of the fit.
+    /// Relative rounding of the fit, n ε cond.
     rounding: f64,
     degenerate: Vec<bool>,
     fields: Vec<(&'static str, Vec<f64>)>,
@@ -93,7 +93,8 @@ fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha
     Answers { rounding: rounding(&factor), degenerate: geometry.is_null().to_vec(), fields }
 }
 
-/// `Σ κ_i d_i d_iᵀ`, `[m, d, d]`: unlike the directions it has no sign to choose and no umbilics.
+/// Shape operators `Σ κ_i d_i d_iᵀ`, `[m, d, d]`. Unlike directions they have no
+/// arbitrary sign and no umbilics.
 fn shape(principal: &[f64], directions: &[f64], d: usize) -> Vec<f64> {
     let at_query = |(curvatures, directions): (&[f64], &[f64])| {
         let term =
@@ -103,7 +104,7 @@ fn shape(principal: &[f64], directions: &[f64], d: usize) -> Vec<f64> {
     principal.chunks(d - 1).zip(directions.chunks((d - 1) * d)).flat_map(at_query).collect()
 }
 
-/// How a field of the original becomes the field of the image.
+/// The field of the image that a similarity makes of a field of the original.
 fn carried(name: &str, field: &[f64], by: &Similarity) -> Vec<f64> {
     let (s, d) = (by.scale, by.translation.len() as i32);
     let divided = |field: Vec<f64>, divisor: f64| field.iter().map(|x| x / divisor).collect();
@@ -119,8 +120,8 @@ fn carried(name: &str, field: &[f64], by: &Similarity) -> Vec<f64> {
     }
 }
 
-/// A stretched sphere and a stretched circle, each with queries on it that are no points of it: all kernels
-/// are smooth there.
+/// A stretched sphere and a stretched circle, each with queries on the surface that are no points of the
+/// cloud. All kernels are smooth there.
 fn settings() -> [(Cloud, Cloud); 2] {
     let (axes, plane_axes) = ([1.3, 1.0, 0.8], [1.4, 0.9]);
     [
@@ -170,7 +171,7 @@ proptest! {
                 translation: translation[..d].to_vec(),
                 ..Similarity::identity(d, n)
             };
-            // The coordinates move by ε (1 + |t|) ≤ 10 ε, the weights by that times cond.
+            // Coordinates move by ε (1 + |t|) ≤ 10 ε, and weights by that times the condition.
             check(&cloud, &queries, &moved, |rounding| 10.0 * rounding);
         }
     }
@@ -219,7 +220,7 @@ fn variance_and_alpha_times_four_are_another_unit_of_the_values() {
             };
             for ((name, once), (_, fourfold)) in answers(1.0).fields.iter().zip(&answers(4.0).fields) {
                 let unit = if *name == "variances" { 4.0 } else { 1.0 };
-                // Exact: 4 and its root are powers of two.
+                // Exact, since 4 and its root are powers of two.
                 assert!(once.iter().zip(fourfold).all(|(a, b)| unit * a == *b), "{family:?} {name}");
             }
         }

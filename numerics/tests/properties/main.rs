@@ -1,8 +1,8 @@
-//! Properties of the numerics that hold for every kernel, through the public API alone.
+//! Properties of the numerics that hold for every kernel, tested through the public API.
 //!
-//! A kernel is left out of a property only where mathematics leaves it out, and the test says why. Clouds and
-//! random numbers are seeded, tolerances are bounds from rounding (n ε cond) or from the order of
-//! convergence.
+//! A kernel is left out of a property only where mathematics excludes it, and the test says why.
+//! Clouds and random numbers are seeded. Tolerances are bounds from rounding (n ε cond) or from
+//! the order of convergence.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,5 +1,5 @@
-//! Operators and shape: constants, coordinates of spheres, the shape operator against differences of the
-//! normals.
+//! Operators and shape: constants, coordinates of spheres, and the shape operator
+//! against differences of normals.
 
 use std::sync::Arc;
 
@@ -22,11 +22,11 @@ use crate::support::{
 const C4: Family = Family::Wendland { smoothness: WendlandSmoothness::C4 };
 const C6: Family = Family::Wendland { smoothness: WendlandSmoothness::C6 };
 
-/// p of a kernel in C^{2p}, the native space H^{p + (d+1)/2}; 4 stands for more, where rounding ends the
-/// asymptotics.
+/// Smoothness p of a kernel in C^{2p}, whose native space is H^{p + (d+1)/2}. 4 stands for 4 and more, where
+/// rounding ends the asymptotics.
 ///
-/// Laplace ε = 0.01 counts as rough: with √ε ℓ below the spacing the analytic neighbourhood of its cusp is
-/// not resolved.
+/// Laplace ε = 0.01 counts as rough: with √ε ℓ below the spacing the analytic neighbourhood of
+/// its cusp is not resolved.
 fn smoothness(family: Family) -> i32 {
     match family {
         Family::Matern { order } => i32::from(order.min(4)),
@@ -46,7 +46,7 @@ fn laplacian(geometry: &Geometry, u: &Interpolant, queries: &Cloud) -> Vec<f64> 
     laplace_beltrami(geometry, u, queries, &Unobserved).unwrap()
 }
 
-/// An ellipsoid and queries on it that are none of its points, where all kernels are smooth.
+/// An ellipsoid, and queries on it that are none of its points, where all kernels are smooth.
 fn ellipsoid() -> (Cloud, Cloud) {
     let axes = [1.3, 1.0, 0.8];
     (stretched(&fibonacci_sphere(100), &axes), stretched(&fibonacci_sphere(23), &axes))
@@ -63,7 +63,7 @@ fn one_fit_for_surface_and_values_annihilates_constants() {
         let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
         let jets = u.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
         for query in 0..queries.n_points() {
-            // The two terms cancel up to the few operations that make each of them.
+            // The two terms cancel up to the rounding of the few operations that compute each of them.
             let (slope, bend) = (norm(jets.gradient(query)), norm(&jets.hessian(query)));
             assert!(norm(&gradients[query * 3..][..3]) <= 16.0 * EPS * slope, "{family:?}: gradient");
             assert!(laplacians[query].abs() <= 64.0 * EPS * bend, "{family:?}: {:e}", laplacians[query]);
@@ -96,15 +96,15 @@ fn with_two_kernels_the_laplacian_of_a_constant_tends_to_zero() {
             let geometry = geometry(&exact_factor(&cloud, surface, 1.0), &cloud);
             largest(laplacian(&geometry, &constant, &cloud))
         });
-        // Of order h^{2p+1} as for coordinates, h ~ n^{−1/2}; half of the gain is asserted.
+        // The order is h^{2p+1} as for coordinates, with h ~ n^{−1/2}. Half of the gain is asserted.
         let gain = 0.5 * 2f64.powf(f64::from(smoothness(surface).min(smoothness(data))) + 0.5);
         let converges = errors.windows(2).all(|pair| pair[1] * gain < pair[0]);
         assert!(converges, "{surface:?} with {data:?}: {errors:?}, expected to gain {gain}");
     }
 }
 
-/// Largest error of Δ x_c = −(d − 1) x_c over the coordinates of the unit sphere, one fit for surface and
-/// values.
+/// Largest error of Δ x_c = −(d − 1) x_c over the coordinates of the unit sphere.
+/// Surface and values share a fit.
 fn coordinate_error(factor: &Arc<Solver>, queries: &Cloud) -> f64 {
     let (cloud, geometry) = (factor.cloud(), geometry(factor, queries));
     assert!(geometry.is_null().iter().all(|is_null| !is_null));
@@ -117,13 +117,17 @@ fn coordinate_error(factor: &Arc<Solver>, queries: &Cloud) -> f64 {
     largest((0..cloud.dimension()).map(error))
 }
 
-/// Kernels with a kink have no Laplacian at the points, and away from them theirs does not converge: left
-/// out.
+/// Checks the order at which the Laplacians of the coordinates converge, on the points and between them.
 ///
-/// In the native space H^m of R^d, m = p + (d + 1)/2, smooth data converge at twice the theorem's order
-/// (errata.md, 11): the function at 2(m − ½) = 2p + d in h, and every derivative costs one, so Δ at 2p + d −
-/// 2. Constants stay under 30 at the scale h/ℓ, half of the gain is asserted; below 1e-10 it is the rounding
-/// of second derivatives that is met.
+/// Kernels with a kink are left out. They have no Laplacian at the points, and away from them
+/// theirs does not converge.
+///
+/// In the native space H^m of R^d, m = p + (d + 1)/2, smooth data converge at twice the theorem's
+/// order (errata.md, 11). For the function this is 2(m − ½) = 2p + d in h. Every derivative costs
+/// one, so Δ has 2p + d − 2.
+///
+/// Constants stay under 30 at the scale h/ℓ. Half of the gain is asserted. Below 1e-10 the error is the
+/// rounding of second derivatives.
 fn check_coordinates(clouds: [Cloud; 2], spacings: [f64; 2], queries: &Cloud, length_scale: f64) {
     for family in families_without_kink() {
         let order = 2 * smoothness(family) + queries.dimension() as i32 - 2;
@@ -173,8 +177,8 @@ fn the_shape_operator_is_the_derivative_of_the_normals() {
             let along = |v: &[f64], c: usize| (0..3).map(|axis| v[axis] * slopes[axis][query * 3 + c]).sum();
             let divergence: f64 = (0..3).map(|axis| slopes[axis][query * 3 + axis]).sum();
             let size = slopes.iter().map(|slope| norm(&slope[query * 3..][..3])).fold(1.0, f64::max);
-            // Truncation: h² over the square of the distance to the nearest kink, 0.05 or more. Rounding:
-            // ε/h.
+            // Truncation is h² over the square of the distance to the nearest kink, 0.05
+            // or more. Rounding is ε/h.
             let tolerance = 1e-7 * size;
             let error = (divergence - here.trace_of_shape_operator(query)).abs();
             assert!(error <= tolerance, "{family:?}: trace off by {error:e} of {divergence}");

@@ -1,4 +1,4 @@
-//! Kernels and small dense algebra shared by the properties.
+//! Kernels and small dense algebra shared by the tests of properties.
 
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
@@ -10,23 +10,23 @@ pub use crate::common::kernels::all_families as families;
 
 pub const EPS: f64 = f64::EPSILON;
 
-/// The families with derivatives at the points of the cloud: all but Laplace ε = 0 and Matérn 1/2, which have
-/// a kink there.
+/// Families with derivatives at the points of the cloud: all but Laplace ε = 0 and
+/// Matérn 1/2, which have a kink.
 pub fn families_without_kink() -> Vec<Family> {
     families().into_iter().filter(|&family| !kernel(family, 1.0).has_kink()).collect()
 }
 
-/// Variance 1.7, so that a forgotten or doubled factor shows.
+/// A kernel of variance 1.7, so that a forgotten or doubled factor shows.
 pub fn kernel(family: Family, length_scale: f64) -> Kernel {
     Kernel::new(family, length_scale, 1.7).unwrap()
 }
 
-/// The length scale at which a family is as wide as Matérn's at 1: Wendland's is the radius of a support.
+/// The length scale at which a family is as wide as Matérn at 1. That of Wendland is the radius of a support.
 pub fn width(family: Family) -> f64 {
     if matches!(family, Family::Wendland { .. }) { 3.0 } else { 1.0 }
 }
 
-/// `k(q_i, x_j)`, `[m, n]`, by evaluating each kernel translate at the queries.
+/// The cross Gram matrix `k(q_i, x_j)`, `[m, n]`, by evaluating each kernel translate at the queries.
 pub fn cross_gram(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Vec<f64> {
     let (n, m) = (cloud.n_points(), queries.n_points());
     let mut matrix = vec![0.0; m * n];
@@ -39,8 +39,8 @@ pub fn cross_gram(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Vec<f64> {
     matrix
 }
 
-/// The lower triangular L of `A = LLᵀ`, row by row, from the textbook loop; `None` if A is not positive
-/// definite.
+/// The lower triangular L of `A = LLᵀ`, by rows, from the textbook loop. `None` if A
+/// is not positive definite.
 pub fn cholesky(a: &[f64]) -> Option<Vec<f64>> {
     let n = a.len().isqrt();
     let mut l = vec![0.0; n * n];
@@ -56,7 +56,7 @@ pub fn cholesky(a: &[f64]) -> Option<Vec<f64>> {
     Some(l)
 }
 
-/// `L⁻¹ b`.
+/// Solves for `L⁻¹ b`.
 pub fn forward_solve(l: &[f64], b: &[f64]) -> Vec<f64> {
     let n = b.len();
     let mut x: Vec<f64> = Vec::with_capacity(n);
@@ -71,7 +71,7 @@ pub fn rounding(factor: &Solver) -> f64 {
     factor.n_points() as f64 * EPS / factor.reciprocal_condition()
 }
 
-/// The cloud moved along one axis.
+/// The cloud moved by h along one axis.
 pub fn shifted(cloud: &Cloud, axis: usize, h: f64) -> Cloud {
     let d = cloud.dimension();
     let moved = |(i, x): (usize, &f64)| if i % d == axis { x + h } else { *x };
@@ -86,18 +86,19 @@ pub fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Largest magnitude; NaN if there is one, so that no comparison with a tolerance passes it.
+/// Largest magnitude, or NaN if any entry is NaN, so that no comparison with a tolerance passes it.
 pub fn largest(a: impl IntoIterator<Item = f64>) -> f64 {
     a.into_iter().fold(0.0, |a, b| if b.is_nan() || b.abs() > a { b.abs() } else { a })
 }
 
-/// Largest difference of two lists of one length.
+/// Largest difference of two lists of equal length.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     largest(a.iter().zip(b).map(|(a, b)| a - b))
 }
 
-/// The product of rotations in the planes of the coordinate axes, by one angle each.
+/// The product of rotations in the coordinate planes, one angle each. Planes beyond the
+/// last angle are not turned.
 pub fn rotation(d: usize, angles: &[f64]) -> Vec<f64> {
     let mut matrix: Vec<f64> = (0..d * d).map(|at| f64::from(u8::from(at / d == at % d))).collect();
     let planes = (0..d).flat_map(|a| (a + 1..d).map(move |b| (a, b)));

@@ -1,6 +1,6 @@
-//! Normals of the Stanford Bunny against those of its mesh.
+//! Normals of the Stanford Bunny, compared with those of its mesh.
 
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::points::cloud::Cloud;
 
 use crate::common::clouds::noisy;
@@ -13,12 +13,12 @@ fn read(name: &str) -> Vec<f64> {
     text.split_whitespace().map(|number| number.parse().unwrap()).collect()
 }
 
-/// The points, and the normals of the mesh there.
+/// The points, and the normals of the mesh at them.
 pub fn bunny() -> (Cloud, Vec<f64>) {
     (Cloud::new(read("bunny.xyz"), 3).unwrap(), read("bunny.normals"))
 }
 
-/// Angles to the normals of the mesh, degrees; a null is as wrong as can be.
+/// Angles to the normals of the mesh in degrees. A null counts as 180°.
 fn angles(cloud: &Cloud, truth: &[f64]) -> Vec<f64> {
     let geometry = geometry(cloud, Purpose::Normals);
     let angle = |(query, truth): (usize, &[f64])| match geometry.is_null()[query] {
@@ -31,7 +31,7 @@ fn angles(cloud: &Cloud, truth: &[f64]) -> Vec<f64> {
     truth.chunks_exact(3).enumerate().map(angle).collect()
 }
 
-/// Median, 95th percentile, and the share that points inward.
+/// Median, 95th percentile, and the share of normals that point inward.
 fn summary(angles: &[f64]) -> (f64, f64, f64) {
     let flipped = angles.iter().filter(|&&angle| angle > 90.0).count() as f64 / angles.len() as f64;
     (quantile(angles, 0.5), quantile(angles, 0.95), flipped)
@@ -46,7 +46,7 @@ fn the_exact_scan_has_the_normals_of_its_mesh() {
     assert_eq!(flipped, 0.0);
 }
 
-/// A rotation by Euler's angles.
+/// A rotation by Euler angles.
 fn rotation(a: f64, b: f64, c: f64) -> [[f64; 3]; 3] {
     let ([sa, ca], [sb, cb], [sc, cc]) = ([a.sin(), a.cos()], [b.sin(), b.cos()], [c.sin(), c.cos()]);
     [
@@ -65,7 +65,7 @@ fn turned(vectors: &[f64], by: &[[f64; 3]; 3]) -> Vec<f64> {
 fn unit_rotation_and_place_do_not_matter() {
     let (cloud, normals) = bunny();
     let expected = summary(&angles(&cloud, &normals));
-    // Decimetres as millimetres and kilometres; shifted by a thousand diameters.
+    // Decimetres converted to millimetres and to kilometres, and a shift by a thousand diameters.
     for (scale, shift, by) in [
         (100.0, 0.0, rotation(0.0, 0.0, 0.0)),
         (1e-4, 0.0, rotation(0.4, 1.1, 2.3)),
@@ -73,7 +73,7 @@ fn unit_rotation_and_place_do_not_matter() {
     ] {
         let moved = turned(cloud.coordinates(), &by).iter().map(|x| scale * x + shift).collect();
         let found = summary(&angles(&Cloud::new(moved, 3).unwrap(), &turned(&normals, &by)));
-        // Another rotation sums in another order: angles agree to far less than they are off.
+        // Another rotation sums in another order. Angles change far less than they are off.
         assert!((found.0 - expected.0).abs() < 0.01, "{found:?}, not {expected:?}");
         assert!((found.1 - expected.1).abs() < 0.1 && found.2 == 0.0, "{found:?}, not {expected:?}");
     }
@@ -84,7 +84,8 @@ fn noise_is_noticed_and_smoothed() {
     let (cloud, normals) = bunny();
     for (noise, largest_median) in [(0.005, 5.5), (0.01, 8.0)] {
         for seed in 0..3 {
-            // Half the diagonal of the bounding box is the larger of the radii that one may think of.
+            // Noise is relative to half the diagonal of the bounding box, the larger
+            // of the radii that might be meant.
             let moved = noisy(&cloud, noise * cloud.radius(), &mut Random(seed));
             let (median, p95, flipped) = summary(&angles(&moved, &normals));
             println!("bunny, noise {noise}: median {median:.2}, 95 % {p95:.2}, flipped {flipped:.4}");

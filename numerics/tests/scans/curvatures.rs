@@ -1,6 +1,6 @@
-//! Curvatures and the Laplace–Beltrami operator with no parameters.
+//! Curvatures and the Laplace–Beltrami operator with default parameters.
 
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::surface::operators::laplace_beltrami;
@@ -10,7 +10,7 @@ use crate::common::fits::fit;
 use crate::common::random::Random;
 use crate::support::{factor, geometry, quantile};
 
-/// Errors of the principal curvatures against the larger exact one, at every point.
+/// Errors of the principal curvatures at every point, relative to the larger exact one.
 fn errors(cloud: &Cloud, exact: impl Fn(&[f64]) -> [f64; 2]) -> Vec<f64> {
     let geometry = geometry(cloud, Purpose::Curvatures);
     assert!(geometry.is_null().iter().all(|is_null| !is_null));

@@ -1,4 +1,4 @@
-//! Clouds that nobody prepared, with no parameters: kernel, length scale, epsilon and alpha are the service's choice.
+//! Scans and random clouds with no parameters: the service chooses kernel, length scale, epsilon and alpha.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! The spectrum of sparse operators on scans.
+//! Eigenvalues of sparse operators on scans.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! Fields that are local, rough, in many dimensions, or drowned in noise: what bands of a posterior of which nothing was said cover of them.
+//! Fields that are local, rough, in many dimensions, or drowned in noise, and how well posterior bands with
+//! default parameters cover them.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
@@ -9,52 +10,54 @@ use gramian_numerics::points::cloud::Cloud;
 use crate::common::random::Random;
 use crate::posterior::{By, Posterior, posterior};
 
-/// Queries all over, and as many inside of what is special about the field.
+/// Queries everywhere, and as many again inside the special part of the field.
 const N_QUERIES: usize = 200;
 
-/// Waves that a random field is summed from.
+/// Number of waves that are summed to a random field.
 const N_WAVES: usize = 400;
 
-/// A field on the unit cube, or on the unit sphere.
+/// A field on the unit cube or the unit sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feature {
-    /// A plane with a Gaussian bump of a width on the unit square.
+    /// A plane with a Gaussian bump of the given width on the unit square.
     Bump(f64),
-    /// `z` with a Gaussian spot of a width on the unit sphere.
+    /// A Gaussian spot of the given width on the unit sphere, added to `z`.
     Spot(f64),
-    /// 0 or 1 on the sides of a line or point, beside a slope.
+    /// A slope with a step from 0 to 1 across a line or point, in the given dimension.
     Step(usize),
-    /// A distance from a line or point.
+    /// The distance from a line or point, in the given dimension.
     Kink(usize),
-    /// `sin 3x + y`.
+    /// The function `sin 3x + y`, in the given dimension.
     Sine(usize),
-    /// A draw of a process with Matérn 5/2 covariances of a length scale in the square.
+    /// A draw of a process on the square with Matérn 5/2 covariances of the given length scale.
     Draw(f64),
-    /// `sin 6x + cos 5y`, most sensors in three clusters.
+    /// The function `sin 6x + cos 5y`, with most sensors in three clusters.
     Clusters,
 }
 
-/// How a field is measured.
+/// A field with its measurement: number of sensors and noise.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured {
     pub feature: Feature,
     pub n_points: usize,
-    /// Deviation of the noise over that of the field.
+    /// Standard deviation of the noise over that of the field.
     pub noise: f64,
 }
 
-/// Per cent of the true values within ±1.96 deviations, all over and inside, and the root mean square error over the spread of the field.
+/// Percentages of true values within ±1.96 deviations, everywhere and inside, and the root mean square error
+/// over the spread of the field.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Bands {
     pub coverage: f64,
     pub inside: Option<f64>,
     pub error: f64,
-    /// Share of the clouds whose values were said to contradict them.
+    /// Share of the clouds whose fit was reported as a misfit.
     pub misfits: f64,
 }
 
 impl Bands {
-    /// Whether they cover what they should: 88 to 99.5 per cent all over, 80 inside; where values are exact, more is no fault.
+    /// Whether the coverage is as required: 88 to 99.5 % everywhere, at least 80 % inside. Exact values
+    /// may be covered up to 100 %.
     pub fn hold(&self, noise: f64) -> bool {
         let most = if noise > 0.0 { 99.5 } else { 100.0 };
         (88.0..=most).contains(&self.coverage) && self.inside.is_none_or(|inside| inside >= 80.0)
@@ -62,7 +65,7 @@ impl Bands {
 }
 
 impl Measured {
-    /// Means over some seeds.
+    /// Means over seeds.
     pub fn bands(&self, by: By, n_seeds: usize) -> Bands {
         let mut sum = Bands::default();
         let (mut n_inside, mut squares) = (0.0, 0.0);
@@ -174,7 +177,7 @@ fn squared(x: &[f64], centre: &[f64]) -> f64 {
     x.iter().zip(centre).map(|(x, c)| (x - c) * (x - c)).sum()
 }
 
-/// Distance from the edge with its sign: a slanted line in the square, a point on the line.
+/// Signed distance from the edge: a slanted line in the square, or a point on the line.
 fn across(x: &[f64]) -> f64 {
     match x {
         [x] => x - 0.45,
@@ -182,7 +185,8 @@ fn across(x: &[f64]) -> f64 {
     }
 }
 
-/// A random field as a sum of waves: those of a Matérn 5/2 have frequencies with a t distribution of five degrees of freedom.
+/// A random field as a sum of waves. Frequencies of Matérn 5/2 have a t distribution
+/// with five degrees of freedom.
 struct Waves(Vec<[f64; 3]>);
 
 impl Waves {

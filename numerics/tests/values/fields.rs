@@ -1,24 +1,24 @@
-//! Functions on space with their derivatives, smooth and not.
+//! Functions on space with their derivatives, smooth and rough.
 
 use crate::jet::Jet;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
-    /// A plane, all but straight.
+    /// A plane with a slight quadratic bend.
     Affine,
-    /// Waves that are longer than a surface of radius 1 is wide.
+    /// Waves longer than the width of a surface of radius 1.
     Low,
-    /// Waves of the length of its radius.
+    /// Waves about as long as the radius of the surface.
     Mid,
-    /// Waves of a third of that.
+    /// Waves about a third as long as the radius of the surface.
     High,
-    /// A step of a width of 0.15.
+    /// A smooth step of width 0.15.
     Front,
 }
 
 pub const FIELDS: [Field; 5] = [Field::Affine, Field::Low, Field::Mid, Field::High, Field::Front];
 
-/// Wave vector, phase and amplitude.
+/// A wave: wave vector, phase and amplitude.
 type Wave = ([f64; 3], f64, f64);
 
 const LOW: [Wave; 2] = [([1.3, 0.4, -0.6], 0.3, 1.0), ([-0.5, 1.1, 0.9], 1.0, 0.7)];

@@ -1,12 +1,13 @@
-//! How many answers of operators on values are off by half without a flag, as requests have them that ask for no deviations.
+//! Counts of answers of operators on values that are off by half without a flag, for
+//! requests without deviations.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
 use std::sync::Arc;
 
-use gramian_numerics::defaults::{Purpose, default_fit};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
@@ -27,14 +28,15 @@ use crate::sampling::{Sampling, sample};
 use crate::shapes::{Shape, Truth};
 use crate::sweep::{laplacian, tangential};
 
-/// What a request says of the kernel.
+/// The kernel that a request names.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Asked {
-    /// Nothing.
+    /// No kernel: all is learned or chosen by default.
     Nothing,
-    /// A family.
+    /// A family without a length scale.
     Family(Family),
-    /// A family with so many times the length scale that it would have had, for values and surface.
+    /// A family with a multiple of its default length scale for values, in both fits: of the
+    /// values and of the surface.
     Width(Family, f64),
 }
 
@@ -44,16 +46,16 @@ pub struct Request {
     pub shape: Shape,
     pub field: Field,
     pub n_points: usize,
-    /// Deviation of the noise over that of the field.
+    /// Standard deviation of the noise over that of the field.
     pub noise: f64,
 }
 
-/// Of the surface gradient and of Laplace–Beltrami.
+/// Counts for the surface gradient and for Laplace–Beltrami.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Counts {
     pub n: [usize; 2],
     pub n_unflagged: [usize; 2],
-    /// Of these, errors by more than half of the root mean square of what is true.
+    /// Answers without a flag that are off by more than half of the root mean square of the true values.
     pub n_off: [usize; 2],
     /// Requests that were refused.
     pub n_refused: usize,
@@ -73,14 +75,14 @@ impl Counts {
     }
 }
 
-/// Queries of a cloud at most.
+/// Largest number of queries of a cloud.
 const MAX_QUERIES: usize = 300;
 
-/// α with a kernel given.
+/// α for kernels that the request names.
 const ALPHA: f64 = 1e-10;
 
 impl Request {
-    /// The sums over `n_clouds` clouds.
+    /// Counts the answers for `n_clouds` clouds.
     pub fn run(&self, n_clouds: usize) -> Counts {
         (0..n_clouds).fold(Counts::default(), |sum, cloud| {
             let counts = self.run_once(cloud).unwrap_or(Counts { n_refused: 1, ..Counts::default() });
@@ -131,7 +133,7 @@ impl Request {
         Ok(counts)
     }
 
-    /// The function through the values, and by how much its kernel is scaled.
+    /// The fit of the values, and the variance by which its unit kernel is multiplied.
     fn function(
         &self,
         cloud: &Arc<Cloud>,

@@ -1,4 +1,5 @@
-//! Operators on values that are kriged around each query, as the local solver has them: what their bars cover, and what is off without a flag.
+//! Operators on values by the local solver, which kriges around each query: coverage of error bars,
+//! and errors without a flag.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
@@ -27,7 +28,7 @@ use crate::sampling::{Sampling, sample};
 use crate::shapes::{Shape, Truth};
 use crate::sweep::{laplacian, tangential};
 
-/// A field on a surface, and the deviation of the noise of its values over that of the field.
+/// A field on a surface, and the standard deviation of the noise of its values over that of the field.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     pub shape: Shape,
@@ -36,24 +37,25 @@ pub struct Case {
     pub noise: f64,
 }
 
-/// What came of an operator.
+/// Coverage, flags and errors of an operator.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome {
-    /// Per cent of the components within ±1.96 deviations.
+    /// Percentage of the components within ±1.96 deviations.
     pub coverage: f64,
-    /// Per cent that are flagged.
+    /// Percentage of the answers with a flag.
     pub flagged: f64,
-    /// Per cent of the others that are off by more than half of the root mean square of what is true.
+    /// Percentage of the answers without a flag that are off by more than half of the root mean
+    /// square of the true values.
     pub off: f64,
-    /// Median error over the largest of what is true, per cent.
+    /// Median error over the largest true value, per cent.
     pub error: f64,
 }
 
-/// Queries of a cloud at most.
+/// Largest number of queries of a cloud.
 const MAX_QUERIES: usize = 500;
 
 impl Case {
-    /// Of the surface gradient and of Laplace–Beltrami, with what was learned.
+    /// Outcomes of the surface gradient and of Laplace–Beltrami, and the hyperparameters that were learned.
     pub fn run(&self, draw: usize) -> ([Outcome; 2], Learned) {
         let mut random = Random((31 * self.n_points + 1001 * draw) as u64 + 5);
         let points = sample(self.shape, Sampling::Random, self.n_points, &mut random);
@@ -98,7 +100,7 @@ impl Case {
     }
 }
 
-/// Of an operator with k components at each query.
+/// The outcome of an operator with k components at each query.
 fn outcome(found: &OfKriged, truth: &[f64], k: usize) -> Outcome {
     let within = found.values.iter().zip(truth).zip(&found.deviations);
     let n_within = within.filter(|((f, t), s)| (*f - *t).abs() <= 1.96 * **s).count();

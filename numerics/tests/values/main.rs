@@ -1,4 +1,4 @@
-//! Whether values need no description: rows of docs/error-bars.md.
+//! Values without a described kernel: bands, error bars and flags must hold, by rows of docs/error-bars.md.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -25,7 +25,7 @@ use sampling::Sampling;
 use shapes::Shape;
 use sweep::{Case, NOISES, ON_SURFACE, QUANTITIES, Row};
 
-/// Closed ones and one with a rim.
+/// Closed surfaces, and one with a rim.
 const SHAPES: [Shape; 5] = [Shape::Sphere, Shape::Torus, Shape::Ellipsoid, Shape::Cyclide, Shape::Wave];
 
 fn rows(n_points: usize) -> Vec<(Case, Row)> {
@@ -42,12 +42,12 @@ fn rows(n_points: usize) -> Vec<(Case, Row)> {
 fn fields_and_operators_have_bars_that_hold_and_few_are_off_without_a_flag() {
     for n_points in [300, 500] {
         let rows = rows(n_points);
-        // Errors of one cloud stand and fall together, so single rows of two clouds scatter by some per cent.
+        // Errors within a cloud are correlated, so single rows of two clouds scatter by some per cent.
         let n_short = rows.iter().filter(|(_, row)| {
             let coverages = row.coverages();
             ON_SURFACE.iter().any(|&quantity| coverages[quantity] < 85.0)
         });
-        // A front of three spacings with noise that hides in it.
+        // The front is left out: it is three spacings wide, and noise hides in it.
         let n_short = n_short.filter(|(case, _)| case.field != Field::Front).count();
         assert!(n_short <= 2, "{n_points}: {n_short} of {} rows", rows.len());
         for quantity in ON_SURFACE {
@@ -73,7 +73,7 @@ fn sensors_have_posteriors_whose_bands_cover() {
     }
     let rows: Vec<(&Sensors, f64)> = cases.par_iter().map(|sensors| (sensors, sensors.coverage(6))).collect();
     let short: Vec<_> = rows.iter().filter(|(_, coverage)| *coverage < 88.0).collect();
-    // Thirty values of a field that they do not resolve.
+    // The short rows are those of thirty values of a field that they do not resolve.
     assert!(short.len() * 20 <= rows.len(), "{short:?}");
     assert!(short.iter().all(|(_, coverage)| *coverage > 70.0), "{short:?}");
     let all = rows.iter().map(|(_, coverage)| coverage).sum::<f64>() / rows.len() as f64;
@@ -82,7 +82,8 @@ fn sensors_have_posteriors_whose_bands_cover() {
 
 #[test]
 fn what_is_local_or_drowned_in_noise_is_learned() {
-    // From 256 values the bump was noise, 6 % of it covered; with noise beyond the field no kernel of less variance than the values was looked at.
+    // Two former faults: of 256 values the bump was taken for noise, and 6 % of it covered. With noise beyond
+    // the field, no kernel of less variance than the values was considered.
     let cases = [
         (Feature::Bump(0.03), 2000, 0.01),
         (Feature::Bump(0.05), 1000, 0.01),
@@ -99,8 +100,8 @@ fn what_is_local_or_drowned_in_noise_is_learned() {
     let cases = cases.map(|(feature, n_points, noise)| Measured { feature, n_points, noise });
     let bands: Vec<Bands> = cases.par_iter().map(|case| case.bands(By::Default, 4)).collect();
     for (case, bands) in cases.iter().zip(bands) {
-        // Of ten seeds 86 to 98 % inside and 89 % and more all over; four scatter by some per cent. By
-        // likelihood alone 42 to 55 % were covered within the narrow bump and spot.
+        // Of ten seeds 86 to 98 % are covered inside and at least 89 % everywhere. Four seeds scatter by some
+        // per cent. By likelihood alone 42 to 55 % were covered within the narrow bump and spot.
         assert!(
             bands.coverage > 85.0 && bands.inside.is_none_or(|inside| inside > 70.0),
             "{case:?}: {bands:?}"
@@ -129,14 +130,15 @@ fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
         }
         let counts: Vec<Counts> = requests.par_iter().map(|request| request.run(1)).collect();
         let all = counts.iter().fold(Counts::default(), Counts::plus);
-        // Without judging, a tenth to nine tenths of the unflagged were off with noise.
+        // Without judging, between a tenth and nine tenths of the unflagged were off where there is noise.
         for operator in [0, 1] {
             assert!(
                 all.n_off[operator] * 100 <= all.n_unflagged[operator].max(100),
                 "noise {noise}: {all:?}"
             );
         }
-        // Flags that are always up say nothing: without noise a quarter of all is served without one, though a torus of 250 points has none.
+        // Flagging everything would pass the assertion above. Without noise a quarter of all answers has no
+        // flag, although a torus of 250 points has none such.
         assert!(noise > 0.0 || all.n_unflagged[1] * 5 > all.n[1], "{all:?}");
     }
 }

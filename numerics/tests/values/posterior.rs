@@ -1,4 +1,4 @@
-//! How many true values lie within 95 % bands of a posterior of which nothing was said.
+//! Coverage of the 95 % bands of posteriors with default parameters.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
@@ -24,31 +24,31 @@ use crate::fields::Field;
 
 const N_QUERIES: usize = 200;
 
-/// Sensors in a cube, on a square or along a line.
+/// Sensors in a cube, a square or an interval.
 #[derive(Debug, Clone, Copy)]
 pub struct Sensors {
     pub dimension: usize,
     pub n_points: usize,
     pub field: Field,
-    /// Deviation of the noise over that of the field.
+    /// Standard deviation of the noise over that of the field.
     pub noise: f64,
     pub factor: f64,
     pub offset: f64,
 }
 
-/// By what kernel, noise and variance are found.
+/// The way in which kernel, noise and variance are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum By {
-    /// As a request has it that says nothing.
+    /// The default for requests that name none of them.
     Default,
-    /// By a search of the best by a criterion, among the same families.
+    /// A search for the best by a criterion, among the same families.
     Criterion(Criterion),
 }
 
-/// What came of some draws.
+/// Coverage and error over several draws.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Found {
-    /// Per cent of the true values within ±1.96 deviations.
+    /// Percentage of the true values within ±1.96 deviations.
     pub coverage: f64,
     /// Root mean square error over the spread of the field.
     pub error: f64,
@@ -57,12 +57,13 @@ pub struct Found {
 const FAMILIES: [Family; 3] = [Family::Matern { order: 2 }, Family::Matern { order: 4 }, Family::Gauss];
 
 impl Sensors {
-    /// Per cent of the true values within ±1.96 deviations, at random queries among the sensors, over some draws.
+    /// Percentage of the true values within ±1.96 deviations, at random queries among the
+    /// sensors, over several draws.
     pub fn coverage(&self, n_draws: usize) -> f64 {
         self.found(By::Default, n_draws).coverage
     }
 
-    /// The same with the error.
+    /// Coverage and error at random queries among the sensors, over several draws.
     pub fn found(&self, by: By, n_draws: usize) -> Found {
         let (mut n_within, mut squares) = (0, 0.0);
         for draw in 0..n_draws {
@@ -74,7 +75,7 @@ impl Sensors {
         Found { coverage: 100.0 * n_within as f64 / n, error: (squares / n).sqrt() }
     }
 
-    /// How many true values lie within the bars, and the squares of the errors over that of the spread.
+    /// The number of true values within the bands, and the sum of the squared errors over the spread.
     fn draw(&self, by: By, draw: usize) -> (usize, f64) {
         let mut random = Random((1000 * draw + self.n_points) as u64 + 1);
         let d = self.dimension;
@@ -100,12 +101,12 @@ impl Sensors {
     }
 }
 
-/// What is said at queries.
+/// Means and variances at queries.
 pub struct Posterior {
     pub means: Vec<f64>,
-    /// Of the function.
+    /// Variances of the latent function.
     pub variances: Vec<f64>,
-    /// Whether the values contradict it.
+    /// Whether the values contradict kernel and noise.
     pub has_misfit: bool,
 }
 
@@ -123,12 +124,12 @@ pub fn posterior(by: By, cloud: Arc<Cloud>, values: &[f64], at: &Cloud) -> Poste
 }
 
 struct Chosen {
-    /// Of variance 1.
+    /// The kernel with variance 1.
     kernel: Kernel,
-    /// Of noise to variance.
+    /// Noise over variance.
     ratio: f64,
     variance: f64,
-    /// Whether the values of some place contradict it.
+    /// Whether the values contradict the kernel at some place.
     has_place: bool,
 }
 
@@ -165,7 +166,7 @@ fn chosen(by: By, cloud: &Cloud, values: &[f64]) -> Chosen {
     let found = select(&selection, &Unobserved).unwrap().hyperparameters;
     let Regularization::Uniform(noise) = found.noise else { unreachable!("it was uniform") };
     let kernel = Kernel::new(found.family, found.length_scales[0], 1.0).unwrap();
-    // What a factorization of many points bears.
+    // The least noise with which many points can be factorized.
     let ratio = (noise / found.variance).max(1e-10);
     Chosen { kernel, ratio, variance: found.variance, has_place: false }
 }

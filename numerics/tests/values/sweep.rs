@@ -1,4 +1,4 @@
-//! How many true values of a field, its derivatives and its operators lie within their error bars when nothing is said of the values.
+//! Coverage of the error bars of a field, its derivatives and its operators, with default parameters.
 
 #![allow(dead_code, reason = "the example prints what the test does not ask")]
 
@@ -30,13 +30,14 @@ use crate::shapes::{Shape, Truth, dot};
 
 pub const NOISES: [f64; 4] = [0.0, 0.003, 0.01, 0.05];
 
-/// Deviations within which 95 % of the errors lie, were they normal.
+/// Deviations within which 95 % of normally distributed errors lie.
 const BAND: f64 = 1.96;
 
-/// Queries of a cloud at most.
+/// Largest number of queries of a cloud.
 const MAX_QUERIES: usize = 300;
 
-/// A field on a surface, how it is sampled, and the deviation of the noise of its values over that of the field.
+/// A field on a surface, its sampling, and the standard deviation of the noise of its
+/// values over that of the field.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     pub shape: Shape,
@@ -46,27 +47,28 @@ pub struct Case {
     pub noise: f64,
 }
 
-/// What was asked.
+/// Names of the quantities.
 pub const QUANTITIES: [&str; 5] = ["value", "gradient", "Hessian", "surface gradient", "Laplace–Beltrami"];
 
-/// Positions of those that live on the surface: across it values at its points say nothing.
+/// Indices of the quantities that depend on the surface alone. Values at its points say nothing across it.
 pub const ON_SURFACE: [usize; 3] = [0, 3, 4];
 
-/// What the error bars of a row turned out to be, by quantity.
+/// Errors and error bars of all clouds of a row, by quantity.
 #[derive(Debug, Clone, Default)]
 pub struct Row {
-    /// Errors over deviations.
+    /// Errors over 1.96 deviations.
     pub ratios: [Vec<f64>; 5],
-    /// Sum of squared errors, and of true values.
+    /// Sums of squared errors and of squared true values.
     pub squares: [[f64; 2]; 5],
-    /// Errors by more than half of the root mean square of what is true, without a deviation of more than that.
+    /// Errors beyond half of the root mean square of the true values, whose deviation
+    /// is at most a quarter of it.
     pub n_off: [usize; 5],
     pub n_unflagged: [usize; 5],
     pub learned: Vec<Learned>,
 }
 
 impl Case {
-    /// The sums over `n_clouds` clouds.
+    /// Runs the case on `n_clouds` clouds and collects all their errors.
     pub fn run(&self, n_clouds: usize) -> Row {
         let mut row = Row::default();
         for cloud in 0..n_clouds {
@@ -137,7 +139,7 @@ pub fn tangential(field: &Jet, on: &Truth) -> [f64; 3] {
     std::array::from_fn(|c| field.gradient[c] - along * on.normal[c])
 }
 
-/// `tr D²f − νᵀD²fν − (κ₁ + κ₂) ∂_νf`.
+/// Laplace–Beltrami of a field, `tr D²f − νᵀD²fν − (κ₁ + κ₂) ∂_νf`.
 pub fn laplacian(field: &Jet, on: &Truth) -> f64 {
     let trace: f64 = (0..3).map(|c| field.hessian[c][c]).sum();
     let across: f64 = (0..3).map(|c| on.normal[c] * dot(field.hessian[c], on.normal)).sum();
@@ -161,7 +163,7 @@ impl Row {
         }
     }
 
-    /// Per cent of the true values within the bars.
+    /// Percentages of the true values within the bars.
     pub fn coverages(&self) -> [f64; 5] {
         std::array::from_fn(|quantity| {
             let ratios = &self.ratios[quantity];
@@ -169,12 +171,13 @@ impl Row {
         })
     }
 
-    /// Root mean square errors over that of what is true.
+    /// Root mean square errors over the root mean square of the true values.
     pub fn errors(&self) -> [f64; 5] {
         self.squares.map(|[error, truth]| (error / truth).sqrt())
     }
 
-    /// Whether the bars of values and operators on the surface are neither too short nor, where there is noise, too long.
+    /// Whether the coverages of values and operators on the surface are at least 88 %, and
+    /// with noise at most 99.5 %.
     pub fn holds(&self, noise: f64) -> bool {
         let most = if noise > 0.0 { 99.5 } else { 100.0 };
         let coverages = self.coverages();

@@ -22,7 +22,7 @@ from sent import CIRCLE, DESCRIPTION, ID
 
 import gramian
 from gramian.rest import models
-from gramian.transport import retry_after
+from gramian.wire.transport import retry_after
 
 VERSION = json.dumps({"name": "gramian", "version": "9", "api": "v1", "instruction_set": "v3", "threads": 1}).encode()
 DIAGNOSTICS = {

@@ -23,7 +23,7 @@ from gramian.dask.parts import Part, Reach, join, look, rim, split
 from gramian.dask.replicas import Replicas
 from gramian.dask.thinning import distinct, thinned
 from gramian.dask.tile import assemble
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 NOWHERE = "http://127.0.0.1:9"
 

@@ -15,7 +15,7 @@ import gramian.dask
 from gramian.dask import parts, plan, replicas
 from gramian.dask.parts import Part, Reach, nearest
 from gramian.dask.requests import OTHER_HYPERPARAMETERS
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from gramian.dask.cut import Ints
 from gramian.dask.measures import Truths
 from gramian.dask.regions import Regions
 from gramian.dask.signs import joined
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 
 @pytest.fixture(autouse=True)

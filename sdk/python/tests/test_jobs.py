@@ -13,7 +13,7 @@ import pytest
 
 import gramian
 from gramian.rest.models import Job
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 PLACE = "/v1/jobs/0193a5e7-8c1d-7b22-9f0e-5d3c6f1a2b4c"
 CLOUD = {
@@ -94,7 +94,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr("gramian.jobs.time", clock)
+    monkeypatch.setattr("gramian.wire.jobs.time", clock)
     return clock
 
 
@@ -134,7 +134,7 @@ def test_a_job_is_followed_to_its_end_over_as_many_connections_as_it_takes(clock
 
 
 def test_a_request_that_is_repeated_has_the_same_key_and_another_one_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gramian.transport.BACKOFF_SECONDS", 0.0)
+    monkeypatch.setattr("gramian.wire.transport.BACKOFF_SECONDS", 0.0)
     told = [events(job("succeeded", 1.0)), refusal(422, "invalid-cloud")]
     lost: list[Answer] = [
         httpx.ReadError("gone"),

@@ -25,7 +25,7 @@ from gramian.answers import Answer
 from gramian.rest import models
 from gramian.rest.api.geometry import compute_normals
 from gramian.rest.models import CloudRef, NormalsRequest, NormalsResponse
-from gramian.tensors import Array, Format
+from gramian.wire.tensors import Array, Format
 
 GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
 

@@ -11,7 +11,7 @@ from sent import CIRCLE, DESCRIPTION, ID, METHODS
 
 import gramian
 from gramian.rest import models
-from gramian.transport import CLOUD_HEADER
+from gramian.wire.transport import CLOUD_HEADER
 
 OTHER = "cd" * 32
 UNKNOWN = {"type": "/problems/unknown-cloud", "title": "", "status": 404, "detail": "", "instance": "some-id"}

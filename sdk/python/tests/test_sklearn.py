@@ -24,7 +24,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 import gramian
 from gramian.sklearn import KernelRegressor
-from gramian.tensors import Array
+from gramian.wire.tensors import Array
 
 ESTIMATORS = [KernelRegressor(), KernelRegressor("matern", alpha=0.1), KernelRegressor(mean="zero", solver="local")]
 

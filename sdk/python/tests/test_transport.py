@@ -14,8 +14,9 @@ import pytest
 import gramian
 from gramian.rest.api.process import get_version
 from gramian.rest.models import Version
-from gramian.tensors import JSON, SAFETENSORS
-from gramian.transport import Connection, RetryingClient
+from gramian.wire.connection import Connection
+from gramian.wire.tensors import JSON, SAFETENSORS
+from gramian.wire.transport import RetryingClient
 
 OK = {"name": "gramian", "version": "0.1.0", "api": "v1", "instruction_set": "v3", "threads": 1}
 OVERLOADED = {

@@ -16,7 +16,9 @@ from typing import Any, Literal, get_args, get_type_hints
 import attrs
 import pytest
 
-from gramian import fit, rest, selection
+from gramian import rest
+from gramian.arguments import fit
+from gramian.resources import selection
 from gramian.rest import api, models
 from gramian.rest.types import File, Response, Unset
 

@@ -1,13 +1,13 @@
-//! The file of keys, in TOML:
+//! The TOML file of keys:
 //!
 //! ```toml
 //! [[key]]
 //! name = "scanner-lab"
 //! hash = "blake3:…"             # of the key, 64 hexadecimal digits
-//! view = "lab"                  # whose clouds it sees; absent: those of its name
-//! requests_per_minute = 600     # absent: any number
-//! burst = 50                    # of these at once, after a pause; absent: a tenth
-//! concurrent_requests = 8       # absent: any number
+//! view = "lab"                  # whose clouds the key sees; default: the name of the key
+//! requests_per_minute = 600     # default: unlimited
+//! burst = 50                    # requests at once after a pause; default: a tenth of requests_per_minute
+//! concurrent_requests = 8       # default: unlimited
 //! ```
 
 use std::num::NonZeroU32;
@@ -18,7 +18,7 @@ use uuid::Uuid;
 use super::Digest;
 use super::limits::Rule;
 
-/// What a key begins with, so that one which got where it should not be is found by a search.
+/// Prefix of every generated key, so that a leaked key can be found by a text search.
 const PREFIX: &str = "gramian_";
 
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub(super) struct KeyEntry {
     pub rule: Rule,
 }
 
-/// As it is written.
+/// The file as deserialized, before its values are checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -54,20 +54,22 @@ struct WrittenKey {
 }
 
 impl KeyEntry {
-    /// Whose clouds it sees.
+    /// Name of the view whose clouds the key sees.
     pub(super) fn view(&self) -> &str {
         self.view.as_deref().unwrap_or(&self.name)
     }
 }
 
 impl KeysFile {
+    /// Parses the text of a file.
+    ///
     /// # Errors
-    /// Says in which line what is wrong; never what stands there, which may be a key.
+    /// Tells the line or the key name and what is wrong, but never quotes a value, which may be a key.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let written: Written = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
             let line = 1 + before.matches('\n').count();
-            // Its message may quote a value.
+            // The message of the TOML error may quote a value.
             format!("line {line} is not as docs/operations.md describes it")
         })?;
         let keys = written.key.into_iter().map(KeyEntry::try_from).collect::<Result<Vec<_>, _>>()?;
@@ -101,21 +103,21 @@ impl TryFrom<WrittenKey> for KeyEntry {
     }
 }
 
-/// It becomes part of names of files.
+/// Whether a name is safe: it becomes part of file names.
 fn is_plain(name: &str) -> bool {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     (1..=64).contains(&name.len()) && name.chars().all(is_plain)
 }
 
-/// A new key, and its lines for the file.
+/// Generates a key. Returns the key and its lines for the file.
 ///
 /// # Errors
-/// If the name is not fit for one.
+/// Refuses a name that is not 1 to 64 letters, digits, '-' and '_'.
 pub fn generate(name: &str) -> Result<(String, String), String> {
     if !is_plain(name) {
         return Err("a name has 1 to 64 letters, digits, '-' and '_'".to_owned());
     }
-    // Twice 122 random bits.
+    // 244 random bits, 122 from each UUID.
     let key = format!("{PREFIX}{}{}", Uuid::new_v4().simple(), Uuid::new_v4().simple());
     let hash = blake3::hash(key.as_bytes()).to_hex();
     Ok((key, format!("[[key]]\nname = \"{name}\"\nhash = \"blake3:{hash}\"\n")))

@@ -1,4 +1,4 @@
-//! How much a key may ask: so many requests a minute, and so many at once.
+//! Limits of a key: requests per minute and concurrent requests.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -7,19 +7,19 @@ use governor::clock::{Clock, DefaultClock};
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// When to come back to a key that has all the requests it may have under way.
+/// Retry-After of a key that has reached its limit of concurrent requests.
 const SECONDS_UNTIL_ONE_ENDS: u64 = 1;
 
-/// The limits of a key; absent, there is none.
+/// The limits of a key. `None` is unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Rule {
     pub requests_per_minute: Option<NonZeroU32>,
-    /// Requests at once after a pause; absent, a tenth of those of a minute.
+    /// Requests at once after a pause. The default is a tenth of `requests_per_minute`.
     pub burst: Option<NonZeroU32>,
     pub concurrent_requests: Option<NonZeroU32>,
 }
 
-/// A rule, and what was counted by it.
+/// The limits of a key with their counters.
 #[derive(Default)]
 pub(super) struct Limits {
     pub rule: Rule,
@@ -27,10 +27,10 @@ pub(super) struct Limits {
     under_way: Option<Arc<Semaphore>>,
 }
 
-/// A request that is under way, until its answer is sent.
+/// A request in progress. It counts as concurrent until this is dropped, when its answer has been sent.
 pub struct Entered(Option<OwnedSemaphorePermit>);
 
-/// Beyond a limit.
+/// A limit that was reached, and when to retry.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TooMany {
     pub limit: String,
@@ -66,7 +66,7 @@ impl Limits {
 }
 
 impl Drop for Entered {
-    /// The permit goes back.
+    /// Releases the permit.
     fn drop(&mut self) {
         self.0.take();
     }

@@ -1,13 +1,14 @@
-//! Who may ask, as whom, and how much: bearer keys from the configuration and from a file.
+//! Access control: bearer keys from the configuration and from a file, with their views and limits.
 //!
-//! KEYS are kept as BLAKE3 hashes, never in plain. Theirs are random (`gramian key` makes them), so that a fast hash is enough. Which
-//! key it is takes the same time to find for all of them, and for none.
+//! KEYS are kept as BLAKE3 hashes, never in plain text. Keys are random (`gramian key` generates them), so a
+//! fast hash is enough. Looking up a key takes the same time whichever it is, and also if it is unknown.
 //!
-//! VIEWS. What a key registers is seen through its view alone. Keys of one name have one view, and so may keys of several names: a key is
-//! replaced by adding its successor to the same view and taking it out later, with the clouds where they were.
+//! VIEWS. A cloud is only visible in the view of the key that registered it. Keys of one name share a view,
+//! and keys of several names may share one. So a key is replaced by adding its successor to the same view and
+//! removing the old key later. The clouds stay where they are.
 //!
-//! ROTATION. The file is read again when it changes. One that cannot be read, or not understood, changes nothing, and is reported; one
-//! without keys lets nobody in.
+//! ROTATION. The file is read again when it changes. A file that cannot be read or parsed changes nothing and
+//! is reported. A file without keys lets nobody in.
 
 mod file;
 mod limits;
@@ -28,56 +29,58 @@ use file::{KeyEntry, KeysFile};
 use limits::Limits;
 pub use limits::{Entered, TooMany};
 
-/// Reads the text of a file of keys: how many there are.
+/// Parses the text of a file of keys and returns the number of keys.
 ///
 /// # Errors
-/// Says what is wrong with it.
+/// Tells what is wrong with the text.
 pub fn check_file(text: &str) -> Result<usize, String> {
     KeysFile::parse(text).map(|file| file.keys.len())
 }
 
-/// How often it is looked whether the file has changed.
+/// Interval between two checks of the file for changes.
 const LOOKING: Duration = Duration::from_secs(1);
 
-/// BLAKE3 of a key, or of the file of keys.
+/// BLAKE3 hash of a key, or of the text of the file of keys.
 type Digest = [u8; 32];
 
-/// All keys, as they are now.
+/// All current keys.
 pub struct Keys {
     configured: Vec<Digest>,
     file: Option<PathBuf>,
-    /// Of the text of the file that was read at the start.
+    /// Digest of the text of the file that was read at startup.
     first: Digest,
     callers: ArcSwap<Vec<Arc<Caller>>>,
-    /// Views by the number of their owner: numbers are never given again.
+    /// Views, indexed by owner. Indices are never reused.
     views: Mutex<Vec<OwnerName>>,
 }
 
-/// A key: who has it, and what that may do.
+/// A key, its owner and its limits.
 pub struct Caller {
     digest: Digest,
-    /// For logs; nothing for keys of the configuration.
+    /// Name for logs. `None` for keys of the configuration.
     pub name: Option<String>,
     pub owner: Owner,
     limits: Limits,
 }
 
 impl Caller {
-    /// Lets a request in, which is under way until what is returned is dropped.
+    /// Admits a request, which counts as in progress until the returned value is dropped.
     ///
     /// # Errors
-    /// [`TooMany`]: beyond the rate or the number of requests of this key.
+    /// [`TooMany`] beyond the rate or the concurrency of this key.
     pub fn enter(&self) -> Result<Entered, TooMany> {
         self.limits.enter()
     }
 }
 
 impl Keys {
+    /// Reads the keys of the configuration and of the file.
+    ///
     /// # Errors
-    /// Says what is wrong with the file.
+    /// Tells what is wrong with the file.
     pub fn new(config: &Config) -> Result<Self, String> {
         let digest = |key: &String| blake3::hash(key.trim().as_bytes()).into();
-        // A blank key, which the configuration refuses, is nobody's.
+        // The configuration refuses blank keys. Should one get here, it belongs to nobody.
         let configured = config.api_keys.iter().filter(|key| !key.trim().is_empty()).map(digest).collect();
         let (file, first) = match &config.keys_file {
             Some(path) if !config.is_open() => read_file(path)?,
@@ -98,27 +101,27 @@ impl Keys {
         Ok(keys)
     }
 
-    /// Whether anyone may call.
+    /// Whether anyone may call without a key.
     pub fn is_open(&self) -> bool {
         self.configured.is_empty() && self.file.is_none()
     }
 
-    /// All whom there are, or were since the start.
+    /// Returns all owners since the start of the process.
     pub fn owners(&self) -> Vec<Owner> {
         (0..self.views().len()).map(Owner).collect()
     }
 
-    /// Whose view has this name, if anybody's.
+    /// Finds the owner of the view with this name.
     pub fn owner_named(&self, name: &OwnerName) -> Option<Owner> {
         self.views().iter().position(|view| view == name).map(Owner)
     }
 
-    /// The name of an owner's view, whatever the order of the keys. It does not tell a key.
+    /// The name of an owner's view. It does not depend on the order of the keys and does not reveal a key.
     pub fn name_of(&self, owner: Owner) -> OwnerName {
         self.views().get(owner.0).cloned().unwrap_or_else(|| OwnerName("nobody".to_owned()))
     }
 
-    /// Finds a key in time that does not depend on the keys: hashes are compared in full, and all of them.
+    /// Finds a key in constant time: full hashes are compared, and always all of them.
     pub fn caller_of(&self, key: &str) -> Option<Arc<Caller>> {
         let digest: Digest = blake3::hash(key.as_bytes()).into();
         let callers = self.callers.load();
@@ -131,8 +134,10 @@ impl Keys {
         bool::from(found).then(|| callers.get(position as usize).cloned()).flatten()
     }
 
-    /// Takes the keys of the file again whenever it has others, for as long as the process lives. It is read each time: neither its
-    /// time nor its length tells that it is as it was, nor that it cannot be read now.
+    /// Reloads the keys whenever the file has changed, until the process ends.
+    ///
+    /// The file is read at every check, because neither its modification time nor its length proves that it
+    /// is unchanged and still readable.
     pub async fn follow_file(self: Arc<Self>) {
         let Some(path) = &self.file else { return };
         let mut last = Ok(self.first);
@@ -157,7 +162,7 @@ impl Keys {
         }
     }
 
-    /// Takes these keys in place of those before. Whose limits are as they were goes on counting.
+    /// Replaces the keys of the file. A key whose name, view and limits are unchanged keeps its counters.
     fn put(&self, file: &KeysFile) {
         let before = self.callers.load_full();
         let before: HashMap<Digest, &Arc<Caller>> =
@@ -206,13 +211,13 @@ impl Caller {
     }
 }
 
-/// The keys of a file, and the digest of its text.
+/// Reads and parses a file. Also returns the digest of its text.
 fn read_file(path: &Path) -> Result<(KeysFile, Digest), String> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("cannot be read: {error}"))?;
     Ok((KeysFile::parse(&text)?, blake3::hash(text.as_bytes()).into()))
 }
 
-/// Each key of the configuration has a view of its own.
+/// The view of a key from the configuration. Each such key has its own.
 fn view_of_digest(digest: &Digest) -> OwnerName {
     let name = blake3::Hash::from(blake3::derive_key("gramian 2026 owner of clouds", digest)).to_hex();
     OwnerName(name[..32].to_owned())

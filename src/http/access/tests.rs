@@ -44,7 +44,7 @@ fn keys_are_replaced_and_their_views_stay() {
         format!("{lines_of_two}{lines_of_next}view = \"one\"\n{lines_of_one}requests_per_minute = 1\n");
     keys.put(&KeysFile::parse(&both).unwrap());
     assert_eq!(owner_of(&keys, &next), Some(before.owner));
-    // Reading the file again is no way to more requests.
+    // Reloading the file does not reset the counters.
     assert!(keys.caller_of(&one).unwrap().enter().is_err() && keys.caller_of(&next).unwrap().enter().is_ok());
     keys.put(&KeysFile::parse(&lines_of_two).unwrap());
     assert!(owner_of(&keys, &one).is_none() && owner_of(&keys, &two) == Some(Owner(1)));

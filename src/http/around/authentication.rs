@@ -1,4 +1,4 @@
-//! Who asks: the owner of the bearer key.
+//! Authentication: the owner of a request is the owner of its bearer key.
 
 use std::sync::Arc;
 
@@ -15,11 +15,12 @@ use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
 use crate::store::Owner;
 
-/// The name of the key that a request was made with, as an extension of its answer, for the log.
+/// Name of the key that made the request. An extension of the answer, for the log.
 #[derive(Clone)]
 pub struct KeyName(pub String);
 
-/// Lets requests with a valid key through that are within its limits, with their [`Owner`] as an extension.
+/// Admits requests that have a valid key and are within its limits. The [`Owner`] becomes an extension of the
+/// request.
 pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
     if app.keys.is_open() {
         request.extensions_mut().insert(Owner(0));
@@ -42,18 +43,18 @@ pub async fn authenticate(State(app): State<Arc<App>>, mut request: Request, nex
     response
 }
 
-/// An answer that counts among the requests of its key until it is sent, or nobody wants it: events may go on for hours.
+/// Counts the request as in progress until the answer is sent or dropped. Streams of events may take hours.
 fn until_sent(answer: Response, entered: Entered) -> Response {
     answer.map(|body| {
         Body::new(body.map_err(move |error| {
-            // It goes with the body, whose bytes and length are what they were.
+            // The closure lives as long as the body. Bytes and length of the body are unchanged.
             let _ = &entered;
             error
         }))
     })
 }
 
-/// The scheme is case-insensitive (RFC 9110, section 11.1).
+/// Returns the key of the `Authorization` header. The scheme is case-insensitive (RFC 9110, section 11.1).
 fn bearer_key(request: &Request) -> Option<&str> {
     let (scheme, key) = request.headers().get(header::AUTHORIZATION)?.to_str().ok()?.split_once(' ')?;
     scheme.eq_ignore_ascii_case("bearer").then(|| key.trim())

@@ -1,4 +1,4 @@
-//! What happens around every handler: request id and log line, problem documents, negotiation, deadline.
+//! Middleware around every handler: request id, log line, problem documents, negotiation, deadline.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -20,20 +20,24 @@ use crate::http::state::app::App;
 use crate::http::wire::negotiation::{Format, Wanted};
 use crate::store::key::CloudId;
 
-/// Bytes of a method and of a path that are logged: clients may send any number.
+/// Most bytes of a method and of a path that are logged, because clients may send any number.
 const LOGGED_METHOD_BYTES: usize = 32;
 const LOGGED_PATH_BYTES: usize = 200;
 
-/// The cloud that a request is about: proxies send all that is about one cloud to one replica.
+/// Header with the id of the cloud that a request is about. Proxies route all requests about one cloud to one
+/// replica.
 pub const CLOUD_HEADER: HeaderName = HeaderName::from_static("gramian-cloud");
 
-/// What the pages for people may load and do: their own files. Swagger UI writes styles into its elements, and has icons in
-/// its style sheet.
+/// Content security policy of the HTML pages: only their own files.
+///
+/// Swagger UI writes inline styles, and its style sheet contains icons.
 const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
     font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Headers that browsers obey: nothing is taken for another type than its own, and pages are shown in no frame, load nothing
-/// from elsewhere and tell nobody where a link was followed from.
+/// Adds security headers that browsers obey.
+///
+/// No body is taken for another media type than its own. HTML pages cannot be framed, load nothing from
+/// elsewhere, and send no referrer.
 fn secure(headers: &mut HeaderMap) {
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     let media_type = headers.get(header::CONTENT_TYPE).map_or(&b""[..], HeaderValue::as_bytes);
@@ -44,9 +48,11 @@ fn secure(headers: &mut HeaderMap) {
     }
 }
 
-/// Names the request, has it answered, writes problem documents that need that name, and logs one line.
+/// Assigns the request id, passes the request on, writes the problem document if there is one, and logs a
+/// line.
 ///
-/// The line has method, path and status, never a body: clouds stay out of the log.
+/// Problem documents contain the request id. The line has method, path and status, never a body: clouds stay
+/// out of the log.
 pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
     let mut under_way = UnderWay::new(app.clone(), &request);
     let request_id = client_request_id(request.headers()).unwrap_or_else(|| Uuid::now_v7().to_string());
@@ -91,7 +97,7 @@ pub async fn name_and_log(State(app): State<Arc<App>>, mut request: Request, nex
     response
 }
 
-/// The cloud that a request names to whoever passes it on, in its head or its path: every answer repeats it.
+/// The cloud that the request names in its header or path, for proxies. Every answer repeats it.
 fn named_cloud(request: &Request) -> Option<HeaderValue> {
     let is_id = |text: &&str| CloudId::parse(text).is_some();
     let in_head = request.headers().get(CLOUD_HEADER).and_then(|value| value.to_str().ok()).filter(is_id);
@@ -99,7 +105,7 @@ fn named_cloud(request: &Request) -> Option<HeaderValue> {
     HeaderValue::from_str(in_head.or_else(in_path)?).ok()
 }
 
-/// The beginning of a text, with a mark where more follows.
+/// Truncates a text and marks the cut with "…".
 fn cut(text: &str, n_bytes: usize) -> String {
     if text.len() <= n_bytes {
         return text.to_owned();
@@ -108,7 +114,7 @@ fn cut(text: &str, n_bytes: usize) -> String {
     format!("{}…", &text[..end])
 }
 
-/// A request under way, also if its client leaves.
+/// Counts a request as in progress until dropped, which also happens when its client leaves.
 struct UnderWay {
     app: Arc<App>,
     began: Instant,
@@ -125,7 +131,7 @@ impl UnderWay {
         Self { app, began: Instant::now(), method: request.method().clone(), route, status: None }
     }
 
-    /// Says that it was answered, and how long that took.
+    /// Records the status of the answer. Returns the time since the request arrived.
     fn answered(&mut self, status: StatusCode) -> Duration {
         self.status = Some(status);
         self.began.elapsed()
@@ -140,14 +146,14 @@ impl Drop for UnderWay {
     }
 }
 
-/// A client's own id, if it is short and harmless in logs and headers.
+/// The client's own request id, if it is short and safe in logs and headers.
 fn client_request_id(headers: &HeaderMap) -> Option<String> {
     let id = headers.get("x-request-id")?.to_str().ok()?;
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     (!id.is_empty() && id.len() <= 128 && id.chars().all(is_plain)).then(|| id.to_owned())
 }
 
-/// Writes the document of a problem, also for errors that a library answered on its own. Other headers are kept.
+/// Writes the problem document of an error, including errors made by a library. Keeps the other headers.
 pub fn with_problem_document(response: Response, request_id: &str) -> Response {
     let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
@@ -169,11 +175,11 @@ pub fn with_problem_document(response: Response, request_id: &str) -> Response {
     documented
 }
 
-/// A problem that has its document, as an extension of its answer.
+/// A complete problem document. An extension of its answer.
 #[derive(Clone)]
 pub struct Documented(pub serde_json::Value);
 
-/// The document of a problem that was written for another request.
+/// Returns a stored problem document with the id of the current request.
 fn written_before(status: StatusCode, document: &serde_json::Value, request_id: &str) -> Response {
     let mut document = document.clone();
     document["instance"] = request_id.into();
@@ -181,10 +187,10 @@ fn written_before(status: StatusCode, document: &serde_json::Value, request_id: 
     (status, media_type, document.to_string()).into_response()
 }
 
-/// An error that no handler of ours made.
+/// The problem for an error that a library made.
 fn foreign(status: StatusCode) -> Problem {
     match status {
-        // axum's own 400 is about a path that is not UTF-8 once decoded.
+        // axum answers 400 if a path is not UTF-8 once decoded.
         StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST => Problem::not_found(),
         StatusCode::METHOD_NOT_ALLOWED => Problem::new(Slug::MethodNotAllowed, "see the Allow header"),
         StatusCode::UNSUPPORTED_MEDIA_TYPE => {
@@ -203,13 +209,15 @@ pub async fn method_not_allowed() -> Problem {
     Problem::new(Slug::MethodNotAllowed, "this path does not have this method; see the Allow header")
 }
 
-/// A panic is a bug: logged by the panic hook, answered without detail.
+/// Answers a panic, which is a bug. The panic hook has logged it, and the answer has no details.
 pub fn recover(_panic: Box<dyn Any + Send + 'static>) -> Response {
     Problem::internal().into_response()
 }
 
-/// Refuses requests that accept no JSON, where there is nothing else. Success of HEAD and DELETE has no body, so there is nothing
-/// to accept: generated clients name the media type of problems alone, which are sent whatever is accepted.
+/// Refuses requests that do not accept JSON, for routes that offer nothing else.
+///
+/// HEAD and DELETE are exempt: their success has no body. Generated clients then list only the media type of
+/// problems, which are sent whatever the client accepts.
 pub async fn negotiate(request: Request, next: Next) -> Response {
     if matches!(*request.method(), Method::HEAD | Method::DELETE) {
         return next.run(request).await;
@@ -220,7 +228,7 @@ pub async fn negotiate(request: Request, next: Next) -> Response {
     }
 }
 
-/// Answers 504 when the deadline passes; dropping the handler cancels its work.
+/// Answers 504 when the deadline passes. Dropping the handler cancels its work.
 pub async fn meet_deadline(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let deadline = app.config.deadline();
     match tokio::time::timeout(deadline, next.run(request)).await {

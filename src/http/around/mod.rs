@@ -1,4 +1,4 @@
-//! What surrounds every request: its name and log line, its framing, its key, its deadline.
+//! Layers around every request: request id and log line, framing, key, deadline.
 
 pub mod authentication;
 pub mod middleware;

@@ -1,4 +1,4 @@
-//! Requests and jobs as spans of OpenTelemetry, where somebody collects them (telemetry.rs); nothing otherwise.
+//! OpenTelemetry spans of requests and jobs. Without a collector (telemetry.rs) they have no effect.
 
 use std::fmt::Display;
 
@@ -13,7 +13,7 @@ use uuid::Uuid;
 use super::trace::TraceParent;
 use crate::http::metrics::method_label;
 
-/// The span of a request or of work on a job, in the trace of who asked if that has one.
+/// The span of a request, or of work on a job, in the trace of the client if it has one.
 pub struct RequestSpan {
     span: BoxedSpan,
     trace_id: u128,
@@ -21,7 +21,10 @@ pub struct RequestSpan {
 }
 
 impl RequestSpan {
-    /// Begins that of a request. The route is a template and the method one of those that the service has, so that there are few names.
+    /// Begins the span of a request.
+    ///
+    /// To keep the number of span names small, the route is a template and the method is one that the service
+    /// knows.
     pub fn begin(method: &Method, route: Option<&str>, headers: &HeaderMap) -> Self {
         let (method, route) = (method_label(method), route.unwrap_or("other").to_owned());
         let name = format!("{method} {route}");
@@ -30,7 +33,7 @@ impl RequestSpan {
         Self::new(name, SpanKind::Server, attributes, TraceParent::of(headers))
     }
 
-    /// Begins that of work on a job for a route, in the trace of the request that became the job.
+    /// Begins the span of work on a job for a route, in the trace of the request that created the job.
     pub fn begin_job(id: &impl Display, route: &str, headers: &HeaderMap) -> Self {
         let attributes =
             vec![KeyValue::new("gramian.job", id.to_string()), KeyValue::new("http.route", route.to_owned())];
@@ -51,7 +54,9 @@ impl RequestSpan {
         Self { span, trace_id: trace_id.unwrap_or_else(|| Uuid::new_v4().as_u128()), parent }
     }
 
-    /// What comes of it later belongs to the same trace: under this span, or where nobody collects spans, under what its client has.
+    /// The parent for later work of the same trace.
+    ///
+    /// It is this span. Without a collector it is the client's span.
     pub fn as_parent(&self) -> TraceParent {
         let own = self.span.span_context();
         if own.is_valid() {
@@ -62,12 +67,12 @@ impl RequestSpan {
         self.parent.clone().unwrap_or_else(invented)
     }
 
-    /// The name of its trace, 32 digits.
+    /// The trace id, as 32 hexadecimal digits.
     pub fn trace_id(&self) -> String {
         format!("{:032x}", self.trace_id)
     }
 
-    /// Ends it with its answer. One that is dropped without ends as well: its client has left.
+    /// Ends the span with the answer. A span dropped before has ended as well, because its client left.
     pub fn end(mut self, status: StatusCode, headers: &HeaderMap) {
         self.span.set_attribute(KeyValue::new("http.response.status_code", i64::from(status.as_u16())));
         let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::to_owned);

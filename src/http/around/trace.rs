@@ -1,10 +1,10 @@
-//! The trace that a request belongs to (W3C Trace Context, 2021): that of its client, or a new one.
+//! The trace that a request belongs to (W3C Trace Context, 2021): the client's trace or a new one.
 
 use std::fmt;
 
 use axum::http::HeaderMap;
 
-/// Names of a trace and of the span in it that asked.
+/// Ids of a trace and of the calling span.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TraceParent {
     pub trace_id: u128,
@@ -13,7 +13,9 @@ pub struct TraceParent {
 }
 
 impl TraceParent {
-    /// `traceparent: 00-<32 digits>-<16 digits>-<2 digits>`, lower-case hexadecimal; later versions may have more behind it.
+    /// Parses `traceparent: 00-<32 digits>-<16 digits>-<2 digits>` in lower-case hexadecimal.
+    ///
+    /// Later versions may append further fields.
     pub fn of(headers: &HeaderMap) -> Option<Self> {
         let mut lines = headers.get_all("traceparent").iter();
         let (Some(line), None) = (lines.next(), lines.next()) else { return None };
@@ -34,7 +36,7 @@ impl TraceParent {
     }
 }
 
-/// As the header says it.
+/// Formats the value of the header.
 impl fmt::Display for TraceParent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { trace_id, span_id, is_sampled } = self;

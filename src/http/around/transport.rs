@@ -1,5 +1,4 @@
-//! What is refused before anybody looks at the request itself: heads that cannot be trusted, and requests that come while the
-//! server drains.
+//! Refusals that precede routing: ambiguous request heads, and requests that arrive while the server drains.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -14,21 +13,21 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::state::app::App;
 
-/// What makes the head of an HTTP/1 request ambiguous: two programs may take it for two different requests.
+/// A defect of an HTTP/1 message that makes it ambiguous: two programs may read it as different requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum HeadFault {
-    /// Content-Length and Transfer-Encoding.
+    /// Content-Length together with Transfer-Encoding.
     TwoFramings = 1,
-    /// Several lengths, or one that is no number.
+    /// Several lengths, or a length that is not a number.
     Length,
-    /// Another Transfer-Encoding than `chunked`, or several.
+    /// A Transfer-Encoding other than `chunked`, or several.
     Coding,
     /// A line that does not end in CR LF.
     LineEnd,
-    /// A header that goes on in the next line.
+    /// A header folded over several lines.
     Folded,
-    /// Chunks that are not framed as they should be.
+    /// Malformed chunk framing.
     Chunks,
 }
 
@@ -36,7 +35,7 @@ impl HeadFault {
     const ALL: [Self; 6] =
         [Self::TwoFramings, Self::Length, Self::Coding, Self::LineEnd, Self::Folded, Self::Chunks];
 
-    /// Of [`u8::from`]; 0 is no fault.
+    /// Converts back from [`u8::from`]. 0 means no fault.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|fault| u8::from(*fault) == code)
     }
@@ -59,10 +58,10 @@ impl From<HeadFault> for u8 {
     }
 }
 
-/// What the connection knows of a request; the server puts it into the extensions.
+/// State of a request on its connection. The server adds it to the extensions of the request.
 #[derive(Debug, Clone, Default)]
 pub struct Arrival {
-    /// On this connection, in the head of this request or near it.
+    /// Fault found on this connection, in or near the head of this request.
     pub fault: Option<HeadFault>,
     is_read: Arc<AtomicBool>,
 }
@@ -72,7 +71,7 @@ impl Arrival {
         Self { fault, is_read: Arc::default() }
     }
 
-    /// The body of the request has been read to its end.
+    /// Records that the body of the request has been read to its end.
     pub fn set_read(&self) {
         self.is_read.store(true, Relaxed);
     }
@@ -82,21 +81,23 @@ impl Arrival {
     }
 }
 
-/// Answers 400 to a head that a proxy in front may understand differently, and 503 while the server drains, else as the service
-/// does. Not a layer of its own: every layer costs each request a microsecond or two.
+/// Answers 400 to a head that a proxy may interpret differently, and 503 while the server drains. Otherwise
+/// passes the request on.
+///
+/// This is not a layer of its own, because every layer costs each request a microsecond or two.
 pub async fn answer(app: &App, request: Request, next: Next) -> Response {
     let version = request.version();
     let arrival = request.extensions().get::<Arrival>();
     let fault = arrival.and_then(|arrival| arrival.fault).map(HeadFault::detail);
     if let Some(detail) = fault.or_else(|| host_fault(&request)).or_else(|| field_fault(request.headers())) {
-        // What follows on this connection may be a request that somebody else has smuggled in.
+        // The rest of this connection may be a request smuggled in by somebody else.
         return close(version, Problem::new(Slug::MalformedRequest, detail).into_response());
     }
-    // The layer for browsers answers OPTIONS of any path.
+    // Without this check, the CORS layer would answer OPTIONS of any path.
     if request.method() == Method::OPTIONS && request.extensions().get::<MatchedPath>().is_none() {
         return Problem::not_found().into_response();
     }
-    // Probes and metrics are there for whoever waits for the end.
+    // Probes and metrics are also answered while the server drains.
     if request.uri().path().starts_with("/health/") || request.uri().path() == "/metrics" {
         return next.run(request).await;
     }
@@ -110,8 +111,9 @@ pub async fn answer(app: &App, request: Request, next: Next) -> Response {
     }
 }
 
-/// Resolves if the server drains before this request, whose body is still to be read if there is an `arrival`, has been read. What is
-/// being computed goes on.
+/// Resolves if the server starts to drain before the body of this request has been read.
+///
+/// Without `arrival`, the body has already been read. Requests that are being computed continue.
 async fn is_refused(app: &App, arrival: Option<Arrival>) {
     if app.draining.is_cancelled() {
         return;
@@ -125,8 +127,9 @@ async fn is_refused(app: &App, arrival: Option<Arrival>) {
     std::future::pending().await
 }
 
-/// What is wrong with the name of the host: there is exactly one, in the target or in `Host` (RFC 9112, section 3.2), but for
-/// HTTP/1.0, which knows none.
+/// Returns the fault of the host name, if any.
+///
+/// There must be exactly one, in the target or in `Host` (RFC 9112, section 3.2). HTTP/1.0 may do without.
 fn host_fault(request: &Request) -> Option<&'static str> {
     let mut hosts = request.headers().get_all(header::HOST).iter();
     let (host, second) = (hosts.next(), hosts.next());
@@ -134,7 +137,7 @@ fn host_fault(request: &Request) -> Option<&'static str> {
         return Some("send one Host");
     }
     let target = request.uri().authority();
-    // RFC 9110, section 4.2.4: what is before the @ disguises the host.
+    // RFC 9110, section 4.2.4: text before an @ could disguise the host.
     if target.is_some_and(|target| target.as_str().contains('@')) {
         return Some("send no user in the target");
     }
@@ -153,8 +156,8 @@ fn host_fault(request: &Request) -> Option<&'static str> {
     target.is_some_and(|target| *target != name).then_some("Host and the target of the request disagree")
 }
 
-/// The fault of other fields, if any: two keys, of which programs may take either, or an expectation that is
-/// not met.
+/// Returns the fault of other fields, if any: two keys, of which programs may take either, or an unsupported
+/// expectation.
 fn field_fault(headers: &HeaderMap) -> Option<&'static str> {
     if headers.get_all(header::AUTHORIZATION).iter().nth(1).is_some() {
         return Some("send one Authorization");
@@ -164,7 +167,7 @@ fn field_fault(headers: &HeaderMap) -> Option<&'static str> {
     (!are_met).then_some("100-continue is the only expectation that is met")
 }
 
-/// Ends the connection with this answer; a connection of HTTP/2 ends otherwise.
+/// Closes the connection after this answer. HTTP/2 ends its connections in another way.
 fn close(version: Version, mut response: Response) -> Response {
     if version < Version::HTTP_2 {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));

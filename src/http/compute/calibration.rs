@@ -1,33 +1,38 @@
-//! How long work takes on this machine, from what ran on it.
+//! Predicted duration of work on this machine, learned from what ran on it.
 //!
-//! Nominally a request takes [`LEAST_SECONDS`] and [`SECONDS_PER_FLOP`] for each of the flops that were counted for it before it began. What
-//! it really took, in proportion to that, is averaged for each class: operation, whether it found what it needs, and decade of flops.
-//! Averages are of logarithms, so that twice as long and half as long are as far off, and forget half of what they know with each
-//! request: machines change, by who else is on them.
+//! The nominal duration of a request is [`LEAST_SECONDS`] plus [`SECONDS_PER_FLOP`] times its flops, counted
+//! before it begins. The ratio of measured to nominal duration is averaged per class: operation, cached or
+//! not, and decade of flops.
+//!
+//! Averages are of logarithms, so that twice as long and half as long deviate equally. Each new request
+//! halves the weight of all earlier ones, because the load of a machine changes.
 
 use std::collections::HashMap;
 
-/// 20 Gflop/s.
+/// Nominal seconds per flop: 20 Gflop/s.
 const SECONDS_PER_FLOP: f64 = 5e-11;
 
-/// What the smallest request takes.
+/// Nominal seconds of the smallest request.
 const LEAST_SECONDS: f64 = 2e-4;
 
-/// The weight of the last request in its class, and in the average over all, which stands in for classes of which nothing is known.
+/// Weight of the last request in the average of its class, and in the overall average.
+///
+/// The overall average stands in for classes without samples.
 const WEIGHT: f64 = 0.5;
 const WEIGHT_OF_ALL: f64 = 0.1;
 
-/// The most that a request may be off by: a process that was stopped for an hour says nothing about the next one.
+/// Largest ratio that a sample counts with. If a process was stopped for an hour, that says nothing about the
+/// next request.
 const MOST: f64 = 1e3;
 
-/// A request by what its time depends on.
+/// The properties of a request that determine its duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Work {
-    /// The operation by name.
+    /// Name of the operation.
     pub operation: &'static str,
-    /// Whether nothing has to be made before it can be answered.
+    /// Whether everything the request needs already exists, so that nothing must be made first.
     pub is_cached: bool,
-    /// What is computed for it, as counted beforehand.
+    /// Flops of the request, counted before it begins.
     pub flops: f64,
 }
 
@@ -41,7 +46,7 @@ impl Work {
     }
 }
 
-/// Averages of ln(measured / nominal).
+/// Averages of ln(measured / nominal), per class and overall.
 #[derive(Default)]
 pub(super) struct Calibration {
     classes: HashMap<(&'static str, bool), Vec<(i32, f64)>>,
@@ -60,14 +65,14 @@ impl Calibration {
         }
     }
 
-    /// How long a request will take, once its turn has come.
+    /// Predicts the seconds that a request takes once its turn has come.
     pub(super) fn seconds(&self, work: Work) -> f64 {
         let of = |is_cached| self.nearest(work.operation, is_cached, work.decade());
         let known = of(work.is_cached).or_else(|| of(!work.is_cached));
         work.nominal_seconds() * known.unwrap_or(self.of_all).exp()
     }
 
-    /// What is known of the same operation with about as many flops.
+    /// The average of the same operation in the nearest decade of flops.
     fn nearest(&self, operation: &'static str, is_cached: bool, decade: i32) -> Option<f64> {
         let decades = self.classes.get(&(operation, is_cached))?;
         decades.iter().min_by_key(|(known, _)| (known - decade).abs()).map(|&(_, average)| average)
@@ -84,15 +89,15 @@ mod tests {
     fn what_ran_tells_how_long_the_next_one_takes() {
         let mut calibration = Calibration::default();
         assert!((calibration.seconds(COLD) - 0.0502).abs() < 1e-12);
-        // A machine ten times as slow: known at once for the same work, and for what is like it.
+        // A machine ten times as slow: learned at once for the same work and for similar work.
         calibration.learn(COLD, 0.502);
         assert!((calibration.seconds(COLD) - 0.502).abs() < 1e-12);
         assert!((calibration.seconds(Work { flops: 1e10, ..COLD }) - 5.002).abs() < 1e-9);
         assert!((calibration.seconds(Work { is_cached: true, ..COLD }) - 0.502).abs() < 1e-12);
-        // A tenth of it for what has another name.
+        // Other operations take a tenth of the deviation over, in logarithms.
         let other = Work { operation: "compute_posterior", ..COLD };
         assert!((calibration.seconds(other) - 0.0502 * 10_f64.powf(0.1)).abs() < 1e-12);
-        // Small requests do not speak for large ones.
+        // Small requests do not affect the prediction of large ones.
         let small = Work { flops: 1e4, ..COLD };
         calibration.learn(small, 2e-5);
         assert!((calibration.seconds(COLD) - 0.502).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! A lane: threads, turns on them, and whether they still move.
+//! A lane: a thread pool, the turns on it, and a check that its threads still make progress.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use super::pulse::Pulse;
 use super::turns::{Turn, Turns};
 use crate::store::Owner;
 
-/// A pool of threads of its own with turns on it.
+/// A thread pool with turns.
 pub(super) struct Lane {
     pool: Arc<rayon::ThreadPool>,
     turns: Arc<Turns>,
@@ -21,10 +21,11 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    /// Starts the threads. The operating system gives those of a greater `niceness` less of a core that others want as well.
+    /// Starts the threads. When cores are contended, the operating system gives threads with a greater
+    /// `niceness` less time.
     ///
     /// # Errors
-    /// If the operating system refuses them.
+    /// Fails if the operating system refuses the threads.
     pub(super) fn new(
         name: &'static str,
         n_threads: usize,
@@ -39,7 +40,7 @@ impl Lane {
         Ok(Self { pool: Arc::new(pool), turns, pulse: Pulse::new() })
     }
 
-    /// Jobs that have their turn, and those that wait for one.
+    /// Returns the number of running jobs and the number of waiting jobs.
     pub(super) fn load(&self) -> (usize, usize) {
         self.turns.load()
     }
@@ -49,8 +50,9 @@ impl Lane {
         self.turns.take(owner).await
     }
 
-    /// Runs a job to its end in a turn. Dropping the future tells the job to stop at its next checkpoint; it keeps its turn until
-    /// then. `None` if it panicked.
+    /// Runs a job to its end in a turn. `None` if it panicked.
+    ///
+    /// Dropping the future tells the job to stop at its next checkpoint. The job keeps its turn until then.
     pub(super) async fn run<T: Send + 'static>(
         &self,
         turn: Turn,
@@ -66,23 +68,25 @@ impl Lane {
             let observer = JobObserver::new(cancelled, pulse, progress);
             let outcome = catch_unwind(AssertUnwindSafe(|| job(&observer)));
             drop(turn);
-            // The receiver is gone if the client is.
+            // Sending fails if the client has left.
             let _ = sender.send(outcome.map(|result| (result, observer.times())));
         });
         receiver.await.ok()?.ok()
     }
 
-    /// Whether the threads have moved within `patience`: a job has come to a checkpoint, or a probe through, which is sent here
-    /// unless one is under way, and waited for a moment.
+    /// Whether the threads have made progress within `patience`.
+    ///
+    /// Progress is a job that reached a checkpoint, or a probe that ran. This function sends a probe unless
+    /// another is pending, and waits [`PROBE_WAIT`] for it.
     pub(super) async fn is_moving(&self, patience: Duration) -> bool {
         if !self.pulse.is_probed.swap(true, Ordering::Relaxed) {
             let (pulse, (sender, receiver)) = (self.pulse.clone(), oneshot::channel::<()>());
-            // An idle lane is silent; from here on something is asked of it.
+            // An idle lane gives no sign of life, so its silence is measured from here.
             pulse.beat();
             self.pool.spawn(move || {
                 pulse.is_probed.store(false, Ordering::Relaxed);
                 pulse.beat();
-                // The receiver is gone if the probe took long.
+                // Sending fails if the probe was late.
                 let _ = sender.send(());
             });
             if tokio::time::timeout(PROBE_WAIT, receiver).await.is_ok() {
@@ -93,7 +97,7 @@ impl Lane {
     }
 }
 
-/// How long a readiness probe waits for its answer; orchestrators wait a second by default.
+/// Time that a readiness check waits for its probe. Orchestrators wait a second by default.
 const PROBE_WAIT: Duration = Duration::from_millis(100);
 
 struct CancelOnDrop(Arc<AtomicBool>);
@@ -104,7 +108,7 @@ impl Drop for CancelOnDrop {
     }
 }
 
-/// Where the operating system knows it by thread; a refusal changes no result.
+/// Sets the niceness of the current thread on Linux, which has it per thread. A refusal changes no result.
 #[cfg(target_os = "linux")]
 fn be_nice(niceness: i32) {
     let _ = rustix::process::nice(niceness);

@@ -1,20 +1,27 @@
-//! The only door to the compute threads: admission, lanes, cancellation, timing.
+//! The compute threads and the only access to them: admission, lanes, cancellation, timing.
 //!
-//! FOUR LANES, by what a job costs. A factorization uses every thread for seconds, a warm query takes microseconds. Each lane
-//! has a thread pool of its own, so that the operating system shares the cores, and prefers the lanes of small jobs: parsing
-//! and planning, small clouds and the chunks of answers run on threads that no work of size can take. The exclusive lane runs
-//! one job at a time: two factorizations side by side would take as long and twice the memory. What costs as much and nobody waits for, work
-//! of `/v1/jobs`, has a lane of its own behind all others, or hours of it would be in front of requests with a deadline.
+//! FOUR LANES, by the cost of a job. A factorization uses every thread for seconds, while a query on a cached
+//! factor takes microseconds. Each lane has a thread pool of its own. The operating system shares the cores
+//! among them and prefers the lanes of small jobs.
 //!
-//! OWNERS. Places and turns go round among the owners, so that many requests of one do not hold up those of another.
+//! - light: parsing, planning, small clouds and chunks of answers. No large job can occupy these threads.
+//! - shared: jobs between light and exclusive.
+//! - exclusive: one large job at a time. Two factorizations side by side would take as long, and twice the
+//!   memory.
+//! - jobs: large jobs of `/v1/jobs`, for which nobody waits. Otherwise hours of such work would delay
+//!   requests that have a deadline.
 //!
-//! CANCELLATION. Dropping the future of a job tells the job to stop at its next checkpoint. It keeps its turn until it has
-//! really stopped, so no more work runs than was admitted.
+//! OWNERS. Places and turns rotate among the owners, so that many requests of one owner do not delay those of
+//! another.
 //!
-//! NOTHING WAITS ON A POOL. A thread that waits for the parts of its job takes up another job meanwhile, on top of its stack. So
-//! a job neither waits for another job nor holds, while it calls on the pool, what another job may want: lock, cell or
-//! channel. What many may want at once is awaited before the job begins, through the flights of the store. clippy.toml
-//! refuses the calls that could break this; each exception says why it is none.
+//! CANCELLATION. Dropping the future of a job tells the job to stop at its next checkpoint. The job keeps its
+//! turn until it has really stopped, so no more work runs than was admitted.
+//!
+//! NOTHING WAITS ON A POOL. A thread that waits for parts of its job meanwhile executes another job, on top
+//! of its stack. So a job must not wait for another job. While it calls on the pool, it must not hold
+//! anything that another job may want: a lock, a cell or a channel. Whatever several jobs may want at once is
+//! awaited before the job begins, through the flights of the store. clippy.toml forbids the calls that could
+//! break this. Each exception states why it is safe.
 
 mod calibration;
 mod lane;
@@ -37,27 +44,28 @@ use places::Places;
 pub use progress::{Progress, Snapshot};
 pub use turns::Turns;
 
-/// Flops up to which a job goes to the light lane: some 2 ms of one core.
+/// Most flops of a job on the light lane: some 2 ms of one core.
 const LIGHT_FLOPS: f64 = 3e7;
 
-/// Flops beyond which a job goes to the exclusive lane: some 100 ms on two cores.
+/// Most flops of a job on the shared lane: some 100 ms on two cores. Larger jobs go to the exclusive or jobs
+/// lane.
 const EXCLUSIVE_FLOPS: f64 = 1e10;
 
-/// What parsing a byte takes, in flops of a light job: a gigabyte a second.
+/// Cost of parsing, in flops per byte. It corresponds to a gigabyte a second.
 pub const FLOPS_PER_PARSED_BYTE: f64 = 20.0;
 
-/// How long a lane may be without any sign of life: between two checkpoints of the largest factorization lies a second or two.
+/// Longest silence of a healthy lane. The checkpoints of the largest factorization are a second or two apart.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// What there is to do at a moment.
+/// Current load of the compute threads.
 pub struct Load {
-    /// Requests that have a place, and how many places there are.
+    /// Number of admitted requests, and the number of places for them.
     pub n_admitted: usize,
     pub n_places: usize,
     pub lanes: [LaneLoad; 4],
 }
 
-/// Jobs of a lane.
+/// Number of jobs on a lane.
 pub struct LaneLoad {
     pub name: &'static str,
     pub n_running: usize,
@@ -78,7 +86,7 @@ impl Compute {
     /// Starts the threads of all lanes.
     ///
     /// # Errors
-    /// If the operating system refuses them.
+    /// Fails if the operating system refuses the threads.
     pub fn new(
         n_threads: usize,
         max_queue: usize,
@@ -95,12 +103,12 @@ impl Compute {
         })
     }
 
-    /// Threads of each lane.
+    /// Number of threads of each lane.
     pub fn n_threads(&self) -> usize {
         self.n_threads
     }
 
-    /// What there is to do now.
+    /// Returns the current load.
     pub fn load(&self) -> Load {
         let lanes = self.lanes().map(|(name, lane)| {
             let (n_running, n_waiting) = lane.load();
@@ -113,28 +121,29 @@ impl Compute {
     /// Takes a place for a request of this owner.
     ///
     /// # Errors
-    /// 503 `overloaded` when as many requests wait as may, with when to come back.
+    /// 503 `overloaded` with Retry-After, if the queue is full.
     pub fn admit(&self, owner: Owner) -> Result<Arc<Admission>, Problem> {
         self.places.take(owner).map(Arc::new).map_err(Problem::overloaded)
     }
 
-    /// Looks whether a request of this owner would be admitted.
+    /// Checks whether a request of this owner would be admitted, without taking a place.
     ///
     /// # Errors
-    /// Those of [`Compute::admit`].
+    /// Returns the errors of [`Compute::admit`].
     pub fn check_room(&self, owner: Owner) -> Result<(), Problem> {
         self.places.look(owner).map_err(Problem::overloaded)
     }
 
-    /// 503 `overloaded` for what is short of memory: some is free when the first of the requests under way has ended.
+    /// 503 `overloaded` for a request that does not fit in memory. Memory becomes free when the first running
+    /// request ends.
     pub fn out_of_memory(&self) -> Problem {
         Problem::overloaded(self.places.seconds_until_any_is_free())
     }
 
-    /// Looks whether any request would be admitted, and whether the threads of every lane move.
+    /// Checks that a request would be admitted, and that the threads of every lane make progress.
     ///
     /// # Errors
-    /// 503 `overloaded`.
+    /// 503 `overloaded` otherwise.
     pub async fn check_ready(&self) -> Result<(), Problem> {
         self.places.look_for_any().map_err(Problem::overloaded)?;
         for (_, lane) in self.lanes() {
@@ -146,10 +155,10 @@ impl Compute {
         Ok(())
     }
 
-    /// Runs a job on the lane for its flops and answers with its result and the time of its stages.
+    /// Runs a job on the lane for its flops. Returns its result and the durations of its stages.
     ///
     /// # Errors
-    /// 500 `internal` if the job panicked; the panic is logged and the threads live on.
+    /// 500 `internal` if the job panicked. The panic is logged and the threads live on.
     pub async fn run<T: Send + 'static>(
         &self,
         admission: &Admission,
@@ -162,10 +171,10 @@ impl Compute {
         lane.run(turn, admission.progress.clone(), job).await.ok_or_else(panicked)
     }
 
-    /// Runs a small job of an answer that is on its way, when its place is another's already.
+    /// Runs a small job for an answer that is being sent. Its request no longer holds a place.
     ///
     /// # Errors
-    /// Those of [`Compute::run`].
+    /// Returns the errors of [`Compute::run`].
     pub async fn run_small<T: Send + 'static>(
         &self,
         owner: Owner,
@@ -196,7 +205,7 @@ impl Compute {
     }
 }
 
-/// Whether a job of so many flops goes to the lane of the smallest.
+/// Whether a job goes to the light lane.
 pub fn is_light(flops: f64) -> bool {
     flops <= LIGHT_FLOPS
 }

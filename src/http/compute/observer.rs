@@ -1,4 +1,4 @@
-//! Watches one job: measures its stages, tells it when its client is gone.
+//! The observer of a job: measures its stages and tells it when its client has left.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -28,11 +28,11 @@ impl StageTimes {
     }
 }
 
-/// Watches one job: measures its stages, tells it when its client is gone.
+/// Measures the stages of a job and tells it when its client has left.
 pub struct JobObserver {
     cancelled: Arc<AtomicBool>,
     pulse: Arc<Pulse>,
-    /// Told where the job is, if anybody looks.
+    /// Receives the stage and residual, if the request is watched.
     progress: Option<Arc<Progress>>,
     clock: Mutex<Clock>,
 }
@@ -65,7 +65,7 @@ impl JobObserver {
         self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The times so far, the current stage included.
+    /// The durations so far, including that of the current stage.
     pub fn times(&self) -> StageTimes {
         let mut clock = self.clock();
         clock.stop();
@@ -90,7 +90,7 @@ impl Observer for JobObserver {
     }
 
     fn is_cancelled(&self) -> bool {
-        // Whoever asks is at work.
+        // Each call is a sign of life of the lane.
         self.pulse.beat();
         self.cancelled.load(Ordering::Relaxed)
     }

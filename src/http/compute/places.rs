@@ -1,4 +1,4 @@
-//! Places of admitted requests, and when the next one will be free.
+//! Places of admitted requests, with a prediction of when the next one becomes free.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,7 +8,7 @@ use super::calibration::{Calibration, Work};
 use super::progress::Progress;
 use crate::store::Owner;
 
-/// A bounded number of places, of which several owners have at most half each.
+/// A bounded number of places. If there are several owners, each may hold at most half.
 pub(super) struct Places {
     n_places: usize,
     share: usize,
@@ -26,18 +26,19 @@ struct State {
 struct Admitted {
     owner: Owner,
     since: Instant,
-    /// Known once it is planned, with the seconds that it was expected to take then.
+    /// Cost and expected seconds. `None` until the request is planned.
     work: Option<(Work, f64)>,
-    /// When its turn came, after it was planned.
+    /// Time of the first turn after planning.
     begun: Option<Instant>,
 }
 
-/// A place among the admitted requests, held until the answer is ready; work that outlives its client holds it as well.
+/// A place among the admitted requests, held until the answer is ready. Work that outlives its client holds
+/// the place too.
 pub struct Admission {
     places: Arc<Places>,
     id: u64,
     pub owner: Owner,
-    /// Told how far the request is, if anybody looks.
+    /// Progress of the request, if it is watched.
     pub(super) progress: Option<Arc<Progress>>,
 }
 
@@ -53,7 +54,7 @@ impl Places {
         Arc::new(Self { n_places, share, deadline, state: Mutex::new(state) })
     }
 
-    /// Takes a place, or says in how many seconds there will be one.
+    /// Takes a place. On failure, returns the seconds until one is expected to be free.
     pub(super) fn take(self: &Arc<Self>, owner: Owner) -> Result<Admission, u64> {
         let mut state = self.state();
         self.check(&state, owner)?;
@@ -64,17 +65,18 @@ impl Places {
         Ok(Admission { places: self.clone(), id, owner, progress: Progress::of_this_task() })
     }
 
-    /// Places that are taken, of how many.
+    /// Returns the number of taken places and the number of all places.
     pub(super) fn load(&self) -> (usize, usize) {
         (self.state().admitted.len(), self.n_places)
     }
 
-    /// Whether there is a place for an owner; if not, in how many seconds.
+    /// Checks that an owner could take a place. On failure, returns the seconds until one is expected to be
+    /// free.
     pub(super) fn look(&self, owner: Owner) -> Result<(), u64> {
         self.check(&self.state(), owner)
     }
 
-    /// Whether there is a place for anybody.
+    /// Checks that there is a free place, whoever the owner.
     pub(super) fn look_for_any(&self) -> Result<(), u64> {
         let state = self.state();
         if state.admitted.len() < self.n_places { Ok(()) } else { Err(self.seconds_until_free(&state, None)) }
@@ -88,7 +90,7 @@ impl Places {
         if state.admitted.len() >= self.n_places { Err(self.seconds_until_free(state, None)) } else { Ok(()) }
     }
 
-    /// When the first of those who have begun will have ended; whole seconds, as the header has them.
+    /// Seconds until the first of the running requests is expected to end, as an integer for Retry-After.
     pub(super) fn seconds_until_any_is_free(&self) -> u64 {
         self.seconds_until_free(&self.state(), None)
     }
@@ -113,7 +115,7 @@ impl Places {
 }
 
 impl Admission {
-    /// Says what the request will cost in all; answers how many seconds that will take.
+    /// Sets the total cost of the request. Returns the expected seconds.
     pub fn set_work(&self, work: Work) -> f64 {
         let mut state = self.places.state();
         let seconds = state.calibration.seconds(work);
@@ -126,24 +128,24 @@ impl Admission {
         seconds
     }
 
-    /// Whether it is a job: nobody waits for its answer.
+    /// Whether the request is a job, whose answer nobody waits for.
     pub fn is_job(&self) -> bool {
         self.progress.is_some()
     }
 
-    /// How many seconds work will take once its turn has come.
+    /// Expected seconds of some work, once its turn has come.
     pub fn expected_seconds(&self, work: Work) -> f64 {
         self.places.state().calibration.seconds(work)
     }
 
-    /// What it takes says nothing about others.
+    /// Excludes this request from the calibration, because its duration is not representative.
     pub fn forget_work(&self) {
         if let Some(admitted) = self.places.state().admitted.get_mut(&self.id) {
             admitted.work = None;
         }
     }
 
-    /// Its turn has come.
+    /// Records that the turn of the request has come.
     pub(super) fn begin(&self) {
         if let Some(admitted) = self.places.state().admitted.get_mut(&self.id)
             && admitted.work.is_some()
@@ -155,7 +157,7 @@ impl Admission {
         }
     }
 
-    /// It was computed to its end: what it took says how fast the machine is.
+    /// Records that the request was computed to its end. Its duration calibrates later predictions.
     pub fn finish(&self) {
         let mut state = self.places.state();
         let admitted = state.admitted.get(&self.id);
@@ -164,7 +166,7 @@ impl Admission {
         state.calibration.learn(work, seconds);
     }
 
-    /// The same of work that was done at once, in the turn that planned it.
+    /// Calibrates with work that was done at once, in the turn that planned it.
     pub fn did_at_once(&self, work: Work, took: Duration) {
         self.places.state().calibration.learn(work, took.as_secs_f64());
     }
@@ -215,12 +217,12 @@ mod tests {
         });
         long.begin();
         short.begin();
-        // At 20 Gflop/s; who has not begun will end later than whoever has.
+        // At 20 Gflop/s. Requests that have not begun end later than those that have.
         assert_eq!(places.look(A), Err(20));
         drop(short);
         assert!(places.look(A).is_ok());
         assert_eq!(places.seconds_until_any_is_free(), 50);
-        // None lasts beyond its deadline.
+        // No request lasts beyond its deadline.
         long.set_work(work(1e15));
         assert_eq!(places.seconds_until_any_is_free(), 100);
     }

@@ -1,7 +1,7 @@
-//! How far a request is, for whoever looks on while it is served: jobs.
+//! Progress of a request while it is served. Only jobs are watched.
 //!
-//! What is known is the stage, and what part of the time that it is expected to take has gone by. A request that takes longer than was
-//! expected comes ever closer to its end, and never there.
+//! Progress consists of the stage and of the elapsed part of the expected time. A request that takes longer
+//! than expected approaches its end asymptotically and never reaches it.
 
 use std::future::Future;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,10 +13,11 @@ tokio::task_local! {
     static WATCHED: Arc<Progress>;
 }
 
-/// Up to this part progress is time; what is left is shared among all that takes longer than expected.
+/// Fraction of the expected time up to which progress is linear in time. The rest is left for requests that
+/// are late.
 const TIMELY: f64 = 0.9;
 
-/// What is known of a request under way.
+/// Progress of a request, written by its job and read by watchers.
 #[derive(Default)]
 pub struct Progress {
     state: Mutex<State>,
@@ -26,32 +27,33 @@ pub struct Progress {
 struct State {
     stage: Option<Stage>,
     residual: Option<f64>,
-    /// Seconds that it is expected to take, and when it began.
+    /// Seconds that the request is expected to take.
     expected: Option<f64>,
+    /// When the request began.
     begun: Option<Instant>,
-    /// It never goes back, whatever is learned on the way.
+    /// Largest fraction reported so far, because progress never goes back.
     fraction: f64,
 }
 
-/// What was known at a moment.
+/// Progress at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Snapshot {
-    /// Nothing until the first one begins.
+    /// `None` until the first stage begins.
     pub stage: Option<Stage>,
-    /// From 0 to 1.
+    /// Between 0 and 1.
     pub fraction: f64,
-    /// Of the last solve, relative.
+    /// Relative residual of the last solve.
     pub residual: Option<f64>,
     pub seconds_left: Option<f64>,
 }
 
 impl Progress {
-    /// Runs a request whose progress is looked at.
+    /// Runs a request as a watched one.
     pub async fn watch<F: Future>(self: &Arc<Self>, request: F) -> F::Output {
         WATCHED.scope(self.clone(), request).await
     }
 
-    /// That of the request that this task serves, if anybody looks.
+    /// The progress of the request that this task serves, if it is watched.
     pub(super) fn of_this_task() -> Option<Arc<Self>> {
         WATCHED.try_with(Arc::clone).ok()
     }
@@ -72,16 +74,16 @@ impl Progress {
     }
 
     pub(super) fn solved_to(&self, relative_residual: f64) {
-        // Beyond float64 it says nothing.
+        // A residual beyond float64 says nothing.
         self.state().residual = Some(relative_residual).filter(|residual| residual.is_finite());
     }
 
-    /// Begins anew: it was refused, and is tried again.
+    /// Resets the progress of a request that was refused and is tried again.
     pub fn restart(&self) {
         *self.state() = State::default();
     }
 
-    /// What is known now.
+    /// Returns the current progress.
     pub fn now(&self) -> Snapshot {
         let mut state = self.state();
         let elapsed = state.begun.map(|begun| begun.elapsed().as_secs_f64());
@@ -103,7 +105,7 @@ impl Progress {
     }
 }
 
-/// The part that is done once this part of the expected time has gone by: as much, and from nine tenths on ever less.
+/// Converts elapsed / expected time to progress: the identity up to 0.9, then ever slower towards 1.
 fn fraction(of_expected: f64) -> f64 {
     match of_expected - TIMELY {
         late if late > 0.0 => 1.0 - (1.0 - TIMELY) / (1.0 + late / (1.0 - TIMELY)),
@@ -132,7 +134,7 @@ mod tests {
         let nothing =
             Snapshot { stage: Some(Stage::Factor), fraction: 0.0, residual: None, seconds_left: None };
         assert_eq!(progress.now(), nothing);
-        // Nothing is known of what takes no known time.
+        // There is no prediction without an expected time.
         progress.begin();
         assert_eq!(progress.now(), nothing);
         progress.expect(1e9);

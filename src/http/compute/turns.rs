@@ -1,8 +1,9 @@
-//! Turns on a lane: as many at once as it has, handed from owner to owner.
+//! A fair semaphore, whose permits (turns) rotate among the owners.
 //!
-//! A semaphore hands its permits out in the order of arrival, so that a hundred requests of one key would go before the one
-//! of another. Here every owner has a queue, and the queues have their turns one after the other. Where a turn may last for hours,
-//! no owner of several has more than half of them, whoever else waits.
+//! A plain semaphore hands its permits out in the order of arrival, so a hundred requests of one key would
+//! precede the one request of another. Here every owner has a queue, and the queues are served in turn. Where
+//! a turn may last for hours and there are several owners, none may hold more than half of the turns, whoever
+//! else waits.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,10 +12,10 @@ use tokio::sync::oneshot;
 
 use crate::store::Owner;
 
-/// Turns that are free, and who waits for one.
+/// A fixed number of turns, with a queue per owner.
 pub struct Turns {
     n: usize,
-    /// Turns that one owner may have.
+    /// Most turns that one owner may hold.
     most: usize,
     state: Mutex<State>,
 }
@@ -22,22 +23,23 @@ pub struct Turns {
 struct State {
     n_free: usize,
     taken: HashMap<Owner, usize>,
-    /// Owners with somebody waiting, the next one first.
+    /// Owners with waiting requests. The next owner to be served is first.
     waiting: VecDeque<(Owner, VecDeque<oneshot::Sender<Turn>>)>,
 }
 
-/// A turn, handed on when dropped.
+/// A turn. When dropped, it passes to the next waiting request.
 pub struct Turn {
     of: Option<(Arc<Turns>, Owner)>,
 }
 
 impl Turns {
-    /// Turns of which one owner may have all.
+    /// Creates `n` turns, all of which one owner may hold.
     pub fn new(n: usize) -> Arc<Self> {
         Self::with_most(n, n)
     }
 
-    /// Turns that may last: two at least where there are several owners, and half of them for each.
+    /// Creates turns that may last for hours. With several owners there are at least two turns, and each
+    /// owner may hold half.
     pub fn of_owners(n: usize, n_owners: usize) -> Arc<Self> {
         if n_owners < 2 { Self::new(n) } else { Self::with_most(n.max(2), n.max(2) / 2) }
     }
@@ -63,18 +65,21 @@ impl Turns {
             }
             receiver
         };
-        // The sender is only dropped unsent with the lane itself: then nobody counts turns any more.
+        // The sender is dropped unsent only together with the lane. Then nobody counts turns any more.
         receiver.await.unwrap_or(Turn { of: None })
     }
 
-    /// Takes a turn back; the next who waits and may have it, whose owner goes to the end of the line. If there is none, it is free.
+    /// Takes a turn back and returns the next request to receive it. If there is none, the turn becomes free.
+    ///
+    /// The owner of that request moves to the end of the line. Owners that already hold as many turns as they
+    /// may are skipped.
     fn next(&self, last: Owner) -> Option<(Owner, oneshot::Sender<Turn>)> {
         let mut state = self.state();
         state.give_back(last);
         let mut passed_over = VecDeque::new();
         let next = loop {
             let Some((owner, mut queue)) = state.waiting.pop_front() else { break None };
-            // Who has left costs its owner no turn.
+            // A request whose client has left costs its owner no turn.
             while queue.front().is_some_and(oneshot::Sender::is_closed) {
                 queue.pop_front();
             }
@@ -91,7 +96,7 @@ impl Turns {
             }
             break Some((owner, next));
         };
-        // They keep their places in front.
+        // Owners that were skipped keep their places in front.
         passed_over.append(&mut state.waiting);
         state.waiting = passed_over;
         match &next {
@@ -101,7 +106,7 @@ impl Turns {
         next
     }
 
-    /// Turns that are taken, and who waits for one.
+    /// Returns the number of taken turns and the number of waiting requests.
     pub fn load(&self) -> (usize, usize) {
         let state = self.state();
         let is_here = |sender: &&oneshot::Sender<Turn>| !sender.is_closed();
@@ -109,7 +114,7 @@ impl Turns {
         (self.n.saturating_sub(state.n_free), n_waiting)
     }
 
-    /// Whether an owner could have one at once.
+    /// Whether an owner could take a turn at once.
     pub fn has_one_for(&self, owner: Owner) -> bool {
         let state = self.state();
         state.n_free > 0 && state.n_taken_by(owner) < self.most
@@ -142,7 +147,7 @@ impl Drop for Turn {
         while let Some((owner, next)) = turns.next(last) {
             match next.send(Turn { of: Some((turns.clone(), owner)) }) {
                 Ok(()) => return,
-                // Who waited has left.
+                // The client of the waiting request has left, so the turn passes on.
                 Err(mut returned) => returned.of = None,
             }
             last = owner;
@@ -169,7 +174,7 @@ mod tests {
         assert!(futures_util::poll!(&mut of_b).is_pending());
         drop(of_a.remove(0));
         drop(first);
-        // The second of A has the turn that the first one left; then comes B before the third of A.
+        // The second request of A takes over the turn of the first. Then B precedes the third of A.
         let second = of_a.remove(0).await;
         drop(second);
         let of_b = of_b.await;
@@ -192,7 +197,7 @@ mod tests {
         let of_b = turns.take(B).await;
         let mut next_of_b = Box::pin(turns.take(B));
         assert!(futures_util::poll!(&mut next_of_b).is_pending());
-        // Though A has waited for longer, it has its half.
+        // A has waited longer, but already holds its half.
         drop(of_b);
         let next_of_b = next_of_b.await;
         assert!(futures_util::poll!(&mut second).is_pending());

@@ -1,11 +1,11 @@
-//! What a request leaves to the service or decides, by words.
+//! Options of a request that are chosen by a word.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use gramian_numerics::solver::trend::Mean;
 
-/// How the linear system is solved.
+/// The method that solves the linear system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverChoice {
@@ -14,31 +14,31 @@ pub enum SolverChoice {
     Auto,
     /// Cholesky factorization of the full matrix: n³/3 flops, 4n² bytes.
     Dense,
-    /// From the points nearest to each query alone: values by kriging, surfaces by regressions. From thousands of points to
-    /// millions.
+    /// Uses only the points nearest to each query: kriging for values, regressions for surfaces. For
+    /// thousands to millions of points.
     Local,
 }
 
-/// What to do with points that coincide when alpha is 0.
+/// The treatment of points that coincide when alpha is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DuplicatePolicy {
     /// Answer 422 `duplicate-points`.
     #[default]
     Refuse,
-    /// Average their values; columns of matrices split the weight equally.
+    /// Average their values. In matrices, the columns of merged points split the weight equally.
     Merge,
 }
 
-/// The mean of a function: what it is made of beside the kernel, and tends to far from the points.
+/// The mean of a function: its part beside the kernel, which it tends to far from the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeanChoice {
     /// 0.
     Zero,
-    /// A constant, found from the values by generalised least squares.
+    /// A constant, estimated from the values by generalised least squares.
     Constant,
-    /// A constant and a slope for each coordinate, likewise.
+    /// A constant and a slope per coordinate, estimated from the values by generalised least squares.
     Linear,
 }
 
@@ -52,17 +52,17 @@ impl From<MeanChoice> for Mean {
     }
 }
 
-/// Which function's level surface is meant.
+/// The function whose level set is the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceChoice {
-    /// `signature`, and `offset` where its gradient vanishes or, for curvatures, is weak.
+    /// `signature`, replaced by `offset` where its gradient vanishes or, for curvatures, is weak.
     #[default]
     Auto,
-    /// The interpolant of the constant 1.
+    /// The signature function: the interpolant of the constant 1.
     Signature,
-    /// An interpolant of signed distances on two offset layers, fitted to the points near each query. It needs no derivatives
-    /// of `kernel`.
+    /// An interpolant of signed distances on two offset layers, fitted to the points near each query. It
+    /// needs no derivatives of `kernel`.
     Offset,
     /// Local regressions of the height over a tangent plane, with noise.
     Local,
@@ -72,7 +72,7 @@ pub enum SurfaceChoice {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceUsed {
-    /// The interpolant of the constant 1.
+    /// The signature function: the interpolant of the constant 1.
     Signature,
     /// The interpolant of signed distances on two offset layers.
     Offset,
@@ -80,19 +80,22 @@ pub enum SurfaceUsed {
     Local,
 }
 
-/// Which way normals point.
+/// The direction of normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OrientationChoice {
-    /// To the side of the cloud's normals where it has some; else out of closed surfaces, against the gradient of the
-    /// signature function, with signs repaired where neighbours contradict it. A sphere has positive curvatures.
+    /// Normals point outward, so a sphere has positive curvatures.
+    ///
+    /// If the cloud has normals, their side is outward. Otherwise normals point out of closed surfaces:
+    /// against the gradient of the signature function, with signs repaired where neighbours contradict it.
     #[default]
     Outward,
-    /// Along the gradient of the signature function, whatever its sign; with the offset model, the opposite of `outward`.
+    /// Along the gradient of the signature function, whatever its sign. With the offset model, the opposite
+    /// of `outward`.
     Gradient,
 }
 
-/// What an answer about values has beside what it always has.
+/// Optional parts of an answer about values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ValuesInclude {
@@ -100,7 +103,7 @@ pub enum ValuesInclude {
     Deviations,
 }
 
-/// What a geometric answer has beside what it always has.
+/// Optional parts of a geometric answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GeometryInclude {

@@ -1,4 +1,4 @@
-//! The cloud of a request.
+//! The cloud of a request, by id or by points.
 
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -7,7 +7,8 @@ use super::schemas::CloudIdSchema;
 use crate::http::wire::read::members::{present, present_unless_empty};
 use crate::http::wire::read::points::Points;
 
-/// A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+/// A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
+/// given.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CloudRef {
@@ -15,12 +16,13 @@ pub struct CloudRef {
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<CloudIdSchema>)]
     pub id: Option<String>,
-    /// The points, one row of coordinates each, all of the same length; the cloud is registered with them.
+    /// The points, with a row of coordinates each, all of the same length. The cloud is registered with the
+    /// request.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
     pub points: Option<Points>,
-    /// Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward. An empty list
-    /// counts as absent.
+    /// Normals at the points, a row each, of any length but 0, with `points` only. They point to the outward
+    /// side. An empty list counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,

@@ -1,4 +1,4 @@
-//! What an answer says of itself.
+//! Diagnostics of an answer: the numbers used, the method, its accuracy, and warnings.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -10,14 +10,15 @@ use crate::http::wire::write::answer::{Member, Parts};
 use gramian_numerics::solver::{Disagreement, Outlier, Place};
 use gramian_numerics::surface::operators::{RowKind, Stencils};
 
-/// How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
-/// answer has them yet.
+/// The factorization of the Gram matrix.
+///
+/// `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FactorizationUsed {
     /// Cholesky, exact up to rounding.
     Cholesky,
-    /// Rank-revealing pivoted Cholesky and least squares on its pivots, where Cholesky fails in float64.
+    /// Rank-revealing pivoted Cholesky and least squares on its pivots, used where Cholesky fails in float64.
     PivotedCholesky,
     /// Reserved for a symmetric indefinite factorization.
     BunchKaufman,
@@ -25,11 +26,13 @@ pub enum FactorizationUsed {
     PartialPivotingLu,
     /// Reserved for iterative solvers.
     ConjugateGradients,
-    /// None: small systems of the points nearest to each query.
+    /// None. Small systems of the points nearest to each query are solved instead.
     Local,
 }
 
-/// The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
+/// The solver that was used.
+///
+/// `landmark` and `iterative` are reserved: no answer has them yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverUsed {
@@ -39,127 +42,138 @@ pub enum SolverUsed {
     Landmark,
     /// Reserved for preconditioned conjugate gradients.
     Iterative,
-    /// The points nearest to each query.
+    /// Small systems of the points nearest to each query.
     Local,
 }
 
-/// What a warning is about.
+/// The subject of a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
-    /// Digits of the weights are lost: their relative error may reach machine precision over the reciprocal condition.
+    /// Digits of the weights are lost: their relative error may reach machine precision divided by the
+    /// reciprocal condition.
     IllConditioned,
     /// A step of iterative refinement reduced the residual.
     Refined,
     /// Points that coincide were merged.
     DuplicatesMerged,
-    /// Variances that came out negative within rounding are served as 0, that of values whose squares leave float64 as 1e-290.
+    /// A variance was adjusted to the range of float64.
+    ///
+    /// Variances that came out negative within rounding are served as 0. If squares of the values leave
+    /// float64, the variance of the values is taken to be 1e-290.
     VarianceClamped,
-    /// The offset model served where the signature function could not.
+    /// The offset model was used where the signature function fails.
     OffsetModelUsed,
-    /// The gradient of the signature function pointed inward at some points; `outward` is the repaired side.
+    /// The gradient of the signature function pointed inward at some points. `outward` is the repaired side.
     OrientationRepaired,
-    /// The cloud is open, so that outward has no meaning.
+    /// The cloud is open, so outward has no meaning.
     OpenCloud,
-    /// The kernel's cusp is seen at the points of the cloud.
+    /// The kernel's cusp shows at the points of the cloud.
     KernelTooRough,
-    /// Curvatures are not confirmed by the points around the query.
+    /// The points around a query do not confirm its curvatures.
     DisagreesWithNeighbours,
     /// Queries lie far from the cloud.
     FarFromCloud,
-    /// Values from the points nearest to a query still change with how many of them are taken.
+    /// Values from the points nearest to a query still change with the number of points used.
     NeighboursNotEnough,
-    /// Values contradict kernel and noise: deviations are too short, where one value is named perhaps around it alone.
+    /// Values contradict kernel and noise, so deviations are too short. If the warning names a value, perhaps
+    /// only around it.
     Misfit,
 }
 
 /// Something that was changed, or that limits the accuracy of the answer.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Warning {
-    /// What it is about.
+    /// The subject of the warning.
     pub code: WarningCode,
-    /// The same in words, with numbers.
+    /// The warning in words, with numbers.
     pub detail: String,
 }
 
-/// What an answer says of itself: the numbers used, how the system was solved, and how well.
+/// Diagnostics of an answer: the numbers used, the method, and its accuracy.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Diagnostics {
     /// The id of the cloud, to refer to it in later requests.
     #[schema(value_type = CloudIdSchema)]
     pub cloud_id: String,
-    /// Points of the cloud, n.
+    /// Number of points of the cloud, n.
     pub n_points: usize,
-    /// Queries answered, m.
+    /// Number of queries answered, m.
     pub n_queries: usize,
-    /// Coordinates of each point, d.
+    /// Number of coordinates of each point, d.
     pub dimension: usize,
-    /// The kernel used, in full.
+    /// The kernel used, with all parameters.
     pub kernel: KernelUsed,
-    /// What was added to the diagonal; absent with `noise_variances`.
+    /// The number added to the diagonal. Absent with `noise_variances`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub alpha: Option<f64>,
     /// The solver used.
     pub solver: SolverUsed,
-    /// Why it was chosen, where `auto` chose another one than the dense one.
+    /// The reason why `auto` chose a solver other than the dense one. Absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub solver_reason: Option<String>,
-    /// How the matrix was factorized.
+    /// The factorization of the matrix.
     pub factorization: FactorizationUsed,
     /// Numerical rank of the matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub rank: Option<usize>,
-    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
+    /// Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub reciprocal_condition: Option<f64>,
-    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and surfaces, with Y = 1.
+    /// ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,
+    /// Y = 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub relative_residual: Option<f64>,
-    /// ‖u‖² = ΛᵀKΛ in the native space of the kernel.
+    /// ‖u‖² = ΛᵀKΛ, the squared norm in the native space of the kernel.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub native_norm_squared: Option<f64>,
-    /// The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+    /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
+    /// mean is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mean_coefficients: Option<Vec<f64>>,
-    /// |u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
+    /// |u(X) − Y|, unit of the values.
+    ///
+    /// Absent for values from the local solver, which is not evaluated at the points.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub misfit: Option<f64>,
-    /// Standard deviation of the noise of the points across the surface, as estimated, length.
+    /// Estimated standard deviation of the noise of the points across the surface, length.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub noise_deviation: Option<f64>,
-    /// Points that were merged into an earlier one.
+    /// Number of points that were merged into an earlier point.
     pub n_merged_duplicates: usize,
-    /// Rows of a sparse operator by how their weights came about.
+    /// Number of rows of a sparse operator by how their weights were computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stencils: Option<StencilsUsed>,
-    /// What was changed or limits the accuracy.
+    /// Changes that were made, and limits of the accuracy.
     pub warnings: Vec<Warning>,
-    /// The same for the fit of the surface, in answers about values on a surface.
+    /// Diagnostics of the fit of the surface, in answers about values on a surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, no_recursion)]
     pub geometry: Option<Box<Diagnostics>>,
 }
 
-/// Rows of a sparse operator by how their weights came about.
+/// Number of rows of a sparse operator by how their weights were computed.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 pub struct StencilsUsed {
     /// Polyharmonic splines on the nearest nodes: the ordinary row.
     pub nearest: usize,
-    /// Polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones lie on one side.
+    /// Polyharmonic splines on nodes that thin out with distance, used where the nearest nodes lie on one
+    /// side.
     pub graded: usize,
-    /// Weights without negative ones beside the diagonal, where no splines give a stable row, as at a rim.
+    /// Weights that are not negative beside the diagonal, used where no splines give a stable row, as at a
+    /// rim.
     pub positive: usize,
-    /// Least squares of the least norm, where the nodes do not determine derivatives.
+    /// Least squares of least norm, used where the nodes do not determine derivatives.
     pub least_norm: usize,
     /// Rows without entries.
     pub empty: usize,
@@ -178,7 +192,7 @@ impl StencilsUsed {
 }
 
 impl Diagnostics {
-    /// Says at which queries a variance came out negative within rounding, if at any.
+    /// Warns of queries at which a variance came out negative within rounding, if there are any.
     pub fn warn_of_clamping(&mut self, queries: &[usize]) {
         let Some(first) = queries.first() else { return };
         let detail = format!(
@@ -190,7 +204,7 @@ impl Diagnostics {
 }
 
 impl Diagnostics {
-    /// Says how values contradict kernel and noise, with what helps.
+    /// Warns that values contradict kernel and noise, and suggests a remedy.
     pub fn warn_of_misfit(&mut self, found: Disagreement, remedy: &str) {
         let spread = found.mean_square.sqrt();
         let detail = match (found.outlier, found.place) {
@@ -211,7 +225,10 @@ impl Diagnostics {
 }
 
 impl Diagnostics {
-    /// Says that neighbourhoods are too small, and by how many deviations half of one differs from all of it.
+    /// Warns that neighbourhoods are too small.
+    ///
+    /// `deviations` is by how many deviations values from half of a neighbourhood differ from those of all of
+    /// it.
     pub fn warn_of_unsettled(&mut self, deviations: Option<f64>) {
         let Some(deviations) = deviations else { return };
         let detail = format!(
@@ -228,25 +245,28 @@ impl Member for Diagnostics {
     }
 }
 
-/// Why a query is degenerate.
+/// The reason why a query is degenerate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DegenerateReason {
-    /// The gradient of the signature function vanishes, and the offset model was not asked or has no answer: the entry is
-    /// null.
+    /// The gradient of the signature function vanishes, and the offset model was not tried or failed: the
+    /// entry is null.
     VanishingGradient,
-    /// The points around the query do not confirm its curvatures; the number is served.
+    /// The points around the query do not confirm its curvatures. The number is served.
     UnderResolved,
-    /// What is known of the side contradicts itself: the normal is served, and may point inward.
+    /// Evidence about the outward side is contradictory. The normal is served, and may point inward.
     AmbiguousSide,
-    /// What is served of values is off by more than a fifth of its root mean square over the queries, as far as the values say, or the kernel has no
-    /// such derivatives; the number is served.
+    /// The number is served, but is uncertain or depends on derivatives that the kernel lacks.
+    ///
+    /// Uncertain means that its error, as estimated from the values, exceeds a fifth of the root mean square
+    /// over the queries.
     Uncertain,
-    /// The kernel's cusp at the points shows in the curvatures, which may be off by factors; the number is served.
+    /// The kernel's cusp at the points shows in the curvatures, which may be off by factors. The number is
+    /// served.
     KernelTooRough,
-    /// The query is farther from the cloud than three spacings; the number is served.
+    /// The query is farther from the cloud than three spacings. The number is served.
     FarFromCloud,
-    /// The offset model would cost more than is admitted; the entry is null.
+    /// The offset model would cost more than is admitted. The entry is null.
     UnaffordableRescue,
 }
 
@@ -255,9 +275,11 @@ pub enum DegenerateReason {
 pub struct Degenerate {
     /// The position of the query.
     pub query: usize,
-    /// Why.
+    /// The reason why the query is degenerate.
     pub reason: DegenerateReason,
-    /// |∇| of the function that was asked there: 1/length for the signature function, about 1 for the offset model, 0
-    /// where that has no answer.
+    /// |∇| of the function used at the query.
+    ///
+    /// Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that
+    /// has no answer.
     pub gradient_norm: f64,
 }

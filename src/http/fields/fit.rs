@@ -1,6 +1,4 @@
-//! The fields that determine a fit, and the macro that gives them to a request.
-
-use std::sync::Arc;
+//! The fields that determine a fit, and the macro that adds them to a request.
 
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -11,8 +9,9 @@ use super::kernel::Kernel;
 use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word};
 use crate::http::wire::read::points::Points;
 
-/// The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as in
-/// the request.
+/// The surface of an operator, if it differs from the surface of the request.
+///
+/// It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Geometry {
@@ -20,23 +19,24 @@ pub struct Geometry {
     #[serde(default, deserialize_with = "present_object")]
     #[schema(nullable = false)]
     pub cloud: Option<CloudRef>,
-    /// The kernel of its signature function.
+    /// The kernel of the signature function of the surface.
     #[serde(default, deserialize_with = "present_object")]
     #[schema(nullable = false)]
     pub kernel: Option<Kernel>,
-    /// Added to the diagonal of its Gram matrix.
+    /// Added to the diagonal of the Gram matrix of the surface.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub alpha: Option<f64>,
-    /// One entry per point of its cloud, instead of `alpha`. An empty list counts as absent.
+    /// Noise variances of the surface, an entry per point of its cloud, instead of `alpha`. An empty list
+    /// counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
     #[schema(nullable = false)]
     pub noise_variances: Option<Vec<f64>>,
-    /// How its linear system is solved.
+    /// The method that solves the linear system of the surface.
     #[serde(default, deserialize_with = "present_word")]
     #[schema(nullable = false)]
     pub solver: Option<SolverChoice>,
-    /// Which function's level surface is meant.
+    /// The function whose level set is the surface.
     #[serde(default, deserialize_with = "present_word")]
     #[schema(nullable = false)]
     pub surface: Option<SurfaceChoice>,
@@ -47,7 +47,7 @@ pub trait HasCloud {
     fn cloud(&self) -> &CloudRef;
 }
 
-/// The fields of a request that determine its fit, taken out of it.
+/// The fields that determine a fit, moved out of a request.
 #[derive(Debug, Default)]
 pub struct Fit {
     pub cloud: CloudRef,
@@ -56,16 +56,12 @@ pub struct Fit {
     pub noise_variances: Option<Vec<f64>>,
     pub solver: SolverChoice,
     pub duplicates: DuplicatePolicy,
-    /// Values at the points of the cloud, where the fit is one of values.
-    pub values: Option<Arc<Vec<f64>>>,
-    /// Lists of them, where there may be many; 0 where there is one.
-    pub n_lists: usize,
     pub mean: Option<MeanChoice>,
-    /// Where local regressions learn, where the client says so.
+    /// Sites at which local regressions learn, if the client gives them.
     pub sites: Option<Points>,
 }
 
-/// Declares a request: the fields of a fit, which stand directly in it, and its own.
+/// Declares a request. The fields of a fit and the request's own fields are members of the same object.
 macro_rules! request {
     (
         $(#[$meta:meta])*
@@ -75,17 +71,22 @@ macro_rules! request {
         #[derive(Debug, serde::Deserialize, utoipa::ToSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            /// The points where values are known, or that sample the surface.
+            /// The points at which values are known, or that sample the surface.
             #[serde(deserialize_with = "crate::http::wire::read::members::object")]
             pub cloud: $crate::http::fields::CloudRef,
-            /// The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-            /// they are given, the noise and a constant mean. The diagnostics repeat all of it.
+            /// The kernel. If absent, it is chosen.
+            ///
+            /// A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+            /// likelihood, together with its variance and, unless they are given, the noise and a constant
+            /// mean. The diagnostics repeat all of it.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_object")]
             #[schema(nullable = false)]
             pub kernel: Option<$crate::http::fields::Kernel>,
-            /// Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-            /// of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-            /// chosen by the noise of the points of a surface, 1e-3 at least.
+            /// Added to the diagonal of the Gram matrix as given, unit of the values squared.
+            ///
+            /// 0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+            /// Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+            /// surfaces it follows the noise of the points and is at least 1e-3.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present")]
             #[schema(nullable = false, minimum = 0.0)]
             pub alpha: Option<f64>,
@@ -93,11 +94,11 @@ macro_rules! request {
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_unless_empty")]
             #[schema(nullable = false)]
             pub noise_variances: Option<Vec<f64>>,
-            /// How the linear system is solved.
+            /// The method that solves the linear system.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_word")]
             #[schema(nullable = false)]
             pub solver: Option<$crate::http::fields::SolverChoice>,
-            /// What to do with points that coincide when alpha is 0.
+            /// The treatment of points that coincide when alpha is 0.
             #[serde(default, deserialize_with = "crate::http::wire::read::members::present_word")]
             #[schema(nullable = false)]
             pub duplicates: Option<$crate::http::fields::DuplicatePolicy>,
@@ -111,7 +112,7 @@ macro_rules! request {
         }
 
         impl $name {
-            /// Takes the fields of the fit out.
+            /// Moves the fields of the fit out of the request.
             fn take_fit(&mut self) -> $crate::http::fields::Fit {
                 $crate::http::fields::Fit {
                     cloud: std::mem::take(&mut self.cloud),
@@ -120,8 +121,6 @@ macro_rules! request {
                     noise_variances: self.noise_variances.take(),
                     solver: self.solver.unwrap_or_default(),
                     duplicates: self.duplicates.unwrap_or_default(),
-                    values: None,
-                    n_lists: 0,
                     mean: None,
                     sites: None,
                 }

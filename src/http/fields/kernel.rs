@@ -1,4 +1,4 @@
-//! Kernels as JSON has them, to kernels of the numerics and back.
+//! Kernels in JSON, and their conversion to and from kernels of the numerics.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -7,12 +7,12 @@ use super::schemas::Smoothness;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::wire::read::members::{present, present_unless_empty, word};
 use crate::http::wire::write::answer::{Member, Parts};
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::kernel::{Family, Kernel as NumericalKernel, WendlandSmoothness};
 use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::sampling::Scales;
 
-/// The families of kernels; `GET /v1/kernels` has their formulas.
+/// The families of kernels. `GET /v1/kernels` has their formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelFamily {
@@ -23,7 +23,9 @@ pub enum KernelFamily {
     InverseMultiquadric,
 }
 
-/// A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
+/// A kernel `k(x, y) = variance · φ(r²)`.
+///
+/// Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
 /// is refused.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -31,42 +33,45 @@ pub struct Kernel {
     /// The family, which determines φ.
     #[serde(deserialize_with = "word")]
     pub family: KernelFamily,
-    /// The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
+    /// The length scale ℓ, in the unit of the coordinates. Default: chosen from the cloud.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub length_scale: Option<f64>,
-    /// A length scale for each axis instead, in the units of the coordinates. An empty list counts as absent.
+    /// A length scale per axis, in the units of the coordinates, instead of `length_scale`. An empty list
+    /// counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
     #[schema(nullable = false)]
     pub length_scales: Option<Vec<f64>>,
-    /// The factor of φ, unit of the values squared; 1 if absent.
+    /// The factor of φ, unit of the values squared. Default: 1.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub variance: Option<f64>,
-    /// laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
+    /// laplace: φ = exp(−√(r² + epsilon)). Default: 0, which leaves a kink at the points of the cloud.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.0)]
     pub epsilon: Option<f64>,
-    /// matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
+    /// matern: the smoothness ν, one of 0.5, 1.5, …, 8.5. Default: 2.5.
+    ///
+    /// The schema gives a range, because generators do not support enumerations of fractions.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0.5, maximum = 8.5, multiple_of = 0.5)]
     pub nu: Option<f64>,
-    /// wendland: 2, 4 or 6 times differentiable; 4 if absent.
+    /// wendland: 2, 4 or 6 times differentiable. Default: 4.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
 
-/// The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+/// The kernel that was used, with every number. Sent back as `kernel`, it gives the same answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct KernelUsed {
     /// The family, which determines φ.
     pub family: KernelFamily,
-    /// The length scale ℓ, in the unit of the coordinates; absent where each axis has its own.
+    /// The length scale ℓ, in the unit of the coordinates. Absent if each axis has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub length_scale: Option<f64>,
-    /// The length scale of each axis, where each has its own.
+    /// The length scale of each axis, if each has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub length_scales: Option<Vec<f64>>,
@@ -80,13 +85,13 @@ pub struct KernelUsed {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub nu: Option<f64>,
-    /// wendland: how often differentiable.
+    /// wendland: how many times the kernel is differentiable.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, value_type = Option<Smoothness>)]
     pub smoothness: Option<u8>,
 }
 
-/// A kernel that is checked but for a length scale that the cloud has yet to give.
+/// A checked kernel. Its length scale may still have to be chosen from the cloud.
 #[derive(Debug, Clone)]
 pub enum PlannedKernel {
     Given(NumericalKernel),
@@ -94,10 +99,10 @@ pub enum PlannedKernel {
 }
 
 impl PlannedKernel {
-    /// Fills in the length scale.
+    /// Chooses the length scale, if it was not given.
     ///
     /// # Errors
-    /// 422 if the cloud is too small or large for any.
+    /// 422 if the extent of the cloud is too small or too large for any length scale.
     pub fn resolve(
         &self,
         scales: Option<&Scales>,
@@ -120,7 +125,7 @@ impl PlannedKernel {
 }
 
 impl Kernel {
-    /// Checks what is given.
+    /// Checks the given parameters.
     ///
     /// # Errors
     /// 422 with a pointer to the parameter.
@@ -133,7 +138,7 @@ impl Kernel {
                 return Err(Problem::invalid_request(format!("{}/length_scales", pointers.kernel), detail));
             }
             (None, Some(length_scales)) => NumericalKernel::of_axes(family, length_scales, variance),
-            // Without a length scale the other parameters are checked with any.
+            // Without a length scale, an arbitrary one serves to check the other parameters.
             (length_scale, None) => NumericalKernel::new(family, length_scale.unwrap_or(1.0), variance),
         };
         let kernel = kernel.map_err(|error| Problem::from_numerics(error, pointers))?;
@@ -194,7 +199,7 @@ impl Member for KernelUsed {
 }
 
 impl KernelUsed {
-    /// That of the heights of local regressions: Matérn 9/2.
+    /// The kernel of the heights of local regressions: Matérn with ν = 9/2.
     pub fn heights(kernel: PatchKernel) -> Self {
         let PatchKernel { length_scale, variance } = kernel;
         Self {
@@ -210,7 +215,7 @@ impl KernelUsed {
 }
 
 impl KernelUsed {
-    /// A kernel whose variance is so many times as large.
+    /// A kernel whose variance is multiplied by a factor.
     pub fn scaled(kernel: &NumericalKernel, factor: f64) -> Self {
         let used = Self::from(kernel);
         Self { variance: used.variance * factor, ..used }
@@ -218,7 +223,7 @@ impl KernelUsed {
 }
 
 impl From<&NumericalKernel> for KernelUsed {
-    /// Every number used, so that a client can pin them.
+    /// Reports every number used, so that a client can pin them.
     fn from(kernel: &NumericalKernel) -> Self {
         let mut full = Self {
             family: KernelFamily::Gauss,

@@ -1,4 +1,4 @@
-//! The objects that requests and answers share.
+//! Objects that requests and answers share.
 
 pub mod kernel;
 

@@ -1,4 +1,4 @@
-//! Types of the document that the code has as plain text and numbers: their schemas.
+//! Schemas of values that the code handles as plain text or numbers.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,8 @@ use utoipa::openapi::schema::{Schema, SchemaType, Type};
 use utoipa::openapi::{ObjectBuilder, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-/// The schema of the id of a cloud; requests are read as text, since what is no id is an unknown cloud.
+/// Schema of a cloud id. Requests are read as text, because text that is not an id is answered as an unknown
+/// cloud.
 pub struct CloudIdSchema;
 
 impl PartialSchema for CloudIdSchema {
@@ -26,7 +27,8 @@ impl ToSchema for CloudIdSchema {
     }
 }
 
-/// The schema of the id of a job; requests are read as text, since what is no id is an unknown job.
+/// Schema of a job id. Requests are read as text, because text that is not an id is answered as an unknown
+/// job.
 pub struct JobIdSchema;
 
 impl PartialSchema for JobIdSchema {
@@ -45,7 +47,7 @@ impl ToSchema for JobIdSchema {
     }
 }
 
-/// The schema of the cursor of a page; requests are read as text, so that a refusal is a problem like any other.
+/// Schema of a page cursor. Requests are read as text, so that a refusal is an ordinary problem document.
 pub struct CursorSchema;
 
 impl PartialSchema for CursorSchema {
@@ -64,7 +66,7 @@ impl ToSchema for CursorSchema {
     }
 }
 
-/// The schema of `smoothness`; requests are read as numbers, so that a refusal can say which there are.
+/// Schema of `smoothness`. Requests are read as numbers, so that a refusal can list the valid ones.
 pub struct Smoothness;
 
 impl PartialSchema for Smoothness {

@@ -1,4 +1,4 @@
-//! Requests that become jobs.
+//! Acceptance of requests as jobs.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use crate::store::objects::jobs::{Claim, ClaimName, JobId, JobRequest};
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
-/// What a job takes over of the head of its request: nothing that is secret.
+/// Request headers that a job keeps. None of them is secret.
 static KEPT_HEADERS: [HeaderName; 5] =
     [header::ACCEPT, header::ACCEPT_ENCODING, header::CONTENT_TYPE, header::CONTENT_ENCODING, CLOUD_HEADER];
 
@@ -34,16 +34,16 @@ static KEPT_HEADERS: [HeaderName; 5] =
 static MEANT_HEADERS: [HeaderName; 4] =
     [header::ACCEPT, header::ACCEPT_ENCODING, header::CONTENT_TYPE, header::CONTENT_ENCODING];
 
-/// The trace that its work belongs to.
+/// Header with the trace that the work on the job belongs to.
 const TRACE: &str = "traceparent";
 
-/// What takes no longer than its body takes to come: there the preference is passed over.
+/// Routes that ignore the preference, because their work takes no longer than receiving the body.
 const AT_ONCE: [&str; 2] = ["/v1/clouds", "/v1/estimate"];
 
-/// Answers 202 to a POST that prefers so, and has it answered behind its client.
+/// Answers 202 to a POST that prefers so, and computes its answer in the background.
 pub async fn respond_async(State(runner): State<Runner>, request: Request, next: Next) -> Response {
     let may_be_long = request.method() == Method::POST && !AT_ONCE.contains(&request.uri().path());
-    // What no route has is refused at once.
+    // A request without a route is refused at once.
     let has_route = request.extensions().get::<MatchedPath>().is_some();
     if !may_be_long || !has_route || !prefers_async(request.headers()) {
         return next.run(request).await;
@@ -54,7 +54,8 @@ pub async fn respond_async(State(runner): State<Runner>, request: Request, next:
     }
 }
 
-/// RFC 7240, section 2: preferences are separated by commas, may have parameters, and their names have no case.
+/// Whether `Prefer` contains `respond-async`. Preferences are separated by commas, may have parameters, and
+/// their names are case-insensitive (RFC 7240, section 2).
 fn prefers_async(headers: &HeaderMap) -> bool {
     let lines = headers.get_all(PREFER).iter().filter_map(|line| line.to_str().ok());
     let mut preferences = lines.flat_map(|line| line.split(','));

@@ -1,4 +1,4 @@
-//! The answer of a job: that of the route, kept.
+//! The answer of a job, which is the answer of its route, kept as a result.
 
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -22,13 +22,14 @@ use crate::store::objects::pieces::BrokenOff;
 use crate::store::objects::room::Room;
 use crate::store::objects::{OwnerName, Unavailable};
 
-/// Attempts that may end with their process: a request that ends a process is not given to all of them, one after the other.
+/// Most attempts that may crash their process. Without a limit, a fatal request would crash every process in
+/// turn.
 const MAX_CRASHES: u32 = 3;
 
-/// How long a job that was told to come back stays away, unless it was told.
+/// Wait before a job whose route answered 503 is tried again.
 const AWAY: Duration = Duration::from_secs(1);
 
-/// What the result of a job takes over of the head of its answer.
+/// Answer headers that the result of a job keeps.
 static KEPT_HEADERS: [HeaderName; 5] = [
     header::CONTENT_TYPE,
     header::CONTENT_ENCODING,
@@ -37,12 +38,12 @@ static KEPT_HEADERS: [HeaderName; 5] = [
     CLOUD_HEADER,
 ];
 
-/// The name of the trace of an answer.
+/// Trace id of an answer.
 #[derive(Clone)]
 struct Trace(String);
 
 impl Runner {
-    /// Answers the request, and writes what comes of it.
+    /// Computes the answer of a job and writes it as the result.
     pub(super) async fn answer(
         &self,
         here: &Here,
@@ -76,13 +77,15 @@ impl Runner {
         Ok(())
     }
 
-    /// The answer of the route. Nothing is held between two attempts at it: the route takes the memory that it needs, and the body is read
-    /// from the store as the route reads it.
+    /// Returns the answer of the route. Repeats the request while the route answers 503.
+    ///
+    /// Nothing is held between two attempts. The route reserves the memory that it needs, and the body is
+    /// read from the store as the route reads it.
     async fn response(&self, here: &Here, name: &OwnerName) -> Result<Response, Unavailable> {
         loop {
             here.progress.restart();
             let Some(found) = self.app.jobs.objects.open_job(name, here.id).await? else {
-                // It was deleted.
+                // The job was deleted.
                 return Ok(Problem::internal().into_response());
             };
             let fault = Arc::new(OnceLock::new());
@@ -118,7 +121,7 @@ impl Runner {
         }
     }
 
-    /// Writes what the request was answered with.
+    /// Writes the answer as the result of the job.
     async fn write(
         &self,
         here: &Here,
@@ -184,7 +187,8 @@ fn head_of(response: &Response) -> JobResult {
     JobResult { outcome, status: response.status().as_u16(), headers: kept.collect() }
 }
 
-/// The request as its client sent it, with its owner. Why its body broke off, if it did, is left in `fault`.
+/// Rebuilds the request as its client sent it, with its owner. If reading the body fails, `fault` receives
+/// the reason.
 fn rebuilt(found: FoundRequest, here: &Here, fault: &Arc<OnceLock<BrokenOff>>) -> Request {
     let FoundRequest { request, n_body_bytes, body } = found;
     let fault = fault.clone();

@@ -1,4 +1,4 @@
-//! `Idempotency-Key`: a request that a client or a proxy sends again is answered with the job that it began.
+//! `Idempotency-Key`: a request that a client or proxy repeats is answered with the job that it began.
 
 use axum::http::{HeaderMap, HeaderName};
 
@@ -12,7 +12,7 @@ use crate::store::objects::jobs::{ClaimName, JobRequest, KeyHash};
 
 pub const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 
-/// Bytes that a key may have.
+/// Longest key in bytes.
 const MAX_KEY_BYTES: usize = 255;
 
 /// Bytes of a body that are hashed at a time.

@@ -1,4 +1,4 @@
-//! What is told of a job.
+//! The description of a job, as clients see it.
 
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -20,40 +20,42 @@ use crate::store::objects::OwnerName;
 use crate::store::objects::jobs::{FoundResult, JobId, JobObjects, JobResult, Lease, Outcome};
 use gramian_numerics::observer::Stage;
 
-/// Bytes that the document of a problem may have.
+/// Longest problem document of a job, in bytes.
 const MAX_PROBLEM_BYTES: u64 = 1 << 20;
 
-/// Where a job is.
+/// The state of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = JobStatus)]
 pub enum Status {
-    /// It waits for its turn.
+    /// The job waits for its turn.
     Queued,
-    /// It is being computed.
+    /// The job is being computed.
     Running,
-    /// Its result is there.
+    /// The result is ready.
     Succeeded,
-    /// Its problem is there.
+    /// The job failed with a problem.
     Failed,
-    /// It was deleted before it ended.
+    /// The job was deleted before it ended.
     Cancelled,
 }
 
-/// How far a job is.
+/// The progress of a job.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = JobProgress)]
 pub struct ProgressView {
-    /// What is being done: `queued`, then the stages of `Server-Timing`: `parse`, `gram`, `factor`, `solve`, `evaluate`; `done` in the end.
+    /// The current stage: `queued`, `parse`, `gram`, `factor`, `solve`, `evaluate`, or `done` in the end.
+    ///
+    /// Stages from `parse` to `evaluate` are those of `Server-Timing`.
     stage: String,
-    /// The part of the time it is expected to take that has gone by, from 0 to 1.
+    /// The elapsed part of the time that the job is expected to take, from 0 to 1.
     #[schema(minimum = 0.0, maximum = 1.0)]
     fraction: f64,
-    /// Of the last solve, relative; absent before there is one.
+    /// Relative residual of the last solve. Absent before there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0.0)]
     residual: Option<f64>,
-    /// Seconds until it is done, by what ran on this machine; absent while that is unknown.
+    /// Seconds until the job is done, predicted from what ran on this machine. Absent while unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0.0)]
     seconds_left: Option<f64>,
@@ -66,28 +68,28 @@ pub struct JobView {
     /// The id of the job.
     #[schema(value_type = crate::http::fields::schemas::JobIdSchema)]
     job_id: String,
-    /// Where it is.
+    /// The state of the job.
     pub status: Status,
-    /// How far it is.
+    /// The progress of the job.
     progress: ProgressView,
-    /// When it was asked for, in UTC.
+    /// The time at which the job was requested, in UTC.
     #[schema(format = DateTime)]
     created_at: String,
-    /// When it ended, in UTC; absent before.
+    /// The time at which the job ended, in UTC. Absent before.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, format = DateTime)]
     ended_at: Option<String>,
-    /// Until when its result is kept, in UTC; absent before there is one.
+    /// The time until which the result is kept, in UTC. Absent before there is a result.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, format = DateTime)]
     expires_at: Option<String>,
-    /// Why it failed: the problem that the request would have been answered with.
+    /// The problem that made the job fail, and that the request would have been answered with.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, value_type = Option<crate::http::problem::ProblemDocument<'static>>)]
     problem: Option<Value>,
 }
 
-/// A job of this process, as far as that knows.
+/// Describes a job of this process from what the process knows.
 pub fn view_of_here(here: &Here) -> JobView {
     let (status, progress) = match here.has_lease() {
         true => (Status::Running, of_snapshot(here.progress.now())),
@@ -96,12 +98,12 @@ pub fn view_of_here(here: &Here) -> JobView {
     view(here.id, status, progress)
 }
 
-/// A job of an owner, wherever it is.
+/// Describes a job of an owner, whichever process works on it.
 ///
 /// # Errors
-/// 404 `unknown-job`; 503 if the store does not answer.
+/// 404 `unknown-job`, or 503 if the store does not answer.
 pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
-    // One that waits here may have been begun elsewhere.
+    // A job that waits here may have been begun by another process.
     if let Some(here) = here_of(app, owner, id).filter(|here| here.has_lease()) {
         return Ok(view_of_here(&here));
     }
@@ -129,22 +131,23 @@ pub async fn look(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem
 /// The objects of a job, unless it was deleted or its result is older than results are kept.
 ///
 /// # Errors
-/// 404 `unknown-job`; 503 if the store does not answer.
+/// 404 `unknown-job`, or 503 if the store does not answer.
 pub async fn find_known(app: &App, owner: &OwnerName, id: JobId) -> Result<JobObjects, Problem> {
     let found = app.jobs.objects.find_job(owner, id).await.map_err(|error| unavailable(&error))?;
     let is_old = |job: &JobObjects| is_older(job.ended_at, app.config.job_result(), SystemTime::now());
     found.filter(|job| job.is_known() && !is_old(job)).ok_or_else(|| unknown_job(&id.to_string()))
 }
 
-/// A job of this process, if it is the owner's.
+/// Finds a job of this process, if it belongs to the owner.
 pub fn here_of(app: &App, owner: Owner, id: JobId) -> Option<Arc<Here>> {
     app.jobs.find(id).filter(|here| here.owner == owner)
 }
 
-/// Resolves once a job has ended.
+/// Waits until a job has ended, and describes it.
 ///
 /// # Errors
-/// Those of [`look`], and 503 once the process is to end before: another one goes on with the job, and can be asked.
+/// Returns the errors of [`look`], and 503 if this process shuts down before. Another process then continues
+/// the job, and can be asked.
 pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobView, Problem> {
     loop {
         if let Some(here) = here_of(app, owner, id) {
@@ -164,7 +167,7 @@ pub async fn look_until_ended(app: &App, owner: Owner, id: JobId) -> Result<JobV
     }
 }
 
-/// How often it is looked how far a job of another process is.
+/// Interval between two looks at a job of another process.
 pub const LOOKING: Duration = Duration::from_secs(1);
 
 impl JobView {
@@ -177,10 +180,10 @@ impl JobView {
     }
 }
 
-/// The document of the problem of a job that failed.
+/// Returns the problem document of a job that failed.
 ///
 /// # Errors
-/// 500 if it is not what was written.
+/// 500 if the document cannot be read.
 pub async fn problem_of(found: FoundResult) -> Result<Value, Problem> {
     let unreadable = |error: &dyn std::fmt::Display| {
         tracing::error!(%error, "the problem of a job cannot be read");
@@ -246,7 +249,7 @@ fn of_lease(lease: Lease) -> ProgressView {
     }
 }
 
-/// As `Server-Timing` has it.
+/// The name of a stage, as in `Server-Timing`.
 pub fn name_of(stage: Option<Stage>) -> &'static str {
     match stage {
         None => "parse",

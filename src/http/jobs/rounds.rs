@@ -1,4 +1,5 @@
-//! Rounds: jobs that nobody works on are taken up, and results that have been kept long enough are forgotten.
+//! Rounds: a periodic task that takes up jobs without a worker, and deletes results that were kept long
+//! enough.
 //!
 //! A round looks up open jobs one by one, and forgets those whose time is over by the table of kept jobs
 //! (kept.rs). Kept results cost it nothing. All jobs are listed at the start, every ten minutes, and for
@@ -14,17 +15,18 @@ use crate::store::Owner;
 use crate::store::objects::jobs::{JobId, JobObjects};
 use crate::store::objects::{OwnerName, Unavailable};
 
-/// How often.
+/// Interval between two rounds.
 const ROUNDS: Duration = Duration::from_secs(SECONDS_UNTIL_COUNTED);
 
 /// Time between two lists of all jobs.
 const COUNTING: Duration = Duration::from_secs(600);
 
-/// The leases that were seen, and since when as they are. Times of the store and of this process are not compared.
+/// The leases seen in the last round, each with the time since which it is unchanged. Times of the store and
+/// of this process are never compared.
 type Seen = HashMap<JobId, (Option<(u32, SystemTime)>, Instant)>;
 
 impl Runner {
-    /// Goes round for as long as the process takes requests.
+    /// Makes rounds until the process drains.
     pub async fn go_round(self) {
         let mut ticks = tokio::time::interval(ROUNDS);
         let mut seen = Seen::new();
@@ -81,7 +83,7 @@ impl Runner {
             let since = last.map_or_else(Instant::now, |&(_, since)| since);
             next.insert(id, (job.lease, since));
             if let Some(here) = here {
-                // It waited here, and another process had a turn for it before.
+                // The job waited here, and another process had a turn for it first.
                 if job.lease != here.last {
                     here.cancelled.cancel();
                 }
@@ -132,7 +134,7 @@ impl Runner {
         jobs.kept.put(job.id, KeptJob { owner, ended_at: job.ended_at, bytes });
     }
 
-    /// Whether its process left it in order.
+    /// Whether the process that last worked on the job released it in order.
     async fn is_released(&self, name: &OwnerName, job: &JobObjects) -> Result<bool, Unavailable> {
         let Some((attempt, _)) = job.lease else { return Ok(false) };
         let lease = self.app.jobs.objects.get_lease(name, job.id, attempt).await?;

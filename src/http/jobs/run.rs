@@ -1,4 +1,4 @@
-//! Working on a job.
+//! Work on a job: turn, lease and attempt.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -10,25 +10,25 @@ use crate::http::state::jobs::{Here, Jobs};
 use crate::store::objects::jobs::{JobObjects, Lease};
 use crate::store::objects::{OwnerName, Unavailable};
 
-/// How often a lease is written again, and how long it holds after that.
+/// Interval at which a lease is renewed, and the time after which it expires.
 pub(super) const RENEWING: Duration = Duration::from_secs(2);
 pub(super) const EXPIRING: Duration = Duration::from_secs(10);
 
-/// How work on a job ended.
+/// The end of work on a job.
 enum Ended {
-    /// Its result is there, whoever wrote it, or nobody wants it any more.
+    /// The job has a result, written by any process, or is no longer wanted.
     Done,
-    /// The process is to end, or the store does not take the result: anybody may go on.
+    /// The process shuts down, or the store does not accept the result. Any process may continue.
     Released,
 }
 
-/// An attempt at a job, which nobody else makes.
+/// An attempt at a job, claimed by this process alone.
 pub(super) struct Attempt {
     pub(super) number: u32,
     pub(super) lease: Lease,
 }
 
-/// A job that is one of this process until this is dropped, also if its work panics.
+/// A guard that removes the job from this process when dropped, also if its work panics.
 struct Present<'a> {
     jobs: &'a Jobs,
     here: Arc<Here>,
@@ -41,7 +41,7 @@ impl Drop for Present<'_> {
 }
 
 impl Runner {
-    /// Works on a job of this process when its turn has come.
+    /// Works on a job of this process once its turn has come.
     pub(super) async fn run(self, here: Arc<Here>) {
         let jobs = &self.app.jobs;
         let present = Present { jobs, here };
@@ -52,14 +52,14 @@ impl Runner {
             () = here.cancelled.cancelled() => return,
             () = self.app.draining.cancelled() => return,
         };
-        // From here on it is this process's, or nobody's here.
+        // From here on, the job is run by this process or is not in this process at all.
         here.is_running.store(true, Ordering::Relaxed);
         let attempt = match self.claim(here, &name).await {
             Ok(Some(attempt)) => attempt,
             Ok(None) => return,
             Err(error) => return tracing::error!(job = %here.id, %error, "a job is put off"),
         };
-        // Other processes see it as well from here on.
+        // From here on, other processes also see that the job is running.
         here.has_lease.store(true, Ordering::Relaxed);
         let ended = tokio::select! {
             () = here.cancelled.cancelled() => Ok(Ended::Done),
@@ -77,11 +77,13 @@ impl Runner {
         }
     }
 
-    /// Makes the next attempt that of this process, unless there is nothing to do, or another has it.
+    /// Claims the next attempt for this process. Returns `None` if the job is not open, or another process
+    /// has begun it.
     async fn claim(&self, here: &Here, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
         let objects = &self.app.jobs.objects;
         let found = objects.find_job(name, here.id).await?;
-        // While it waited here, another process may have begun it: that one has it, and if it leaves it, the rounds find it.
+        // Another process may have begun the job while it waited here. If that process abandons it, the
+        // rounds find it.
         let is_to_do = |job: &JobObjects| job.is_open() && job.lease == here.last;
         let Some(job) = found.filter(is_to_do) else { return Ok(None) };
         let attempt = match job.lease {
@@ -96,7 +98,8 @@ impl Runner {
         Ok(is_claimed.then_some(attempt))
     }
 
-    /// Says that anybody may go on at once, as soon as the store takes that, unless the process is to end before.
+    /// Releases the lease, so that any process may continue at once. Retries until the store accepts, or the
+    /// process drains.
     async fn release(&self, here: &Here, name: &OwnerName, attempt: Attempt) {
         let lease = Lease { is_released: true, ..attempt.lease };
         while let Err(error) = self.app.jobs.objects.renew_lease(name, here.id, attempt.number, &lease).await
@@ -110,7 +113,8 @@ impl Runner {
         }
     }
 
-    /// Says again and again that the job is worked on, until that is for nothing: it has a result, another has begun it, or it is forgotten.
+    /// Renews the lease until that is pointless: the job has a result, another process has begun it, or it is
+    /// forgotten.
     async fn hold_lease(&self, here: &Here, name: &OwnerName, attempt: &Attempt) {
         let objects = &self.app.jobs.objects;
         let mut ticks = tokio::time::interval(RENEWING);
@@ -132,7 +136,7 @@ impl Runner {
                 Err(error) => Err(error),
             };
             if let Err(error) = renewed {
-                // Another process may take the job up meanwhile, and one of them ends it.
+                // Another process may take the job up meanwhile. Either of them ends it.
                 tracing::warn!(job = %here.id, %error, "the lease of a job is not written");
             }
         }

@@ -1,4 +1,5 @@
-//! The examples of the document: files in openapi/examples/ that a test sends and compares.
+//! The examples of the `OpenAPI` document: files in openapi/examples/, whose requests a test sends and
+//! compares.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,15 +12,16 @@ use utoipa::openapi::{Content, Ref, RefOr};
 use super::{id_of, operations};
 use crate::http::problem::slug::Slug;
 
-/// One example of a file, by the name that it has there.
+/// The name and text of an example file.
 macro_rules! example_file {
     ($name:literal) => {
         ($name, include_str!(concat!("../../../openapi/examples/", $name, ".json")))
     };
 }
 
-/// A request and its answer for each operation that answers with a body, by operation id, in the order in which a test
-/// sends the ones and compares the others.
+/// A request and its answer for each operation that answers with a body, by operation id.
+///
+/// A test sends the requests in this order and compares the answers.
 pub const EXAMPLES: [(&str, &str); 24] = [
     example_file!("create_cloud"),
     example_file!("get_cloud"),
@@ -47,21 +49,22 @@ pub const EXAMPLES: [(&str, &str); 24] = [
     example_file!("get_problem_page"),
 ];
 
-/// One problem document of every type, with what provokes it.
+/// A problem document of every type, with a request that provokes it.
 pub const PROBLEMS: &str = include_str!("../../../openapi/examples/problems.json");
 
-/// What an example file has.
+/// The content of an example file.
 #[derive(Deserialize)]
 struct Sample {
     request: Option<Value>,
     response: Value,
 }
 
-/// Puts the examples where readers and generators look for them.
+/// Adds the examples to the operations, where readers and generators look for them.
 pub fn add(document: &mut utoipa::openapi::OpenApi) {
     for operation in operations(document) {
         let Some((_, text)) = EXAMPLES.iter().find(|(name, _)| *name == id_of(operation)) else { continue };
-        // The files are part of the build and read by a test; an unreadable one leaves the operation without an example.
+        // The files are compiled in and read by a test. An unreadable file would leave its operation without
+        // an example.
         if let Ok(sample) = serde_json::from_str::<Sample>(text) {
             add_sample(operation, sample);
         }
@@ -73,7 +76,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
     document.components.get_or_insert_default().examples = problems;
 }
 
-/// The names of the examples that the answers of an operation refer to.
+/// Returns the names of the examples that the answers of an operation refer to.
 fn examples_of(operation: &Operation) -> Vec<String> {
     let responses = operation.responses.responses.values().filter_map(|response| match response {
         RefOr::T(response) => Some(response.content.values()),
@@ -105,7 +108,7 @@ fn set_example(content: Option<&mut RefOr<Content>>, example: Option<&Value>) {
     }
 }
 
-/// The problem documents by the slugs of their types.
+/// Returns the example problem documents by slug.
 fn problem_examples() -> BTreeMap<String, RefOr<Example>> {
     let samples: BTreeMap<String, Sample> = serde_json::from_str(PROBLEMS).unwrap_or_default();
     let example = |(slug, sample): (String, Sample)| {
@@ -116,7 +119,7 @@ fn problem_examples() -> BTreeMap<String, RefOr<Example>> {
     samples.into_iter().filter_map(example).collect()
 }
 
-/// A reference to the example of a problem.
+/// Returns a reference to the example of a problem.
 pub fn problem_example(slug: Slug) -> RefOr<Example> {
     RefOr::Ref(Ref::new(format!("#/components/examples/{}", slug.as_str())))
 }

@@ -6,7 +6,7 @@ use utoipa::openapi::{Content, ContentBuilder, ObjectBuilder, RefOr};
 use super::{id_of, operations};
 use crate::http::wire::negotiation::Format;
 
-/// What requests and answers may be beside JSON, by operation id.
+/// Returns the media types other than JSON that an operation accepts and answers with.
 fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) {
     match operation_id {
         "create_cloud" => (&[Format::Safetensors, Format::Npy, Format::Ply], &[]),
@@ -18,7 +18,7 @@ fn binary_formats(operation_id: &str) -> (&'static [Format], &'static [Format]) 
     }
 }
 
-/// Adds the binary media types of operations with a body. A test asks the service for every one.
+/// Adds the binary media types of operations with a body. A test requests each of them from the service.
 pub fn add(document: &mut utoipa::openapi::OpenApi) {
     for operation in operations(document) {
         let (requests, answers) = binary_formats(id_of(operation));

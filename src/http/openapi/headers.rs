@@ -1,4 +1,5 @@
-//! The headers of answers: declared once as components, referred to by every answer that has them.
+//! The headers of answers, declared once as components. Every answer that has a header refers to its
+//! component.
 
 use utoipa::openapi::header::{Header, HeaderBuilder};
 use utoipa::openapi::path::Operation;
@@ -53,7 +54,7 @@ pub fn add(document: &mut utoipa::openapi::OpenApi) {
     document.components.get_or_insert_default().headers = declared.into();
 }
 
-/// The headers that the operation has when it succeeds.
+/// Returns the headers that an operation has when it succeeds.
 fn own_names(operation: &Operation) -> Vec<&'static str> {
     match id_of(operation) {
         "create_cloud" => vec!["Location", "Gramian-Cloud"],
@@ -64,7 +65,7 @@ fn own_names(operation: &Operation) -> Vec<&'static str> {
     }
 }
 
-/// The headers of answers with this status.
+/// Returns the headers of answers with this status.
 fn names(status: &str, own: &[&'static str]) -> Vec<&'static str> {
     let by_status = match status {
         "200" | "201" | "304" => own,

@@ -1,9 +1,11 @@
-//! Links: what can be asked next of a cloud that an answer names. A link holds for every answer that has it, so the next
-//! page of a list is none.
+//! Links: the operations that make sense next for a cloud named in an answer.
 //!
-//! Where the id goes into the body, the link says so in words. The `requestBody` of a link may be an object, in which the
-//! expression for the id has its place; but openapi-generator, whose parser knows expressions alone there, refuses a
-//! document that has one. The tests of the document put it in for Schemathesis (openapi/schemathesis_hooks.py).
+//! A link holds for every answer that has it, so the next page of a list cannot be one.
+//!
+//! Where the id goes into the body, the link says so in words. The `requestBody` of a link may be an object
+//! that contains the expression for the id. But openapi-generator, whose parser only knows bare expressions
+//! there, refuses documents with such an object. The tests of the document insert it for Schemathesis
+//! (openapi/schemathesis_hooks.py).
 
 use std::collections::BTreeMap;
 
@@ -12,18 +14,19 @@ use utoipa::openapi::{Ref, RefOr};
 
 use super::{id_of, is_computed, operations};
 
-/// Where answers name a cloud: those about it, and those computed from it.
+/// Expressions for the cloud id in answers about a cloud, and in answers computed from a cloud.
 const CLOUD_ID: &str = "$response.body#/cloud_id";
 const CLOUD_ID_USED: &str = "$response.body#/diagnostics/cloud_id";
 
-/// Operations on a cloud of which only the id is needed.
+/// Operations on a cloud that only need its id, in the path.
 const ON_PATH: [&str; 3] = ["get_cloud", "check_cloud", "delete_cloud"];
 const CLOUD_USED: &str = "get_cloud_used";
-/// How requests with a body refer to the cloud.
+/// Description of links whose operation refers to the cloud in the body.
 const IN_BODY: &str = "The cloud, referred to in the body by its id, the `cloud_id` of this answer: `{\"cloud\": {\"id\": cloud_id}}`.";
 
-/// Declares the links and refers to them from the answers that they start from. Every request that computes refers to a
-/// cloud; its other fields are the client's.
+/// Declares the links, and refers to them from the answers that they start from.
+///
+/// Every request that computes refers to a cloud. The client chooses its other members.
 pub fn add(document: &mut utoipa::openapi::OpenApi) {
     let computed: Vec<String> = operations(document)
         .filter(|operation| is_computed(operation))

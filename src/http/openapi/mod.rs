@@ -1,6 +1,7 @@
-//! The OpenAPI document: generated from the code, committed as openapi/openapi.json, tested against it.
+//! The `OpenAPI` document: generated from the code, committed as openapi/openapi.json, and tested against the
+//! code.
 //!
-//! The routes declare their operations; what is the same for many of them is added here.
+//! The routes declare their operations. Parts that many operations share are added here.
 
 pub mod examples;
 mod formats;
@@ -68,7 +69,7 @@ pub fn complete(document: &mut utoipa::openapi::OpenApi) {
     empty_answers_to_head(document);
 }
 
-/// HEAD is answered without a body, whatever the problem.
+/// Removes the bodies of answers to HEAD, which has none, whatever the problem.
 fn empty_answers_to_head(document: &mut utoipa::openapi::OpenApi) {
     for operation in document.paths.paths.values_mut().filter_map(|item| item.head.as_mut()) {
         for response in operation.responses.responses.values_mut() {
@@ -79,9 +80,10 @@ fn empty_answers_to_head(document: &mut utoipa::openapi::OpenApi) {
     }
 }
 
-/// The document as JSON. Headers that are declared are always sent, which the library's types cannot say.
+/// Returns the document as JSON. Marks declared headers as always sent, which the library's types cannot
+/// express.
 pub fn to_value(document: &utoipa::openapi::OpenApi) -> Value {
-    // Serialization of a document that utoipa built cannot fail; an empty one would be caught by the test of the file.
+    // A document built by utoipa always serializes. The test of openapi.json would catch an empty one.
     let mut document = serde_json::to_value(document).unwrap_or_default();
     let headers = document.pointer_mut("/components/headers").and_then(Value::as_object_mut);
     for header in headers.into_iter().flat_map(|headers| headers.values_mut()) {
@@ -90,7 +92,7 @@ pub fn to_value(document: &utoipa::openapi::OpenApi) -> Value {
     document
 }
 
-/// The text of a document, as it is served and committed.
+/// Returns the text of a document, as served and committed.
 pub fn to_text(document: &Value) -> String {
     format!("{document:#}\n")
 }
@@ -102,12 +104,13 @@ fn operations(document: &mut utoipa::openapi::OpenApi) -> impl Iterator<Item = &
     })
 }
 
-/// The name of an operation, by which examples, formats and links know it.
+/// Returns the operation id, under which examples, formats and links are registered.
 fn id_of(operation: &Operation) -> &str {
     operation.operation_id.as_deref().unwrap_or_default()
 }
 
-/// Whether its answers come from a factorization: every operation with a body but the registration of clouds.
+/// Whether an operation answers from a factorization: all with a body, except registration of clouds and
+/// estimates.
 fn is_computed(operation: &Operation) -> bool {
     operation.request_body.is_some() && !matches!(id_of(operation), "create_cloud" | "estimate")
 }

@@ -1,5 +1,7 @@
-//! The problems that operations can answer, as sets for the document. [`Problem`] is what handlers return. Every set has what any
-//! request may meet: an ambiguous head, a bug, and a server that drains or has no connection left.
+//! Sets of problems that operations can answer with, for the `OpenAPI` document. Handlers return [`Problem`].
+//!
+//! Every set includes what any request may meet: an ambiguous head, a bug, and a server that drains or has no
+//! free connection.
 //!
 //! [`Problem`]: crate::http::problem::Problem
 
@@ -26,7 +28,7 @@ macro_rules! problem_set {
 }
 
 problem_set! {
-    /// Operations that compute.
+    /// Problems of operations that compute.
     ComputeProblems:
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, NotAcceptable, RequestTimeout, BodyTooLarge,
     ProblemTooLarge,
@@ -36,7 +38,7 @@ problem_set! {
 }
 
 problem_set! {
-    /// The registration of a cloud.
+    /// Problems of the registration of a cloud.
     RegisterProblems:
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, NotAcceptable, RequestTimeout, BodyTooLarge, ProblemTooLarge,
     UnsupportedMediaType,
@@ -44,27 +46,27 @@ problem_set! {
 }
 
 problem_set! {
-    /// The description of one cloud. What is not UTF-8 in the path is no path.
+    /// Problems of the description of a cloud. A path that is not UTF-8 is not found.
     DescribeProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
-    /// Operations that only look a cloud up, and answer without a body.
+    /// Problems of operations that only look a cloud up and answer without a body.
     LookUpProblems: MalformedRequest, Unauthorized, RateLimited, UnknownCloud, NotFound, Internal, Overloaded
 }
 
 problem_set! {
-    /// A look at one job.
+    /// Problems of operations that describe a job.
     JobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, NotAcceptable, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
-    /// Operations on one job that need not agree on a media type.
+    /// Problems of operations on a job that need no media type in common.
     AnyJobProblems: MalformedRequest, Unauthorized, RateLimited, UnknownJob, NotFound, Internal, Overloaded
 }
 
 problem_set! {
-    /// The result of a job, which is what its request is answered with.
+    /// Problems of fetching the result of a job, which include those of the request that became the job.
     JobResultProblems:
     MalformedRequest, MalformedJson, MalformedBody, Unauthorized, RateLimited, UnknownCloud, UnknownJob, NotFound, NotAcceptable,
     BodyTooLarge, ProblemTooLarge, UnsupportedMediaType, InvalidRequest, InvalidCloud, DuplicatePoints, DimensionMismatch,
@@ -73,31 +75,31 @@ problem_set! {
 }
 
 problem_set! {
-    /// The list of clouds.
+    /// Problems of the list of clouds.
     ListProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, InvalidRequest, Internal, Overloaded, DeadlineExceeded
 }
 
 problem_set! {
-    /// Operations that only read what is built in.
+    /// Problems of operations that only read built-in information.
     ReadProblems: MalformedRequest, Unauthorized, RateLimited, NotAcceptable, Internal, Overloaded
 }
 
 problem_set! {
-    /// Probes and pages, which are only refused with the connection or its head.
+    /// Problems of probes and pages, which are only refused with their connection or its head.
     ProbeProblems: MalformedRequest, Internal, Overloaded
 }
 
 problem_set! {
-    /// The readiness probe.
+    /// Problems of the readiness probe.
     ReadyProblems: MalformedRequest, Internal, Overloaded
 }
 
 problem_set! {
-    /// Pages of one problem.
+    /// Problems of the page of a problem type.
     PageProblems: MalformedRequest, NotFound, Internal, Overloaded
 }
 
-/// One response for each status, with the problems that have it and an example of each.
+/// Returns a response for each status, with its problems and an example of each.
 fn responses_of(slugs: &[Slug]) -> BTreeMap<String, RefOr<Response>> {
     let mut by_status: BTreeMap<String, Vec<Slug>> = BTreeMap::new();
     for &slug in slugs {

@@ -1,4 +1,4 @@
-//! The document for generators that stop at OpenAPI 3.0: the same operations and types, JSON only.
+//! The document for generators that only support `OpenAPI` 3.0: the same operations and types, but JSON only.
 
 use serde_json::{Map, Value, json};
 
@@ -10,9 +10,10 @@ const WHAT_IS_DIFFERENT: &str = " This document is for tools that stop at OpenAP
 
 /// Translates a document of version 3.1 to 3.0.3.
 ///
-/// What 3.0 cannot say is said its way: nullable types, exclusive bounds, descriptions beside references, licences.
-/// Bodies come as `application/json` only, problem documents among them, since generators know no other; operations
-/// that answer nothing but pages for people are left out, and so are links, of which generators make nothing.
+/// Features that 3.0 lacks are expressed in its terms: nullable types, exclusive bounds, descriptions beside
+/// references, licences. All bodies are `application/json`, including problem documents, since generators
+/// know no other type. Operations that only answer with HTML pages are left out, and so are links, which
+/// generators ignore.
 pub fn derive(document: &Value) -> Value {
     let mut document = document.clone();
     document["openapi"] = json!("3.0.3");
@@ -33,7 +34,7 @@ pub fn derive(document: &Value) -> Value {
     document
 }
 
-/// Drops the examples of what was left out.
+/// Drops the examples of operations that were left out.
 fn drop_unused_examples(document: &mut Value) {
     let text = document["paths"].to_string();
     if let Some(examples) = document.pointer_mut("/components/examples").and_then(Value::as_object_mut) {
@@ -54,9 +55,9 @@ fn translate(value: &mut Value) {
         Value::Object(object) => {
             for (name, member) in object.iter_mut() {
                 match (name.as_str(), member) {
-                    // Examples are data, which looks like a schema by accident at most.
+                    // Examples are data. Any resemblance to a schema is accidental.
                     ("example" | "examples", _) => {}
-                    // The names in it are those of members, not keywords.
+                    // The keys of `properties` are member names, not keywords.
                     ("properties", Value::Object(properties)) => properties.values_mut().for_each(translate),
                     (_, member) => translate(member),
                 }
@@ -74,7 +75,7 @@ fn translate(value: &mut Value) {
     }
 }
 
-/// Media types: JSON, and problem documents as JSON.
+/// Keeps only JSON, and declares problem documents as JSON.
 fn keep_json(object: &mut Object) {
     let Some(content) = object.get_mut("content").and_then(Value::as_object_mut) else { return };
     if let Some(problem) = content.shift_remove("application/problem+json") {
@@ -83,7 +84,7 @@ fn keep_json(object: &mut Object) {
     content.retain(|media_type, _| media_type == "application/json");
 }
 
-/// `type: [x, null]` becomes `type: x, nullable: true`.
+/// Turns `type: [x, null]` into `type: x, nullable: true`.
 fn take_null_out_of_type(object: &mut Object) {
     let Some(Value::Array(types)) = object.get("type") else { return };
     let mut kept: Vec<Value> = types.iter().filter(|kind| *kind != "null").cloned().collect();
@@ -95,7 +96,7 @@ fn take_null_out_of_type(object: &mut Object) {
     }
 }
 
-/// `exclusiveMinimum: x` becomes `minimum: x, exclusiveMinimum: true`.
+/// Turns `exclusiveMinimum: x` into `minimum: x, exclusiveMinimum: true`.
 fn translate_bound(object: &mut Object, exclusive: &str, inclusive: &str) {
     if object.get(exclusive).is_some_and(Value::is_number) {
         let bound = object.insert(exclusive.to_owned(), json!(true));
@@ -103,7 +104,7 @@ fn translate_bound(object: &mut Object, exclusive: &str, inclusive: &str) {
     }
 }
 
-/// A reference stands alone in 3.0: with anything beside it, it becomes the one member of an `allOf`.
+/// Wraps a reference with siblings in an `allOf`, because a reference must stand alone in 3.0.
 fn wrap_reference(object: &mut Object) {
     if object.len() > 1
         && object.get("$ref").is_some_and(Value::is_string)

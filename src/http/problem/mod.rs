@@ -10,22 +10,22 @@ use utoipa::ToSchema;
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use slug::Slug;
 
-/// Points listed in `point_indices` at most: enough to find the pattern, and bounded.
+/// Most points listed in `point_indices`: bounded, but enough to see the pattern.
 const MAX_POINT_INDICES: usize = 1000;
 
-/// When to come back after an allocation failed: factorizations under way have ended by then.
+/// Seconds to wait after an allocation failed. Factorizations in progress have ended by then.
 const RETRY_AFTER_MEMORY_SECONDS: u64 = 60;
 
-/// What went wrong, where, and what to do about it.
+/// A refusal or failure: its type, what happened where, and the remedy.
 #[derive(Debug, Clone)]
 pub struct Problem {
     slug: Slug,
     detail: String,
-    /// Boxed, since every fallible function carries a problem and few have these.
+    /// Boxed, because every fallible function can return a problem, and few problems have these members.
     members: Box<Members>,
 }
 
-/// The members that only some problems have.
+/// Members that only some problems have.
 #[derive(Debug, Clone, Default)]
 struct Members {
     errors: Vec<FieldError>,
@@ -36,13 +36,13 @@ struct Members {
     retry_after_seconds: Option<u64>,
 }
 
-/// One field of the request that was refused.
+/// A field of the request that was refused.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct FieldError {
-    /// RFC 6901 pointer into the request body, such as `/cloud/points/17/2`; for query parameters, `/<name>`.
+    /// RFC 6901 pointer into the request body, such as `/cloud/points/17/2`. For query parameters, `/<name>`.
     #[schema(example = "/cloud/points/17/2")]
     pub pointer: String,
-    /// What is wrong with this field.
+    /// The reason why the field was refused.
     #[schema(example = "expected a number, found null")]
     pub detail: String,
 }
@@ -51,15 +51,15 @@ pub struct FieldError {
 #[derive(Serialize, ToSchema)]
 #[schema(as = Problem)]
 pub struct ProblemDocument<'a> {
-    /// The kind of problem: `/problems/<slug>`, served as a page.
+    /// The type of problem: `/problems/<slug>`, which is also served as a page.
     #[schema(format = "uri-reference", example = "/problems/invalid-request")]
     r#type: String,
-    /// The kind of problem in words, the same for every occurrence.
+    /// The type of problem in words, the same for every occurrence.
     title: &'a str,
-    /// The HTTP status, repeated.
+    /// The HTTP status code of the response.
     #[schema(example = 422)]
     status: u16,
-    /// What happened in this request, where, and the remedy where there is one.
+    /// The specifics of this occurrence: what happened, where, and the remedy if there is one.
     detail: &'a str,
     /// The id of the request, as in `X-Request-Id`.
     instance: &'a str,
@@ -71,7 +71,7 @@ pub struct ProblemDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     minimum_alpha: Option<f64>,
-    /// The points in question, by position in the cloud; at most the first 1,000.
+    /// The points in question, as positions in the cloud. At most the first 1,000.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     #[schema(required = false)]
     point_indices: &'a [usize],
@@ -79,13 +79,14 @@ pub struct ProblemDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     limit: Option<u64>,
-    /// What the request would have needed, in the same unit.
+    /// The size that the request would have needed, in the unit of `limit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     required: Option<u64>,
 }
 
-/// Where the parts of a fit stand in the request: what `geometry` leaves out stands elsewhere.
+/// Pointers to the parts of a fit in the request. Parts that `geometry` leaves out are elsewhere in the
+/// request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pointers {
     /// The points of the cloud, or its id.
@@ -93,12 +94,12 @@ pub struct Pointers {
     pub kernel: &'static str,
     /// `alpha` or `noise_variances`.
     pub regularization: &'static str,
-    /// The queries, or the points that stand for them.
+    /// The queries, or the points that serve as queries.
     pub queries: &'static str,
 }
 
 impl Pointers {
-    /// The fields of the request itself, the cloud as points.
+    /// Pointers to the fields of the request itself, with the cloud given as points.
     pub const REQUEST: Pointers = Pointers {
         points: "/cloud/points",
         kernel: "/kernel",
@@ -106,13 +107,13 @@ impl Pointers {
         queries: "/queries",
     };
 
-    /// One entry of a list; an id has none.
+    /// Pointer to an entry of a list. A cloud given by id has no entries, so its pointer stays as it is.
     fn entry(list: &str, index: usize) -> String {
         if list.ends_with("/id") { list.to_owned() } else { format!("{list}/{index}") }
     }
 }
 
-/// Seconds after which another instance has taken over from one that drains.
+/// Seconds after which another instance has replaced one that drains.
 const SECONDS_UNTIL_REPLACED: u64 = 1;
 
 impl Problem {
@@ -120,7 +121,7 @@ impl Problem {
         Self { slug, detail: detail.into(), members: Box::default() }
     }
 
-    /// A problem of one field; its detail is the field's.
+    /// A problem of a field. The field repeats the detail.
     pub fn of_field(slug: Slug, pointer: impl Into<String>, detail: impl Into<String>) -> Self {
         Self::new(slug, detail).at(pointer)
     }
@@ -139,19 +140,19 @@ impl Problem {
         Self::of_field(Slug::DimensionMismatch, pointer, detail)
     }
 
-    /// A problem with the limit that was exceeded.
+    /// A problem that states the limit that was exceeded.
     pub fn beyond(slug: Slug, limit: usize, detail: impl Into<String>) -> Self {
         let mut problem = Self::new(slug, detail);
         problem.members.limit = Some(limit as u64);
         problem
     }
 
-    /// 404 for a path that there is not.
+    /// 404 for a path that does not exist.
     pub fn not_found() -> Self {
         Self::new(Slug::NotFound, "no such path; /openapi.json lists every path")
     }
 
-    /// 413 for a request whose size in `what` is over a limit.
+    /// 413 for a request whose size in `what` exceeds a limit.
     pub fn too_large(slug: Slug, what: &str, limit: usize, required: Option<usize>) -> Self {
         let needed = required.map(|n| format!(", this request has {n}")).unwrap_or_default();
         let mut problem = Self::beyond(slug, limit, format!("at most {limit} {what} are served{needed}"));
@@ -159,7 +160,7 @@ impl Problem {
         problem
     }
 
-    /// 503 for what finds no place, no memory or no thread now.
+    /// 503 if no place, memory or thread is free.
     pub fn overloaded(retry_after_seconds: u64) -> Self {
         let detail =
             format!("all that can be served at once is being served; try again in {retry_after_seconds} s");
@@ -184,17 +185,17 @@ impl Problem {
         problem
     }
 
-    /// 503 of a process that is to end.
+    /// 503 of a process that is shutting down.
     pub fn draining() -> Self {
         Self::unavailable("the server is shutting down", SECONDS_UNTIL_REPLACED)
     }
 
-    /// Says nothing internal: the log has the cause under the request id.
+    /// 500 that reveals nothing internal: the log has the cause under the request id.
     pub fn internal() -> Self {
         Self::new(Slug::Internal, "an internal error occurred; the request id identifies it in the logs")
     }
 
-    /// Adds to the detail, also where a field repeats it, what the client can do.
+    /// Appends a remedy to the detail, and to the fields that repeat the detail.
     pub fn with_remedy(mut self, remedy: &str) -> Self {
         let detail = format!("{}; {remedy}", self.detail);
         let repeating = self.members.errors.iter_mut().filter(|error| error.detail == self.detail);
@@ -203,7 +204,7 @@ impl Problem {
         self
     }
 
-    /// Adds a field with this problem's detail.
+    /// Adds a field with the detail of this problem.
     pub fn at(mut self, pointer: impl Into<String>) -> Self {
         self.members.errors.push(FieldError { pointer: pointer.into(), detail: self.detail.clone() });
         self
@@ -213,7 +214,7 @@ impl Problem {
         self.slug
     }
 
-    /// Turns a refusal of the numerics into its problem: status, type, pointer and remedy.
+    /// Converts an error of the numerics to a problem with type, pointer and remedy.
     pub fn from_numerics(error: NumericsError, pointers: Pointers) -> Self {
         use NumericsError as E;
         let detail = error.to_string();
@@ -255,26 +256,9 @@ impl Problem {
                 let remedy = format!("{detail}; use matern with nu of 2.5 or more, or another smooth kernel");
                 Self::of_field(Slug::KernelNotSmooth, format!("{}/family", pointers.kernel), remedy)
             }
-            E::DuplicatePoints { points } => {
-                let remedy = format!(
-                    "{detail}; set alpha (or their noise_variances) above 0, or alpha to 0 and \"duplicates\" to \"merge\" \
-                     to average their values"
-                );
-                let mut problem = Self::new(Slug::DuplicatePoints, remedy);
-                for point in points.iter().take(10) {
-                    let pointer = Pointers::entry(pointers.points, *point);
-                    problem
-                        .members
-                        .errors
-                        .push(FieldError { pointer, detail: "coincides with another point".to_owned() });
-                }
-                // A cloud given by its id has one pointer for all its points.
-                problem.members.errors.dedup_by(|a, b| a.pointer == b.pointer);
-                problem.members.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
-                problem
-            }
+            E::DuplicatePoints { points } => Self::duplicates(points, &detail, pointers),
             E::NotPositiveDefinite { reason, minimum_alpha } => {
-                // Rounded up: the remedy must work when it is typed in.
+                // Rounded up, so that the remedy works when it is typed in.
                 let enough = 1.01 * minimum_alpha;
                 let remedy = format!("{detail}; set alpha to {enough:.2e} or more, or use a rougher kernel");
                 let mut problem = Self::of_field(Slug::NotPositiveDefinite, pointers.regularization, remedy);
@@ -296,12 +280,29 @@ impl Problem {
             }
             E::MeanNotDetermined => at(Slug::InvalidRequest, "/mean"),
             E::WeightsOverflow => at(Slug::InvalidRequest, "/values"),
-            // Whoever cancelled is gone and reads nothing; the deadline has its own answer.
+            // The client that cancelled is gone and reads no answer. The deadline has an answer of its own.
             E::Cancelled => Self::new(Slug::DeadlineExceeded, detail),
         }
     }
 
-    /// The document for one request.
+    fn duplicates(points: Vec<usize>, detail: &str, pointers: Pointers) -> Self {
+        let remedy = format!(
+            "{detail}; set alpha (or their noise_variances) above 0, or alpha to 0 and \"duplicates\" to \"merge\" to \
+             average their values"
+        );
+        let mut problem = Self::new(Slug::DuplicatePoints, remedy);
+        for point in points.iter().take(10) {
+            let pointer = Pointers::entry(pointers.points, *point);
+            let detail = "coincides with another point".to_owned();
+            problem.members.errors.push(FieldError { pointer, detail });
+        }
+        // A cloud given by its id has one pointer for all its points.
+        problem.members.errors.dedup_by(|a, b| a.pointer == b.pointer);
+        problem.members.point_indices = points.into_iter().take(MAX_POINT_INDICES).collect();
+        problem
+    }
+
+    /// Returns the problem document for a request.
     pub fn document<'a>(&'a self, request_id: &'a str) -> ProblemDocument<'a> {
         ProblemDocument {
             r#type: format!("/problems/{}", self.slug.as_str()),
@@ -317,7 +318,7 @@ impl Problem {
         }
     }
 
-    /// The full response, once the id of the request is known.
+    /// Returns the full response, once the id of the request is known.
     pub fn to_response(&self, request_id: &str) -> Response {
         let body = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
         let mut response = (self.slug.status(), body).into_response();
@@ -334,7 +335,8 @@ impl Problem {
 }
 
 impl IntoResponse for Problem {
-    /// An empty response that carries the problem: the middleware, which knows the id of the request, writes the document.
+    /// Returns an empty response that carries the problem. The middleware writes the document, because it
+    /// knows the request id.
     fn into_response(self) -> Response {
         let mut response = self.slug.status().into_response();
         response.extensions_mut().insert(self);

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::factors;
+use super::durable::factors;
 use super::fitted::{Fits, Fitted};
-use super::plan::{Cost, FitModel, FitPlan};
+use super::plan::{Cost, FitPlan};
 use super::report::Report;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
@@ -13,17 +13,12 @@ use crate::http::state::app::{App, FitFailure};
 use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
-use gramian_numerics::error::NumericsError;
-use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::moving::Moving;
-use gramian_numerics::kernel::Kernel;
+use gramian_numerics::model::{Making, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::solver::Workspace;
 use gramian_numerics::solver::choose::Choice;
-use gramian_numerics::solver::{Solver, System, Workspace};
-use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
-use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::signature::{Signature, SignatureSurface};
+use gramian_numerics::surface::local::Given;
 
 /// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
 const LEAST_BYTES: usize = 16 << 10;
@@ -283,20 +278,17 @@ async fn prepare(
     plan: FitPlan,
     mut memory: Reservation,
 ) -> Result<PreparedFit, FitFailure> {
-    let (kernel, regularization) = match plan.model.clone() {
-        FitModel::Dense { kernel, regularization } => (kernel, regularization),
-        FitModel::Moving { kernel, regularization, .. } => {
-            return prepare_moving(app, admission, plan, (kernel, regularization), memory).await;
-        }
-        FitModel::Local { .. } => return Ok(PreparedFit::local(memory)),
-    };
-    let flops = plan.choice(app.prepared.memory()).at_most.flops;
-    let system = System::new(plan.fitted.clone(), kernel.clone(), regularization.clone());
-    if let Ok(system) = &system
-        && let Some(solver) = factors::restore(&app, &admission, &plan, system).await
-    {
-        return Ok(PreparedFit::restored(solver, memory));
+    if let Some(model) = plan.recipe.made_at_once() {
+        return Ok(PreparedFit::at_once(model, memory));
     }
+    if let Some(model) = factors::restore(&app, &admission, &plan).await {
+        return Ok(PreparedFit::restored(model, memory));
+    }
+    let flops = plan.choice(app.prepared.memory()).at_most.flops;
+    let sampling = match plan.recipe.needs_sampling() {
+        true => sampling_unless_merged(&app, &admission, &plan).await?,
+        false => None,
+    };
     let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {
         let (n_taken, mut is_short) = (memory.n_bytes(), false);
@@ -306,40 +298,17 @@ async fn prepare(
             !is_short
         };
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
-        let solver = system.and_then(|system| Solver::dense_in(workspace, system, observer));
-        match solver {
+        let making = Making { cloud: plan.fitted, sampling, workspace };
+        match plan.recipe.make(making, observer) {
             // The memory goes with the job: it may run on for a moment when nobody waits any more.
-            Ok(solver) => Ok((solver, memory)),
+            Ok(model) => Ok((model, memory)),
             Err(_) if is_short => Err(FitFailure::NeedsAll),
             Err(error) => Err(FitFailure::Refused(error)),
         }
     };
     let (outcome, times) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
-    let (solver, memory) = outcome?;
-    Ok(PreparedFit::new(solver, times.gram, times.factor, memory))
-}
-
-/// Checks the system, and sees to it that the neighbours of its cloud can be found.
-async fn prepare_moving(
-    app: Arc<App>,
-    admission: Arc<Admission>,
-    plan: FitPlan,
-    (kernel, regularization): (Kernel, Regularization),
-    memory: Reservation,
-) -> Result<PreparedFit, FitFailure> {
-    let flops = plan.choice(app.prepared.memory()).expected.flops;
-    let sampling = sampling_unless_merged(&app, &admission, &plan).await?;
-    let job = move |observer: &JobObserver| {
-        let sampling = match sampling {
-            Some(sampling) => sampling,
-            None => Arc::new(Sampling::of(&plan.fitted, observer)?),
-        };
-        let system = System::new(plan.fitted, kernel, regularization)?;
-        Ok((Moving::new(system, sampling, observer)?, memory))
-    };
-    let (outcome, _) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;
-    let (moving, memory) = outcome.map_err(FitFailure::Refused)?;
-    Ok(PreparedFit::moving(moving, memory))
+    let (model, memory) = outcome?;
+    Ok(PreparedFit::new(model, times.gram, times.factor, memory))
 }
 
 /// How the cloud of a fit is sampled; without the merged points it is another cloud, of which nobody knows.
@@ -373,14 +342,15 @@ fn make_surface(
                 None => Arc::new(Sampling::of(&plan.fitted, observer)?),
             };
             let normals = plan.fitted_normals();
-            let given = Given { normals: normals.as_deref(), sites: plan.sites() };
-            let surface = match stored.solver() {
-                None => LocalSurface::of(plan.fitted.clone(), sampling, given, observer)?.into(),
-                Some(solver) => {
-                    let signature = signature(&shared, &plan, solver, observer)?;
-                    SignatureSurface::over(sampling, signature, given.normals, observer)?.into()
-                }
-            };
+            let given = Given { normals: normals.as_deref(), sites: plan.recipe.sites() };
+            let ones = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
+            let signature = shared.prepared.solution(plan.key, ones);
+            let is_new = signature.is_none();
+            let making = SurfaceMaking { cloud: &plan.fitted, sampling, given, signature };
+            let surface = stored.model().surface(making, observer)?;
+            if let Some(signature) = surface.signature().filter(|_| is_new) {
+                shared.prepared.keep_solution(plan.key, ones, signature.solution.clone());
+            }
             // As with a factor, the memory goes with the job.
             Ok((surface, memory))
         };
@@ -388,20 +358,4 @@ fn make_surface(
         let _ = times.set(taken);
         surface.map_err(FitFailure::Refused)
     }
-}
-
-/// The signature function of a fit, its weights found if they were solved before.
-fn signature(
-    app: &App,
-    plan: &FitPlan,
-    solver: &Arc<Solver>,
-    observer: &JobObserver,
-) -> Result<Signature, NumericsError> {
-    let key = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
-    if let Some(solution) = app.prepared.solution(plan.key, key) {
-        return Signature::of(Interpolant { solver: solver.clone(), solution }, observer);
-    }
-    let signature = Signature::fit(solver.clone(), observer)?;
-    app.prepared.keep_solution(plan.key, key, signature.function().solution.clone());
-    Ok(signature)
 }

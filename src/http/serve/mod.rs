@@ -1,7 +1,7 @@
 //! How requests are served: the way of each from its body to its answer.
 
+mod diagnostics;
 pub mod durable;
-pub mod factors;
 
 pub mod operation;
 
@@ -11,6 +11,7 @@ pub mod intake;
 pub mod plan;
 pub mod planner;
 pub mod sampling;
+pub mod surface;
 pub mod values;
 
 mod report;

@@ -335,7 +335,7 @@ enum Parsed<O: Operation> {
 /// A fit that needs to know more of its cloud or of its values.
 fn lacking_mut<W>(plan: &mut Plan<W>) -> Option<&mut PlannedFit> {
     let mut fits = [Some(&mut plan.main), plan.surface.as_mut()].into_iter().flatten();
-    fits.find(|fit| fit.lacks_anything())
+    fits.find(|fit| fit.lack().is_some())
 }
 
 fn resolve<W>(
@@ -351,6 +351,9 @@ fn resolve<W>(
 /// Bytes that a request holds until it is answered: values, queries, and clouds that may not be kept.
 fn n_bytes_held<W>(plan: &Plan<W>) -> usize {
     let clouds = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
-    let n_bytes = clouds.map(|fit| fit.stored.n_bytes() + 2 * size_of::<f64>() * fit.n_points());
+    let n_bytes = clouds.map(|fit| {
+        let on = fit.on();
+        on.stored.n_bytes() + 2 * size_of::<f64>() * on.n_points()
+    });
     n_bytes.sum::<usize>() + plan.cost.n_held * size_of::<f64>()
 }

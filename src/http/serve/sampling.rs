@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::plan::PlannedFit;
+use super::plan::{Lack, PlannedFit, PlannedValues, Values};
 use crate::http::compute::{Admission, JobObserver};
 use crate::http::problem::{Pointers, Problem};
 use crate::http::state::app::App;
@@ -10,7 +10,7 @@ use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::estimate_noise;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::selection::learning_price;
+use gramian_numerics::selection::{Learned, learning_price};
 use gramian_numerics::solver::choose::{noise_flops, sampling_flops};
 
 /// Finds what a fit lacks of its cloud.
@@ -23,32 +23,49 @@ pub async fn find_lacking(
     admission: &Arc<Admission>,
     fit: &mut PlannedFit,
 ) -> Result<(), Problem> {
-    let sampling = find_sampling(app, admission, &fit.stored).await?;
-    if fit.lacks_noise() {
-        let cloud = fit.stored.cloud.clone();
-        let flops = noise_flops(cloud.n_points(), cloud.dimension());
-        let look = move |observer: &JobObserver| estimate_noise(&cloud, &sampling, observer);
-        let looking = look_at(app, admission, flops, look);
-        app.clouds.noise(admission.owner, &fit.stored, || looking).await?;
-    } else if fit.lacks_learned() {
-        let asked = fit.learning(sampling)?;
-        let price = learning_price(fit.n_points(), fit.stored.cloud.dimension(), fit.n_lists());
-        let (shared, admitted) = (app.clone(), admission.clone());
-        let looking = async move {
-            let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;
-            // The memory goes with the job: it may run on for a moment when nobody waits any more.
-            let learn = move |observer: &JobObserver| {
-                let learned = asked.learn(observer);
-                drop(memory);
-                learned
-            };
-            look_at(&shared, &admitted, price.flops, learn).await
-        };
-        if let Some(values) = &mut fit.values {
-            values.learned = Some(app.learned.get_or_learn(values.key, || looking).await?);
+    let on = fit.on();
+    let sampling = find_sampling(app, admission, &on.stored).await?;
+    match fit {
+        PlannedFit::Surface(fit) if fit.lack() == Some(Lack::Noise) => {
+            let stored = &fit.on.stored;
+            let cloud = stored.cloud.clone();
+            let flops = noise_flops(cloud.n_points(), cloud.dimension());
+            let look = move |observer: &JobObserver| estimate_noise(&cloud, &sampling, observer);
+            let looking = look_at(app, admission, flops, look);
+            app.clouds.noise(admission.owner, stored, || looking).await?;
+        }
+        PlannedFit::Surface(_) => {}
+        PlannedFit::Values(fit) => {
+            let Some(values) = fit.unlearned().cloned() else { return Ok(()) };
+            fit.learned = Some(find_learned(app, admission, fit, values, sampling).await?);
         }
     }
     Ok(())
+}
+
+/// Kernel, noise and mean of values.
+async fn find_learned(
+    app: &Arc<App>,
+    admission: &Arc<Admission>,
+    fit: &PlannedValues,
+    values: Arc<Values>,
+    sampling: Arc<Sampling>,
+) -> Result<Arc<Learned>, Problem> {
+    let (key, cloud) = (values.learned_key, &fit.on.stored.cloud);
+    let price = learning_price(cloud.n_points(), cloud.dimension(), values.n_lists);
+    let asked = fit.learning(values, sampling)?;
+    let (shared, admitted) = (app.clone(), admission.clone());
+    let looking = async move {
+        let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;
+        // The memory goes with the job: it may run on for a moment when nobody waits any more.
+        let learn = move |observer: &JobObserver| {
+            let learned = asked.learn(observer);
+            drop(memory);
+            learned
+        };
+        look_at(&shared, &admitted, price.flops, learn).await
+    };
+    app.learned.get_or_learn(key, || looking).await
 }
 
 /// How a cloud is sampled.

@@ -1,4 +1,4 @@
-//! What every request shares.
+//! The application: everything that requests share.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
@@ -21,7 +21,7 @@ use crate::store::learned::LearnedStore;
 use crate::store::prepared::{PreparedBytes, PreparedStore};
 use gramian_numerics::error::NumericsError;
 
-/// Why the service does not start.
+/// Reason why the service does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     #[error("the store (GRAMIAN_STORE) {0}")]
@@ -34,12 +34,14 @@ pub enum StartError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
-/// Why there is no factorization. Requests that share a computation share its failure, but each has pointers of its own.
+/// Reason why there is no factorization.
+///
+/// Requests that share a computation share its failure, but each adds its own pointers.
 #[derive(Debug, Clone)]
 pub enum FitFailure {
     Refused(NumericsError),
     Broken(Problem),
-    /// Cholesky has failed, and there was no memory for the fallback at that moment.
+    /// Cholesky failed, and there was not enough memory for the fallback at that moment.
     NeedsAll,
 }
 
@@ -49,26 +51,26 @@ pub struct App {
     pub memory: Memory,
     pub keys: Arc<Keys>,
     pub metrics: Metrics,
-    /// The memory of bodies that are read, unpacked and parsed, and of requests that wait.
+    /// Memory for bodies that are read, decompressed and parsed, and for requests that wait.
     pub intake: Budget,
     pub clouds: CloudStore<Problem>,
-    /// Where clouds outlive the process, if they do.
+    /// The store in which clouds outlive the process, if one is configured.
     pub durable: Option<Durable>,
     pub jobs: Jobs,
     pub prepared: PreparedStore<FitFailure>,
     pub learned: LearnedStore<Problem>,
     pub compute: Arc<Compute>,
-    /// Requests between their arrival and their answer.
+    /// Number of requests that have arrived but are not answered.
     pub n_requests: AtomicUsize,
-    /// Cancelled when the server drains: it still answers, but is not ready for more.
+    /// Cancelled when the server drains. It then finishes its requests, but is not ready for more.
     pub draining: CancellationToken,
 }
 
 impl App {
-    /// Opens the store, and starts the compute threads with empty caches.
+    /// Opens the store, and starts the compute threads. All caches are empty.
     ///
     /// # Errors
-    /// If the store does not work, or the operating system refuses the threads.
+    /// Fails if the store does not work, or the operating system refuses the threads.
     pub async fn new(config: Config) -> Result<Arc<Self>, StartError> {
         let durable = match &config.store {
             None => None,
@@ -105,11 +107,12 @@ impl App {
         }))
     }
 
-    /// Memory for work, so many bytes of it, as soon as they are free; `None` if they are no longer wanted. Whoever
-    /// waits for it holds no other memory for work.
+    /// Reserves memory for work, once enough is free. `None` if the memory is no longer wanted.
+    ///
+    /// To avoid deadlocks, the caller must hold no other memory for work while it waits.
     ///
     /// # Errors
-    /// 413 `problem-too-large` if there will never be so many.
+    /// 413 `problem-too-large` if the budget will never have that much.
     pub async fn reserve(
         &self,
         owner: Owner,

@@ -1,4 +1,4 @@
-//! The store that outlives the process, and how far it is behind what was acknowledged.
+//! The durable store of clouds, and how far it lags behind the acknowledged registrations.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,24 +7,27 @@ use tokio::sync::Notify;
 
 use crate::store::objects::{Objects, Place, Retention};
 
-/// The store, and whether it takes what it is given.
+/// The durable store, with counters of its backlog and size.
 pub struct Durable {
     pub objects: Arc<Objects>,
-    /// Clouds that it did not take, and how many of them it has been offered again since.
+    /// Number of clouds that the store refused, and how many of these have been offered again since.
     pub n_refused: AtomicU64,
     pub n_made_up: AtomicU64,
-    /// What the last sweep found, and what was written since.
+    /// Size of the store: the result of the last sweep, plus what was written since.
     pub n_clouds: AtomicU64,
     pub n_bytes: AtomicU64,
     pub n_factor_bytes: AtomicU64,
+    /// Wakes the sweep when clouds or factors exceed their limit in bytes.
     pub is_full: Notify,
     /// Held while a factor is written.
     pub writing_factor: tokio::sync::Mutex<()>,
 }
 
 impl Durable {
+    /// Opens the store.
+    ///
     /// # Errors
-    /// Says what is wrong with the place.
+    /// Tells what is wrong with the place.
     pub async fn open(place: &Place) -> Result<Self, String> {
         let variables = std::env::vars_os();
         let variables =
@@ -42,17 +45,17 @@ impl Durable {
         })
     }
 
-    /// Whether all that was acknowledged outlives the process.
+    /// Whether everything acknowledged outlives the process.
     pub fn is_up_to_date(&self) -> bool {
         self.n_made_up.load(Ordering::Acquire) == self.n_refused.load(Ordering::Acquire)
     }
 
-    /// Bytes of factors in the store, about.
+    /// Approximate bytes of factors in the store.
     pub fn factor_bytes(&self) -> u64 {
         self.n_factor_bytes.load(Ordering::Relaxed)
     }
 
-    /// How many clouds the store has, and bytes of them, about.
+    /// Approximate number of clouds in the store, and their bytes.
     pub fn size(&self) -> (u64, u64) {
         (self.n_clouds.load(Ordering::Relaxed), self.n_bytes.load(Ordering::Relaxed))
     }

@@ -1,4 +1,4 @@
-//! The jobs of this process, and how many it may have: the table on which the service of jobs (http/jobs/) works.
+//! The table of jobs of this process, and its limits. The service of jobs (http/jobs/) works on this table.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,7 +17,7 @@ use crate::store::objects::jobs::JobId;
 use crate::store::objects::room::Room;
 use crate::store::objects::{Objects, OwnerName, Unavailable};
 
-/// The jobs of this process, and where all of them are.
+/// The jobs of this process, and the objects of all jobs.
 pub struct Jobs {
     pub objects: Arc<Objects>,
     here: Mutex<HashMap<JobId, Arc<Here>>>,
@@ -25,37 +25,37 @@ pub struct Jobs {
     pub bytes: Budget,
     pub kept: Kept,
     pub turns: Arc<Turns>,
-    /// Jobs that may wait or run here, of all owners and of one.
+    /// Most jobs that may wait or run in this process, of all owners and of one.
     most: usize,
     most_of_owner: usize,
-    /// Who is told about jobs while they go on, one unit each.
+    /// Clients that follow the progress of jobs, one unit each.
     followers: Budget,
 }
 
-/// A job that this process works on, or will.
+/// A job of this process, waiting or running.
 pub struct Here {
     pub id: JobId,
     pub owner: Owner,
-    /// The last attempt at it when it came here. One that is newer when its turn comes is another process's.
+    /// The last attempt at the job when it was added here. A newer attempt belongs to another process.
     pub last: Option<(u32, SystemTime)>,
     pub progress: Arc<Progress>,
-    /// Whether it has a turn in this process.
+    /// Whether the job has a turn in this process.
     pub is_running: AtomicBool,
-    /// Whether its lease is in the store, so that each process says that it is running.
+    /// Whether the lease of the job is in the store, so that every process reports it as running.
     pub has_lease: AtomicBool,
     pub cancelled: CancellationToken,
-    /// Cancelled when it is not here any more.
+    /// Cancelled when the job is removed from this process.
     pub over: CancellationToken,
 }
 
-/// How many jobs wait, and how many run.
+/// Number of waiting jobs and number of running jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Load {
     pub n_waiting: usize,
     pub n_running: usize,
 }
 
-/// How many jobs there may be, and of how many owners.
+/// Limits of jobs.
 pub struct JobLimits {
     /// Bytes of kept requests and results, in the store or, without one, in memory.
     pub n_bytes: usize,
@@ -67,7 +67,7 @@ pub struct JobLimits {
 }
 
 impl Jobs {
-    /// Jobs in the store, or, where there is none, in memory.
+    /// Creates the table. Jobs are kept in the store, or in memory if there is none.
     pub fn new(store: Option<Arc<Objects>>, limits: &JobLimits) -> Self {
         let &JobLimits { n_owners, n_threads, .. } = limits;
         let most = n_threads.saturating_add(limits.max_queue);
@@ -83,7 +83,7 @@ impl Jobs {
         }
     }
 
-    /// Those of this process.
+    /// Returns the number of jobs of this process.
     pub fn load(&self) -> Load {
         let here = self.here();
         let n_running = here.values().filter(|job| job.is_running()).count();
@@ -100,13 +100,14 @@ impl Jobs {
         if self.objects.in_memory_alone() { 0 } else { self.bytes.n_held() }
     }
 
-    /// Counts one more who is told about a job while it goes on, until what is returned is dropped; nothing if there are too many, of all
-    /// owners or of this one.
+    /// Counts a client that follows a job until the returned value is dropped.
+    ///
+    /// `None` if too many clients follow jobs, of all owners or of this one.
     pub fn follow(&self, owner: Owner) -> Option<Reservation> {
         self.followers.try_reserve(owner, 1)
     }
 
-    /// Resolves once no job is here any more.
+    /// Resolves once this process has no jobs.
     pub async fn all_left(&self) {
         loop {
             let Some(job) = self.here().values().next().cloned() else { return };
@@ -118,7 +119,8 @@ impl Jobs {
         self.here().get(&id).cloned()
     }
 
-    /// Makes a job one of this process, unless it is, or there are too many, of all owners or of this one.
+    /// Adds a job to this process. `None` if it is already here, or there are too many, of all owners or of
+    /// this one.
     pub fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<Here>> {
         let mut here = self.here();
         let n_of_owner = here.values().filter(|job| job.owner == owner).count();
@@ -146,23 +148,23 @@ impl Jobs {
         waiting.map(|job| job.id).collect()
     }
 
-    /// A job is not here any more.
+    /// Removes a job from this process.
     pub fn remove(&self, job: &Here) {
         self.here().remove(&job.id);
         job.over.cancel();
     }
 
-    /// Whether another job of an owner could begin at once.
+    /// Whether a job of an owner could begin at once.
     pub fn has_turn(&self, owner: Owner) -> bool {
         self.turns.has_one_for(owner)
     }
 
-    /// Room for `n_bytes` of a job, if its owner may have as many.
+    /// Reserves room for `n_bytes` of a job, if its owner may have that much.
     pub fn room(&self, owner: Owner, n_bytes: usize) -> Option<Room> {
         Room::of(&self.bytes, owner, n_bytes)
     }
 
-    /// 413 for a result that there is no room for.
+    /// 413 for a result that does not fit.
     pub fn too_large(&self) -> Problem {
         let limit = self.bytes.largest();
         let detail = format!(
@@ -172,11 +174,12 @@ impl Jobs {
             .with_remedy("fetch results and delete their jobs, or ask for less")
     }
 
-    /// Ends a job without a result, unless it has one or is unknown. Returns whether it was ended. Another
-    /// process that works on the job finds out when it renews its lease.
+    /// Cancels a job, unless it has a result or is unknown. Returns whether it was cancelled.
+    ///
+    /// If another process works on the job, it notices when it renews its lease.
     ///
     /// # Errors
-    /// If the store does not answer.
+    /// Fails if the store does not answer.
     pub async fn cancel(&self, owner: Owner, name: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
         let is_cancelled = self.objects.cancel_job(name, id).await?;
         if is_cancelled {
@@ -188,7 +191,7 @@ impl Jobs {
         Ok(is_cancelled)
     }
 
-    /// Resolves when a job of this process is not here any more; never for others.
+    /// Resolves when this process stops working on the job. Never resolves for jobs of other processes.
     pub async fn until_over(&self, id: JobId) {
         match self.find(id) {
             Some(here) => here.over.cancelled().await,
@@ -196,10 +199,10 @@ impl Jobs {
         }
     }
 
-    /// Deletes a job wherever it is. Returns whether it was known.
+    /// Deletes a job, whichever process works on it. Returns whether it was known.
     ///
     /// # Errors
-    /// If the store does not answer.
+    /// Fails if the store does not answer.
     pub async fn forget(&self, owner: &OwnerName, id: JobId) -> Result<bool, Unavailable> {
         let was_known = self.objects.delete_job(owner, id).await?;
         self.kept.remove(id);

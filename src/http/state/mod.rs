@@ -1,4 +1,4 @@
-//! What all requests share. Nothing in here knows a request.
+//! State that all requests share. This module knows no request.
 
 pub mod app;
 pub mod durable;

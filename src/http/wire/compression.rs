@@ -1,4 +1,4 @@
-//! gzip and zstd, in and out. Both run on the compute pool, chunk by chunk.
+//! gzip and zstd, for request bodies and answers. Both run on the compute pool, chunk by chunk.
 
 use std::io::{self, BufRead, Read, Write};
 
@@ -10,19 +10,20 @@ use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use gramian_numerics::observer::Observer;
 
-/// What to do about a body that is too large.
+/// The remedy that a 413 for a body suggests.
 pub const SMALLER_BODY: &str = "register the cloud once and refer to it by id, split the queries over several requests, \
      or send lists of numbers as tensors (operators raise the limit by GRAMIAN_MAX_BODY_BYTES)";
 
-/// Levels for random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, 2 leaves 46 % at 127 MB/s, 6 as much at half the
-/// speed; zstd 1 leaves 42 % at 470 MB/s, 3 more at a third of the speed.
+/// Compression levels, chosen on random floats in decimals. gzip 1 leaves 70 % at 200 MB/s, gzip 2 leaves 46
+/// % at 127 MB/s, and gzip 6 leaves as much as gzip 2 at half its speed. zstd 1 leaves 42 % at 470 MB/s. zstd
+/// 3 leaves more than zstd 1, at a third of its speed.
 const GZIP_LEVEL: flate2::Compression = flate2::Compression::new(2);
 const ZSTD_LEVEL: i32 = 1;
 
-/// Window that a client may ask the decoder to hold, as a power of 2: the 8 MiB of RFC 9659.
+/// Largest window that a client may ask the decoder to hold, as a power of 2: the 8 MiB of RFC 9659.
 const ZSTD_WINDOW_LOG: u32 = 23;
 
-/// Compresses a body as it comes.
+/// A streaming compressor for the body of an answer.
 pub enum Compressor {
     Identity,
     Gzip(GzEncoder<Vec<u8>>),
@@ -30,8 +31,10 @@ pub enum Compressor {
 }
 
 impl Compressor {
+    /// Starts a stream.
+    ///
     /// # Errors
-    /// If the library has no memory for its state.
+    /// Fails if the library has no memory for its state.
     pub fn new(coding: Coding) -> io::Result<Self> {
         Ok(match coding {
             Coding::Identity => Self::Identity,
@@ -40,10 +43,12 @@ impl Compressor {
         })
     }
 
-    /// What can be sent after so much more of the body; nothing, if the encoder still waits for more.
+    /// Compresses the next part of the body and returns the output that is ready.
+    ///
+    /// The output is empty while the encoder still waits for more input.
     ///
     /// # Errors
-    /// None that are known: the sink is memory.
+    /// No error is known: the sink is memory.
     pub fn write(&mut self, bytes: Vec<u8>) -> io::Result<Vec<u8>> {
         match self {
             Self::Identity => Ok(bytes),
@@ -52,10 +57,10 @@ impl Compressor {
         }
     }
 
-    /// The end of the body.
+    /// Ends the stream and returns the rest of the output.
     ///
     /// # Errors
-    /// Those of [`Compressor::write`].
+    /// Returns the errors of [`Compressor::write`].
     pub fn finish(self) -> io::Result<Vec<u8>> {
         match self {
             Self::Identity => Ok(Vec::new()),
@@ -65,17 +70,20 @@ impl Compressor {
     }
 }
 
-/// Bytes that are read at a time, and between two looks at whether somebody waits.
+/// Bytes read at a time. The observer is asked once per block whether anybody still waits.
 const BLOCK_BYTES: usize = 64 << 10;
 
-/// Decompresses a request of at most `limit` bytes.
+/// Decompresses a body into at most `limit` bytes.
 ///
-/// Twice: the first time it only counts, so that the second one fills a buffer of the right size. A buffer that grows takes up
-/// to three times as much, and what a stream says of its own length may be wrong. In between `make_room` is told how many bytes
-/// there will be.
+/// The stream is decompressed twice. The first pass only counts, so that the second can fill a buffer of the
+/// right size. A growing buffer would take up to three times as much memory, and the length that a stream
+/// declares may be wrong. Between the passes, `make_room` receives the decompressed length in bytes.
 ///
 /// # Errors
-/// Those of `make_room`, 413 `body-too-large` beyond the limit, 504 once nobody waits for it, 400 `malformed-body` for what is not of this coding.
+/// - The errors of `make_room`.
+/// - 413 `body-too-large` beyond the limit.
+/// - 504 once nobody waits for the request.
+/// - 400 `malformed-body` for bytes that are not of this coding.
 pub fn decompress(
     bytes: Vec<u8>,
     coding: Coding,
@@ -113,7 +121,8 @@ pub fn decompress(
     Ok(plain)
 }
 
-/// Reads to the end, or until there is more than `limit`; says which.
+/// Reads blocks until the end of the stream, and passes each to `take`. Returns false if there are more than
+/// `limit` bytes.
 fn read_blocks(
     mut reader: impl Read,
     limit: usize,
@@ -137,7 +146,9 @@ fn read_blocks(
     }
 }
 
-/// What is left of a compressed body, block by block: a long one may have no plain bytes at all.
+/// A reader over a compressed body that checks for cancellation at every block.
+///
+/// The compressed side needs checks of its own: a long body may decompress to no bytes at all.
 struct Packed<'a> {
     bytes: &'a [u8],
     observer: &'a dyn Observer,
@@ -220,7 +231,7 @@ mod tests {
         }
     }
 
-    /// Nobody waits from the start.
+    /// An observer whose client has gone from the start.
     struct Left;
 
     impl Observer for Left {

@@ -1,4 +1,4 @@
-//! Bodies: how they are written, what becomes of them, and what answers become.
+//! Bodies of requests and answers: content negotiation, compression, reading and writing.
 
 pub mod compression;
 pub mod negotiation;

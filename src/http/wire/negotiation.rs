@@ -1,19 +1,19 @@
-//! Which media type and content coding a body has, and which its answer gets.
+//! Content negotiation: the media type and content coding of a request body and of its answer.
 
 use axum::http::{HeaderMap, HeaderName, header};
 
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 
-/// How a body is written.
+/// Media type of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     Json,
-    /// Tensors named as the JSON arrays, everything else as JSON text in its metadata.
+    /// Tensors named like the arrays of the JSON. Everything else is JSON text in the metadata.
     Safetensors,
-    /// One array of `NumPy`.
+    /// A single `NumPy` array.
     Npy,
-    /// Points, and normals if there are some, as scanners write them.
+    /// Points in the format of scanners, with normals if there are any.
     Ply,
 }
 
@@ -28,7 +28,7 @@ impl Format {
     }
 }
 
-/// How a body is compressed.
+/// Content coding of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coding {
     Identity,
@@ -46,7 +46,7 @@ impl Coding {
     }
 }
 
-/// What the client wants of an answer.
+/// Format and coding of the answer, negotiated from the request headers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wanted {
     pub format: Format,
@@ -54,18 +54,20 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// Chooses among the formats that are offered, the preferred ones first.
+    /// Chooses among the formats that are offered, which are ordered by the server's preference.
     ///
     /// # Errors
-    /// 406 `not-acceptable` if the client takes none of them.
+    /// 406 `not-acceptable` if the client accepts none of them.
     pub fn of(headers: &HeaderMap, offered: &[Format]) -> Result<Self, Problem> {
         let format = accepted_format(headers, offered)?;
         Ok(Self { format, coding: accepted_coding(headers, format) })
     }
 }
 
-/// RFC 9110, section 12.5.1: the most specific range that matches a format gives its weight. The greatest weight wins, then
-/// a format that is named over one that is only meant, then the first one offered.
+/// Chooses the format of the answer from `Accept` (RFC 9110, section 12.5.1).
+///
+/// The most specific range that matches a format gives its weight. The greatest weight wins. On a tie, the
+/// format whose range is more specific wins, then the first one offered.
 fn accepted_format(headers: &HeaderMap, offered: &[Format]) -> Result<Format, Problem> {
     let Some(accept) = list_of(headers, &header::ACCEPT) else {
         return offered.first().copied().ok_or_else(Problem::internal);
@@ -93,9 +95,11 @@ fn accepted_format(headers: &HeaderMap, offered: &[Format]) -> Result<Format, Pr
     })
 }
 
-/// RFC 9110, section 12.5.3. Of equal weight, zstd before gzip; where no coding is acceptable, none is used. Binary numbers
-/// lose a few per cent to compression and take long, so they are left as they are unless the client says that it prefers
-/// otherwise.
+/// Chooses the coding of the answer from `Accept-Encoding` (RFC 9110, section 12.5.3).
+///
+/// zstd wins over gzip of equal weight. If no coding is acceptable, the answer is not compressed. Binary
+/// formats stay uncompressed unless the client prefers compression: it takes long and saves only a few per
+/// cent of binary numbers.
 fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
     let Some(accept) = list_of(headers, &header::ACCEPT_ENCODING) else { return Coding::Identity };
     let given = |name: &str| weights(&accept).filter(|(coding, _)| coding == name).last();
@@ -113,10 +117,10 @@ fn accepted_coding(headers: &HeaderMap, format: Format) -> Coding {
     best.map_or(Coding::Identity, |(coding, _)| coding)
 }
 
-/// The format and coding that a request announces.
+/// Reads the format and coding of a body from `Content-Type` and `Content-Encoding`.
 ///
 /// # Errors
-/// 415 `unsupported-media-type` for what is not among the formats, or a coding other than gzip and zstd.
+/// 415 `unsupported-media-type` for a media type not in `formats`, or a coding other than gzip and zstd.
 pub fn announced(headers: &HeaderMap, formats: &[Format]) -> Result<(Format, Coding), Problem> {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let essence = text(header::CONTENT_TYPE).and_then(|value| value.split(';').next()).unwrap_or("").trim();
@@ -137,13 +141,13 @@ pub fn announced(headers: &HeaderMap, formats: &[Format]) -> Result<(Format, Cod
     }
 }
 
-/// All lines of a header that is a list; `None` if there is none.
+/// Joins all lines of a list header. `None` if the header is absent.
 fn list_of(headers: &HeaderMap, name: &HeaderName) -> Option<String> {
     let lines: Vec<&str> = headers.get_all(name).iter().filter_map(|value| value.to_str().ok()).collect();
     (!lines.is_empty()).then(|| lines.join(","))
 }
 
-/// The entries of a list with their weights, 1 if they have none.
+/// Splits a list header into lower-case entries and their weights. The default weight is 1.
 fn weights(list: &str) -> impl Iterator<Item = (String, f64)> {
     list.split(',').map(|entry| {
         let mut parts = entry.split(';').map(str::trim);

@@ -42,7 +42,7 @@ async fn no_owner_holds_more_than_half_and_the_poorer_comes_first() {
     let of_a = budget.reserve(A, 400 << 10, keep_everything).await.unwrap().unwrap();
     let mut more_of_a = Box::pin(budget.reserve(A, 200 << 10, keep_everything));
     assert!(futures_util::poll!(&mut more_of_a).is_pending());
-    // It may not, so that it holds up nobody else.
+    // Its owner may not have it, so it blocks nobody else.
     let of_b = budget.reserve(B, 400 << 10, keep_everything).await.unwrap().unwrap();
     assert!(budget.try_reserve(A, 200 << 10).is_none());
     drop(of_a);

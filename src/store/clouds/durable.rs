@@ -1,12 +1,12 @@
-//! Clouds behind memory: what becomes of a cloud when it is posted, used, read, offered again or deleted.
+//! Transitions of a cloud between memory and the store: post, use, read, new offer and deletion.
 //!
-//! TRUTH. A cloud is there when its object is in the store (objects/clouds.rs), or when it is pending:
-//! acknowledged, and in memory alone because the store failed to take it. Everything else in memory is a
-//! cache of the store.
+//! TRUTH. A cloud exists if its object is in the store (objects/clouds.rs), or if it is pending. A pending
+//! cloud was acknowledged, but is in memory alone because the store failed to take it. Everything else in
+//! memory is a cache of the store.
 //!
-//! TURNS. Every change of a cloud, in the store and in memory, happens in its turn, so that this process
-//! makes one at a time. What other processes change, the store decides: an object is created by one of them,
-//! and deleting it is one step.
+//! TURNS. Every change of a cloud, in the store or in memory, holds the turn of the cloud: a lock per cloud
+//! (turns.rs). So this process makes one change at a time. Between processes the store decides: only one of
+//! them creates an object, and a deletion is a single step.
 //!
 //! ```text
 //!              written, or found in the store              not in the store any more
@@ -14,7 +14,7 @@
 //!      │ the store fails                          ↑ offered again, and written
 //!      └────────────────→ Pending ────────────────┘          DELETE: from each of them
 //!
-//!  Unwritten, by DELETE → Deleted: it is not written any more
+//!  Unwritten, by DELETE → Deleted: it is no longer written
 //! ```
 
 use std::sync::Arc;
@@ -36,31 +36,31 @@ pub struct Holder {
     pub name: OwnerName,
 }
 
-/// What came of keeping a cloud.
+/// Outcome of an attempt to keep a cloud beyond the process.
 #[derive(Debug)]
 pub enum Kept {
-    /// It is new to the store, where it takes so many bytes.
+    /// The cloud is new to the store and takes this many bytes there.
     Written(u64),
-    /// It was there.
+    /// The cloud was kept already.
     Known,
-    /// It was registered, and deleted before it was written.
+    /// The cloud was registered, and deleted before it was written.
     Deleted,
-    /// The store failed to take it, for this reason: memory keeps it until the store does.
+    /// The store failed to take the cloud, for this reason. Memory keeps it until the store takes it.
     Pending(String),
-    /// The store failed to take it, and memory does not have it either.
+    /// The store failed to take the cloud, for this reason, and memory does not have it either.
     Nowhere(String),
 }
 
-/// What memory knows of a cloud, once the store was asked where that was due.
+/// Outcome of a look-up in memory, after a check with the store if one was due.
 pub enum Recalled {
     Here(Arc<RegisteredCloud>),
-    /// Memory had it, and the store does not any more.
+    /// The cloud was in memory but is no longer in the store.
     Gone,
     Unknown,
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
-    /// Sees to it that a cloud outlives the process, encoded by `encode` if it has to be written.
+    /// Makes a cloud outlive the process. `encode` is called only if the cloud has to be written.
     pub async fn keep<F>(
         &self,
         objects: &Objects,
@@ -88,7 +88,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         match write(objects, holder, cloud, encode).await {
             Ok(kept) => kept,
             Err(reason) => {
-                // First, because memory does not let go of what is pending.
+                // The mark comes before the check, because memory never evicts a pending cloud.
                 cloud.set_pending();
                 match self.has(holder.owner, cloud) {
                     true => Kept::Pending(reason),
@@ -98,8 +98,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         }
     }
 
-    /// Offers a pending cloud to the store again. Answers `None` if it is not pending any more, or was
-    /// deleted.
+    /// Offers a pending cloud to the store again. Returns `None` if it is no longer pending, or was deleted.
     pub async fn offer<F>(
         &self,
         objects: &Objects,
@@ -117,15 +116,15 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Some(write(objects, holder, cloud, encode).await.unwrap_or_else(Kept::Pending))
     }
 
-    /// Finds a cloud in memory. The store is asked for it first if it was last seen there `trust` ago or
-    /// earlier. While the store does not answer, memory is believed.
+    /// Finds a cloud in memory. The store is asked first if the cloud was last seen there `trust` ago or
+    /// earlier. While the store does not answer, the cloud in memory is assumed to be still stored.
     pub async fn recall(&self, objects: &Objects, holder: &Holder, id: CloudId, trust: Duration) -> Recalled {
         let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
         if cloud.is_trusted(trust) {
             return Recalled::Here(cloud);
         }
         let _turn = self.turns.take((holder.owner, id)).await;
-        // Others may have asked, or changed it, before this turn.
+        // Other tasks may have asked about it, or changed it, before this turn.
         let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
         if cloud.is_trusted(trust) || is_still_stored(objects, holder, &cloud).await {
             return Recalled::Here(cloud);
@@ -134,8 +133,8 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Recalled::Gone
     }
 
-    /// Takes a cloud that was read from the store into memory, unless it was deleted meanwhile. A damaged one
-    /// is put aside.
+    /// Takes a cloud that was read from the store into memory, unless it was deleted meanwhile. A damaged
+    /// cloud is moved aside.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -163,14 +162,15 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         }
     }
 
-    /// Puts a damaged cloud aside in its turn, so that nobody in this process writes it meanwhile.
+    /// Moves a damaged cloud aside. It holds the turn of the cloud, so this process does not write it
+    /// meanwhile.
     pub(super) async fn put_aside(&self, objects: &Objects, holder: &Holder, id: CloudId, damaged: Damaged) {
         let _turn = self.turns.take((holder.owner, id)).await;
         objects.put_aside(&holder.name, id, damaged).await;
     }
 
-    /// Deletes a cloud from store and memory; says whether it was there. Of several that delete it at once in
-    /// this process, one finds it there.
+    /// Deletes a cloud from store and memory. Returns whether it existed. Of concurrent deletions in this
+    /// process, one returns true.
     ///
     /// # Errors
     /// [`Unavailable`]: nothing is deleted, as far as the store tells.
@@ -189,14 +189,14 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Ok(was_stored || was_unstored)
     }
 
-    /// Lets go of a cloud that is not written, because it could not be read again.
+    /// Drops a cloud from memory that was not written, because it could not be read again.
     pub fn drop_unreadable(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) {
         if self.has(owner, cloud) {
             self.clouds.remove(owner, &cloud.id);
         }
     }
 
-    /// Has the store asked before a cloud is used again: it may have been let go there.
+    /// Requires a check with the store before the cloud is used again: it may have been deleted there.
     pub fn distrust(&self, owner: Owner, id: CloudId) {
         if let Some(cloud) = self.clouds.peek(owner, &id) {
             cloud.set_seen(false);
@@ -204,7 +204,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 }
 
-/// Whether the store has a cloud still, or does not say.
+/// Returns whether the store still has a cloud. If the store does not answer, it is assumed to.
 async fn is_still_stored(objects: &Objects, holder: &Holder, cloud: &RegisteredCloud) -> bool {
     let is_missing = matches!(objects.cloud_bytes(&holder.name, cloud.id).await, Ok(None));
     cloud.set_seen(!is_missing);

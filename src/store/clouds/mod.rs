@@ -1,4 +1,4 @@
-//! Registered clouds, named by their content: the memory of them, and what becomes of each where there is a
+//! Registered clouds, named by their content: the cache in memory, and their transitions when there is a
 //! store (durable.rs, page.rs).
 
 mod durable;
@@ -21,7 +21,7 @@ pub use page::{CloudPage, ListedCloud};
 pub use registered::RegisteredCloud;
 use turns::Turns;
 
-/// The clouds of all owners within one byte budget. `E` is what a computation may fail with.
+/// The clouds of all owners within one byte budget. `E` is the error of a computation.
 pub struct CloudStore<E> {
     clouds: FairCache<CloudId, Arc<RegisteredCloud>>,
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
@@ -41,8 +41,8 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         }
     }
 
-    /// Registers a cloud, or finds it; says whether it is new. A cloud beyond the whole budget is answered,
-    /// not kept.
+    /// Registers a cloud, or finds it. Returns it and whether it is new. A cloud larger than the whole budget
+    /// is returned but not kept.
     pub fn register(
         &self,
         owner: Owner,
@@ -57,10 +57,10 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         self.clouds.get_or_insert(owner, id, stored, |stored| stored.n_bytes())
     }
 
-    /// The cloud in memory, or what `read` finds, which is made once for all who ask at the same time.
+    /// Returns the cloud from memory, or else the result of `read`. Concurrent callers share one read.
     ///
     /// # Errors
-    /// Those of `read`; they are not kept.
+    /// Returns the errors of `read`. They are not cached.
     pub async fn get_or_read<F>(
         &self,
         owner: Owner,
@@ -75,14 +75,14 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
             None => self.reads.join((owner, id), &read).await,
         };
         match find().await {
-            // The flight may have looked before this request came, and the cloud may have been posted
-            // between. A second flight began later.
+            // The joined flight may have looked before this request came, and the cloud may have been posted
+            // in between. A second flight starts later than that.
             (Boarding::Joined, Ok(None)) => find().await.1,
             (_, found) => found,
         }
     }
 
-    /// Whether memory has this cloud, and not another one of the same points.
+    /// Returns whether memory holds this very cloud, and not another copy of the same points.
     pub fn has(&self, owner: Owner, cloud: &Arc<RegisteredCloud>) -> bool {
         self.clouds.peek(owner, &cloud.id).is_some_and(|kept| Arc::ptr_eq(&kept, cloud))
     }
@@ -91,10 +91,11 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         self.clouds.get(owner, &id)
     }
 
-    /// How the cloud is sampled, which `compute` finds at most once however many ask.
+    /// Returns the sampling of a cloud. Concurrent callers share one run of `compute`, and its result is
+    /// kept.
     ///
     /// # Errors
-    /// Those of `compute`; they are not kept.
+    /// Returns the errors of `compute`. They are not cached.
     pub async fn sampling<F>(
         &self,
         owner: Owner,
@@ -110,17 +111,16 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         };
         let (sampling, is_new) = fill(&stored.sampling, &self.samplings, (owner, stored.id), begin).await?;
         if is_new {
-            // A cloud that was kept stays, with the weight that it had where its sampling has no room beside
-            // it.
+            // A cached cloud stays cached. If its sampling has no room beside it, it keeps its old weight.
             self.clouds.reweigh(owner, stored.id, stored.n_bytes());
         }
         Ok(sampling)
     }
 
-    /// Sees to it that the noise of the cloud is known, as [`CloudStore::sampling`] does.
+    /// Makes sure that the noise of the cloud is known. Concurrent callers share one run of `compute`.
     ///
     /// # Errors
-    /// Those of `compute`; they are not kept.
+    /// Returns the errors of `compute`. They are not cached.
     pub async fn noise<F>(
         &self,
         owner: Owner,
@@ -134,18 +134,18 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         Ok(())
     }
 
-    /// Bytes of all clouds that are kept.
+    /// Bytes of all clouds in memory.
     pub fn n_bytes(&self) -> usize {
         self.clouds.n_bytes()
     }
 
-    /// How many are kept, and how many made room for others.
+    /// Numbers of clouds kept now and evicted since the start.
     pub fn counts(&self) -> Counts {
         self.clouds.counts()
     }
 
-    /// Clouds of an owner that memory has and the store does not, as far as this process knows. Without a
-    /// store these are all.
+    /// Clouds of an owner that are in memory and not in the store, as far as this process knows. Without a
+    /// store these are all clouds.
     pub fn unstored(&self, owner: Owner) -> Vec<Arc<RegisteredCloud>> {
         let mut clouds = self.clouds.values(owner);
         clouds.retain(|cloud| !cloud.is_stored());
@@ -153,7 +153,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     }
 }
 
-/// What is in a cell, or what a flight brings, which is put in; and whether this one put it in.
+/// Returns the content of a cell, filled by a flight if it is empty, and whether this call filled it.
 async fn fill<T, E, F>(
     cell: &OnceLock<T>,
     flights: &SingleFlight<(Owner, CloudId), T, E>,
@@ -169,7 +169,7 @@ where
         return Ok((known.clone(), false));
     }
     let found = flights.join(key, compute).await.1?;
-    // Of many who bring the same, the first one puts it in.
+    // The first of several concurrent callers fills the cell.
     let is_new = cell.set(found.clone()).is_ok();
     Ok((found, is_new))
 }
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn the_least_recently_used_clouds_make_room() {
-        // 1,000 points weigh 8 KB and less than one beside; the budget holds four of them.
+        // 1,000 points take 8 KB, and less than 1 KB of overhead. The budget holds four such clouds.
         let store = CloudStore::<()>::new(40 << 10);
         let ids: Vec<_> =
             (0..10).map(|k| store.register(Owner(0), line(1000, f64::from(k) / 16.0), None).0.id).collect();
@@ -220,7 +220,7 @@ mod tests {
         store.sampling(Owner(0), &stored, compute).await.unwrap();
         let range = stored.scales().and_then(Scales::nearest_range).unwrap();
         assert_eq!((range.min, range.median, range.max), (1.0, 1.0, 4.0));
-        // What is known is not computed again.
+        // A known sampling is not computed again.
         let before = store.n_bytes();
         let again = store.sampling(Owner(0), &stored, || async { Err(NumericsError::Cancelled) }).await;
         assert!(again.is_ok() && store.n_bytes() == before && before >= stored.n_bytes());

@@ -1,4 +1,4 @@
-//! Pages of the list of clouds: the objects of the store, and beside them the clouds that memory alone has.
+//! Pages of the list of clouds: objects of the store, and clouds that are in memory alone.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
 use crate::store::objects::{ListWindow, Listed, Objects, Unavailable};
 
-/// A cloud in a list, as far as it is known there.
+/// A cloud in a list: in full if memory has it, otherwise its head in the store.
 pub enum ListedCloud {
     InMemory(Arc<RegisteredCloud>),
     InStore(CloudId, CloudHead),
@@ -19,7 +19,7 @@ pub enum ListedCloud {
 /// A page of the list.
 pub struct CloudPage {
     pub clouds: Vec<ListedCloud>,
-    /// The place behind which the next page begins; `None` on the last page.
+    /// The place after which the next page begins. `None` on the last page.
     pub next: Option<Listed>,
 }
 
@@ -40,15 +40,16 @@ impl ListedCloud {
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
-    /// The places of [`CloudStore::unstored`] clouds in the list, by their ids.
+    /// Places of [`CloudStore::unstored`] clouds in the list, by id.
     pub fn unstored_places(&self, owner: Owner) -> HashMap<CloudId, Listed> {
         let place = |cloud: &RegisteredCloud| Listed { since: cloud.created_at(), id: cloud.id };
         self.unstored(owner).iter().map(|cloud| (cloud.id, place(cloud))).collect()
     }
 
-    /// The first clouds of the list within a window, of which `unstored` are in memory alone. A page that is
-    /// not the last one has at least one cloud. It has fewer than the window if some were deleted while the
-    /// page was made.
+    /// Returns the first clouds of the list within a window. `unstored` are the clouds in memory alone.
+    ///
+    /// A page other than the last has at least one cloud. It has fewer than the window if some were deleted
+    /// while the page was made.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -74,7 +75,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         }
     }
 
-    /// What is known of the clouds at some places, without those that are gone or damaged.
+    /// Returns the clouds at some places, without those that are gone or damaged.
     async fn described(
         &self,
         objects: Option<&Objects>,
@@ -82,7 +83,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
         places: &[Listed],
     ) -> Result<Vec<ListedCloud>, Unavailable> {
         let (mut found, mut elsewhere) = (Vec::new(), Vec::new());
-        // A directory shows a cloud twice that was deleted and posted again while it was listed.
+        // A cloud that was deleted and posted again during the listing appears twice in a directory.
         let mut ids = HashSet::new();
         for place in places.iter().filter(|place| ids.insert(place.id)) {
             match self.clouds.peek(holder.owner, &place.id) {

@@ -1,4 +1,4 @@
-//! A registered cloud: its points, what was learned from their positions, and where it is kept.
+//! A registered cloud: its points, what is known of their positions, and where it is kept.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -10,16 +10,16 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::count_duplicates;
 use gramian_numerics::points::sampling::{Sampling, Scales};
 
-/// A cloud with what its positions say, once that was asked for.
+/// A cloud with facts about its positions, once they were asked for.
 ///
-/// The cells are only ever read and set: what they hold is computed elsewhere, by `CloudStore::sampling` and
+/// The cells are only read and set here. Their values are computed by `CloudStore::sampling` and
 /// `CloudStore::noise`.
 pub struct RegisteredCloud {
     pub id: CloudId,
     pub cloud: Arc<Cloud>,
     /// The client's normals, `[n, d]`, not normalised.
     pub normals: Option<Arc<Cloud>>,
-    /// Points that coincide with an earlier one.
+    /// Number of points that coincide with an earlier one.
     pub n_duplicates: usize,
     /// The least and the greatest value of each coordinate.
     pub bounding_box: (Vec<f64>, Vec<f64>),
@@ -28,31 +28,30 @@ pub struct RegisteredCloud {
     pub(super) noise: OnceLock<f64>,
 }
 
-/// When a cloud was registered, and where it is kept.
+/// Time of registration, and where the cloud is kept.
 #[derive(Clone, Copy)]
 struct Record {
     created_at: SystemTime,
     standing: Standing,
 }
 
-/// Where a cloud is kept: durable.rs has the transitions.
+/// Place where a cloud is kept. The transitions are in durable.rs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Standing {
-    /// In memory alone: there is no store, or the request that brought the cloud has not written it yet.
+    /// Memory alone: there is no store, or the request that brought the cloud has not written it yet.
     Unwritten,
-    /// In memory alone although it was acknowledged: the store failed to take it, and is offered it again.
+    /// Memory alone although acknowledged: the store failed to take the cloud, and is offered it again.
     Pending,
-    /// In the store, and seen there last at this moment. `None`: to be looked for before it is used.
+    /// The store, where it was last seen at this moment. `None`: it must be looked for before it is used.
     Stored { seen_at: Option<Instant> },
-    /// Deleted before it was written, so that it is not written any more.
+    /// Deleted before it was written, so it will not be written.
     Deleted,
 }
 
 impl RegisteredCloud {
     pub(super) fn new(id: CloudId, cloud: Cloud, normals: Option<Cloud>) -> Self {
         let record = Record { created_at: SystemTime::now(), standing: Standing::Unwritten };
-        // The points come first, what is needed for a moment behind them: less stays on the heap between
-        // blocks.
+        // Points are allocated before temporaries, which leaves less memory on the heap between blocks.
         let (cloud, normals) =
             (Arc::new(cloud.compact()), normals.map(|normals| Arc::new(normals.compact())));
         Self {
@@ -67,7 +66,7 @@ impl RegisteredCloud {
         }
     }
 
-    /// A cloud that was read from the store.
+    /// Creates a cloud that was read from the store.
     pub fn restored(id: CloudId, stored: StoredCloud) -> Self {
         let standing = Standing::Stored { seen_at: Some(Instant::now()) };
         let StoredCloud { head, points: cloud, normals } = stored;
@@ -83,7 +82,7 @@ impl RegisteredCloud {
         }
     }
 
-    /// What a list of clouds says of it.
+    /// Returns its entry in the list of clouds.
     pub fn head(&self) -> CloudHead {
         CloudHead {
             created_at: self.created_at(),
@@ -95,22 +94,23 @@ impl RegisteredCloud {
         }
     }
 
-    /// What the store keeps of it.
+    /// Returns its content as the store keeps it.
     pub fn stored(&self) -> StoredCloud {
         StoredCloud { head: self.head(), points: self.cloud.clone(), normals: self.normals.clone() }
     }
 
-    /// When it was registered.
+    /// Time of registration.
     pub fn created_at(&self) -> SystemTime {
         self.record().created_at
     }
 
-    /// Whether the store has it, as far as this process knows.
+    /// Returns whether the store has it, as far as this process knows.
     pub fn is_stored(&self) -> bool {
         matches!(self.standing(), Standing::Stored { .. })
     }
 
-    /// Whether it is in memory alone, or was seen in the store less than `most` ago.
+    /// Returns whether it may be used without asking the store: it is in memory alone, or was seen in the
+    /// store less than `most` ago.
     pub fn is_trusted(&self, most: Duration) -> bool {
         match self.standing() {
             Standing::Unwritten | Standing::Pending | Standing::Deleted => true,
@@ -118,7 +118,7 @@ impl RegisteredCloud {
         }
     }
 
-    /// Whether it was acknowledged, and only memory has it.
+    /// Returns whether it was acknowledged and is in memory alone.
     pub(super) fn is_pending(&self) -> bool {
         self.standing() == Standing::Pending
     }
@@ -127,35 +127,35 @@ impl RegisteredCloud {
         self.record().standing
     }
 
-    /// Notes that it was deleted; says whether it was there, in memory alone.
+    /// Marks it as deleted. Returns whether it existed in memory alone.
     pub(super) fn set_deleted(&self) -> bool {
         let mut record = self.record();
         match record.standing {
             Standing::Unwritten => record.standing = Standing::Deleted,
             Standing::Pending => {}
-            // One that memory only believed to be in the store was deleted by another process.
+            // Memory only believed this one to be in the store. Another process deleted it.
             Standing::Stored { .. } | Standing::Deleted => return false,
         }
         true
     }
 
-    /// Notes that the store has lost it: it is registered again, now.
+    /// Records that the store has lost it. It counts as registered anew, now.
     pub(super) fn set_unwritten(&self) {
         *self.record() = Record { created_at: SystemTime::now(), standing: Standing::Unwritten };
     }
 
-    /// Notes that the store failed to take it.
+    /// Records that the store failed to take it.
     pub(super) fn set_pending(&self) {
         self.record().standing = Standing::Pending;
     }
 
-    /// Notes that the store has it, as a cloud that was registered at `since`.
+    /// Records that the store has it, as a cloud registered at `since`.
     pub(super) fn set_stored(&self, since: SystemTime) {
         *self.record() =
             Record { created_at: since, standing: Standing::Stored { seen_at: Some(Instant::now()) } };
     }
 
-    /// Notes whether it was just seen in the store, or has to be looked for there before it is used.
+    /// Records whether it was just seen in the store, or must be looked for there before it is used.
     pub(super) fn set_seen(&self, is_seen: bool) {
         let mut record = self.record();
         if let Standing::Stored { seen_at } = &mut record.standing {
@@ -171,12 +171,12 @@ impl RegisteredCloud {
         self.record.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How it is sampled, once that was asked for.
+    /// Sampling of the points, once it was asked for.
     pub fn sampling(&self) -> Option<&Arc<Sampling>> {
         self.sampling.get()
     }
 
-    /// The lengths that kernels are chosen by, once its sampling was asked for.
+    /// Lengths that kernels are chosen by, once the sampling was asked for.
     pub fn scales(&self) -> Option<&Scales> {
         self.sampling().map(|sampling| sampling.scales())
     }

@@ -1,4 +1,4 @@
-//! Turns: one change of a cloud at a time within a process.
+//! Turns: locks that allow one change of a cloud at a time within a process.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -6,10 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use tokio::sync::OwnedMutexGuard;
 
-/// Locks by key, each of which is there for as long as somebody has or awaits it.
+/// Locks by key. A lock exists for as long as a task holds or awaits it.
 ///
-/// A turn is held across calls of the store, by tasks and never by threads: nothing on the compute pool
-/// awaits one.
+/// A turn is held across calls of the store. Only async tasks await turns, never threads of the compute pool.
 pub(super) struct Turns<K> {
     locks: Mutex<HashMap<K, Weak<tokio::sync::Mutex<()>>>>,
 }
@@ -21,8 +20,7 @@ impl<K> Default for Turns<K> {
 }
 
 impl<K: Hash + Eq> Turns<K> {
-    /// Waits until nobody else has the turn of this key. Those who wait have it in the order in which they
-    /// came.
+    /// Waits for the turn of this key. Waiting tasks get it in order of arrival.
     pub(super) async fn take(&self, key: K) -> OwnedMutexGuard<()> {
         let lock = self.lock_of(key);
         lock.lock_owned().await
@@ -33,7 +31,7 @@ impl<K: Hash + Eq> Turns<K> {
         if let Some(lock) = locks.get(&key).and_then(Weak::upgrade) {
             return lock;
         }
-        // Entries that nobody holds are swept here, so that the map stays as small as the traffic.
+        // Entries that nobody holds are swept here, so the map stays as small as the traffic.
         locks.retain(|_, lock| lock.strong_count() > 0);
         let lock = Arc::default();
         locks.insert(key, Arc::downgrade(&lock));

@@ -1,4 +1,4 @@
-//! A cloud as the bytes of an object.
+//! Encoding of a cloud as the bytes of an object.
 //!
 //! ```text
 //! head     "gramian cloud 1\n"                      16 bytes
@@ -10,8 +10,9 @@
 //! BLAKE3 of points and normals                      32 bytes
 //! ```
 //!
-//! Numbers are little-endian. The head has a hash of its own so that a list of clouds needs no points. What is read is what was
-//! written, or refused: hashes, lengths, and the cloud's own name, which is the hash of its points.
+//! Numbers are little-endian. The head has a hash of its own, so a list of clouds needs no points. Reading
+//! returns what was written, or refuses it. It checks the hashes, the lengths, and the name of the cloud,
+//! which is the hash of its points.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,10 +27,10 @@ use gramian_numerics::points::cloud::Cloud;
 const MAGIC: &[u8; 16] = b"gramian cloud 1\n";
 const N_COUNTS: usize = 5;
 const HASH_BYTES: usize = 32;
-/// Where the number of coordinates stands.
+/// Byte position of the number of coordinates d.
 const DIMENSION_AT: usize = MAGIC.len() + 16;
 
-/// What a list of clouds says of each.
+/// Facts about a cloud that a list shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CloudHead {
     pub created_at: SystemTime,
@@ -41,26 +42,26 @@ pub struct CloudHead {
     pub bounding_box: (Vec<f64>, Vec<f64>),
 }
 
-/// Bytes that a head has for points of so many coordinates.
+/// Bytes of a head for points of this dimension.
 fn head_bytes(dimension: usize) -> usize {
     MAGIC.len() + 8 * (N_COUNTS + 2 * dimension) + HASH_BYTES
 }
 
-/// Bytes that a head has by its own account, which may be wrong; 0 where it is none.
+/// Bytes of a head as computed from its own dimension field, which may be wrong. A missing field counts as 0.
 pub(super) fn head_bytes_of(bytes: &[u8]) -> u64 {
     let dimension = bytes.get(DIMENSION_AT..DIMENSION_AT + 8).and_then(|word| word.try_into().ok());
     let dimension = dimension.map_or(0, u64::from_le_bytes).min(1 << 30);
     head_bytes(dimension as usize) as u64
 }
 
-/// Bytes of the object of a cloud.
+/// Bytes of the object of a cloud. `None` on overflow.
 pub fn object_bytes(head: &CloudHead) -> Option<usize> {
     let lists = if head.has_normals { 2 } else { 1 };
     let numbers = head.n_points.checked_mul(head.dimension)?.checked_mul(8 * lists)?;
     numbers.checked_add(head_bytes(head.dimension))?.checked_add(HASH_BYTES)
 }
 
-/// A cloud with all that its object says of it.
+/// A cloud with everything that its object contains.
 pub struct StoredCloud {
     pub head: CloudHead,
     pub points: Arc<Cloud>,
@@ -85,10 +86,10 @@ impl CloudHead {
         bytes
     }
 
-    /// Reads the head of an object from as many of its first bytes as there are.
+    /// Reads the head of an object from its first bytes, however many are given.
     ///
     /// # Errors
-    /// [`Damaged`] for what is no head, or not as it was written.
+    /// [`Damaged`] if the bytes are not a head, or not as written.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, Damaged> {
         let rest = bytes.strip_prefix(MAGIC).ok_or(Damaged("its first bytes are those of no cloud"))?;
         let counts = rest.get(..8 * N_COUNTS).ok_or(CUT)?;
@@ -99,7 +100,7 @@ impl CloudHead {
             (next(), next(), next(), next(), next());
         let count = |x: u64| usize::try_from(x).map_err(|_| Damaged("a number is beyond this machine"));
         let (n_points, dimension) = (count(n_points)?, count(dimension)?);
-        // Before anything is made of it: the hash.
+        // Nothing is built from the numbers before their hash is checked.
         if dimension > bytes.len() {
             return Err(CUT);
         }
@@ -126,7 +127,7 @@ const OTHER: Damaged = Damaged("its bytes are not those that were written");
 const NO_CLOUD: Damaged = Damaged("its numbers are no cloud");
 const ANOTHER: Damaged = Damaged("it is another cloud than its name says");
 
-/// The object of a cloud, in pieces. Its numbers are those of the cloud, not copies.
+/// Encodes a cloud as the pieces of its object. The numbers are shared with the cloud, not copied.
 pub fn encode(cloud: StoredCloud) -> Vec<Bytes> {
     let mut hasher = blake3::Hasher::new();
     let mut pieces = vec![Bytes::from(cloud.head.encode())];
@@ -139,7 +140,7 @@ pub fn encode(cloud: StoredCloud) -> Vec<Bytes> {
     pieces
 }
 
-/// The numbers of a cloud, for as long as they are written.
+/// Coordinates of a cloud, kept alive while they are written.
 struct Numbers(Arc<Cloud>);
 
 impl Numbers {
@@ -157,7 +158,7 @@ impl AsRef<[u8]> for Numbers {
     }
 }
 
-/// Whether the bytes of an object are those that were written, as they come and without keeping them.
+/// A streaming check that the bytes of an object are those that were written. It keeps no bytes.
 pub(super) struct Check {
     numbers: Range<usize>,
     is_as_long: bool,
@@ -167,7 +168,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// Of an object of so many bytes, whose head is whole.
+    /// Creates a check for an object of `n_bytes` whose head is intact.
     pub(super) fn new(head: &CloudHead, n_bytes: u64) -> Self {
         let first = head_bytes(head.dimension);
         let expected = object_bytes(head).filter(|&expected| expected as u64 == n_bytes);
@@ -187,8 +188,10 @@ impl Check {
         self.at = end;
     }
 
+    /// Ends the check.
+    ///
     /// # Errors
-    /// [`Damaged`] unless they are.
+    /// [`Damaged`] unless all bytes are those that were written.
     pub(super) fn end(self) -> Result<(), Damaged> {
         match () {
             () if !self.is_as_long || self.at != self.numbers.end + HASH_BYTES => Err(CUT),
@@ -198,7 +201,8 @@ impl Check {
     }
 }
 
-/// Whether it is the bytes that are wrong, and not what they say.
+/// Returns whether the bytes differ from those written. Otherwise they are intact, but encode no cloud or
+/// another one.
 pub(super) fn is_of_bytes(damaged: Damaged) -> bool {
     damaged != NO_CLOUD && damaged != ANOTHER
 }
@@ -206,7 +210,7 @@ pub(super) fn is_of_bytes(damaged: Damaged) -> bool {
 /// Reads the cloud `id` from its object.
 ///
 /// # Errors
-/// [`Damaged`] unless it is whole and as it was written.
+/// [`Damaged`] unless the object is complete and as written.
 pub fn decode(id: CloudId, bytes: &[u8]) -> Result<StoredCloud, Damaged> {
     let head = CloudHead::decode(bytes)?;
     if object_bytes(&head) != Some(bytes.len()) {
@@ -236,7 +240,7 @@ fn floats(bytes: &[u8]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// The name of a cloud and what is written of it, the same each time.
+    /// Returns the name of a cloud and its content, equal at each call.
     fn stored(has_normals: bool) -> (CloudId, StoredCloud) {
         let points = Arc::new(Cloud::new(vec![-0.0, 1.5, 2.0, -3.0, 2.0, -3.0], 2).unwrap());
         let normals = Cloud::new(vec![1.0, 0.0, 0.0, 2.0, 1.0, 1.0], 2).unwrap();

@@ -1,8 +1,8 @@
-//! Clouds as objects: written, found whole, listed and forgotten.
+//! Clouds as objects: written, found, listed and deleted.
 //!
-//! ONE OBJECT is one cloud: `<owner>/clouds/<cloud id>`. It is there or not, and with it the cloud, in each
-//! answer about it. The list is the objects of that folder in the order in which the store took them, so
-//! there is no second record that could disagree.
+//! ONE OBJECT is one cloud: `<owner>/clouds/<cloud id>`. The cloud exists in every answer if and only if the
+//! object does. The list consists of the objects of that folder in the order in which the store took them. So
+//! no second record could disagree.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, SystemTime};
@@ -15,11 +15,12 @@ use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStoreExt, PutPayload}
 use super::cloud_object::{self, CloudHead};
 use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
 
-/// Heads that are read at once.
+/// Number of heads read concurrently.
 const HEADS_AT_ONCE: usize = 32;
 
-/// Bytes that the head of most clouds is within, and that of any.
+/// Bytes read first, which contain the head of most clouds.
 const FIRST_BYTES: u64 = 1024;
+/// Most bytes of any head.
 const MAX_HEAD_BYTES: u64 = 1 << 20;
 
 /// The folder of an owner's clouds.
@@ -28,24 +29,24 @@ pub(super) const FOLDER: &str = "clouds";
 /// A place in a list of clouds. Places are ordered by time, ties by id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Listed {
-    /// When the store took the cloud, to the precision of the store. For one that is in memory alone: when it
-    /// was registered.
+    /// Time at which the store took the cloud, to the precision of the store. For a cloud in memory alone:
+    /// its time of registration.
     pub since: SystemTime,
     pub id: CloudId,
 }
 
-/// A part of a list: at most `n` places, behind one if that is named.
+/// A window of a list: at most `n` places, after a given one if any.
 #[derive(Debug, Clone, Copy)]
 pub struct ListWindow {
     pub after: Option<Listed>,
     pub n: usize,
 }
 
-/// The first places of a window, as they are found in any order. However long the list is, no more than these
-/// are in memory.
+/// The first places of a window, collected from places in any order. No more than these are in memory,
+/// however long the list is.
 struct FirstPlaces {
     window: ListWindow,
-    /// One more than the window, which says whether they are the last.
+    /// Up to `n + 1` places. The extra one tells that the window is not the last.
     first: BTreeSet<Listed>,
 }
 
@@ -70,7 +71,7 @@ impl ListWindow {
         FirstPlaces { window: self, first: BTreeSet::new() }
     }
 
-    /// The places of this window among some, in their order, and whether they are the last.
+    /// Returns the places of this window among some, in order, and whether they are the last.
     pub fn first_of(self, places: impl Iterator<Item = Listed>) -> (Vec<Listed>, bool) {
         let mut first = self.begin();
         places.for_each(|place| first.add(place));
@@ -78,19 +79,19 @@ impl ListWindow {
     }
 }
 
-/// What came of writing a cloud.
+/// Outcome of writing a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Written {
     Now,
-    /// It was there, since then.
+    /// The cloud existed, with this time of registration.
     Before(SystemTime),
 }
 
 impl Objects {
-    /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it is there.
+    /// Writes the object of a cloud, made by [`cloud_object::encode`], unless it exists.
     ///
     /// # Errors
-    /// [`Unavailable`]: it may be there all the same, where the store took it and did not say so.
+    /// [`Unavailable`]. The object may exist nevertheless, if the store took it and its answer was lost.
     pub async fn put_cloud(
         &self,
         owner: &OwnerName,
@@ -104,8 +105,8 @@ impl Objects {
         }
         match self.whole_head(owner, id).await? {
             Some(head) => Ok(Written::Before(head.created_at)),
-            // It was damaged, or has gone meanwhile. If another process writes it again at once, that one
-            // writes the same points.
+            // The object was damaged, or was deleted meanwhile. If another process writes it again at once,
+            // it writes the same points.
             None => {
                 self.put(&name, payload).await?;
                 Ok(Written::Now)
@@ -113,7 +114,7 @@ impl Objects {
         }
     }
 
-    /// How many bytes the object of a cloud has, if it is there.
+    /// Size of the object of a cloud in bytes, if it exists.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -123,7 +124,7 @@ impl Objects {
         Ok(found.map(|found| found.size))
     }
 
-    /// The object of a cloud, if it is there: for [`cloud_object::decode`].
+    /// Reads the object of a cloud, if it exists, for [`cloud_object::decode`].
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -133,7 +134,7 @@ impl Objects {
         self.counted(Verb::Read, &name, found.await)
     }
 
-    /// What lists say of a cloud, if it is there: its head, or why that cannot be read.
+    /// Reads the head of a cloud, if it exists. The inner error tells why the head cannot be read.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -146,7 +147,7 @@ impl Objects {
         Ok(first.map(|bytes| CloudHead::decode(&bytes)))
     }
 
-    /// The head of a cloud that is there and whole, whose points are read for that. One that is not is put aside.
+    /// Reads the head of an intact cloud. The points are read to check them. A damaged cloud is moved aside.
     async fn whole_head(&self, owner: &OwnerName, id: CloudId) -> Result<Option<CloudHead>, Unavailable> {
         match self.check(owner, id).await? {
             None => Ok(None),
@@ -158,7 +159,7 @@ impl Objects {
         }
     }
 
-    /// Whether a cloud is there, and whole.
+    /// Checks all bytes of a cloud, if it exists. Returns its head, or the damage.
     async fn check(
         &self,
         owner: &OwnerName,
@@ -182,7 +183,7 @@ impl Objects {
         Ok(Some(check.end().map(|()| head)))
     }
 
-    /// The heads of some clouds, without those that are gone.
+    /// Reads the heads of some clouds, without those that are gone.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -197,9 +198,11 @@ impl Objects {
         heads.try_filter_map(|found| async move { Ok(found) }).try_collect().await
     }
 
-    /// The first places of a window, in their order, and whether they are the last: of the objects of an
-    /// owner, and of `unstored` clouds beside them. A cloud has one place, also if it was stored after it was
-    /// taken to be unstored. Not every store lists in an order, so that all names of the folder pass by.
+    /// Returns the first places of a window, in order, and whether they are the last.
+    ///
+    /// The list has the objects of an owner and the `unstored` clouds. A cloud has one place, even if it was
+    /// stored after it was taken to be unstored. Some stores list in no order, so all names of the folder are
+    /// read.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -221,7 +224,7 @@ impl Objects {
         Ok(first.into_places())
     }
 
-    /// An item of a list, nothing at its end.
+    /// Counts a failed item of a list. `None` marks the end.
     fn counted_item(
         &self,
         folder: &Path,
@@ -230,16 +233,17 @@ impl Objects {
         item.transpose().map_err(|error| self.failed(Verb::List, folder, error))
     }
 
-    /// Deletes a cloud, its factors and what was put aside of it; says whether the cloud was there. Of
-    /// several that delete one cloud at once, a directory tells exactly one so. A bucket does not say what it
-    /// deleted, so that processes which delete it at once may all be told so.
+    /// Deletes a cloud, its factors and its damaged copy. Returns whether the cloud existed.
+    ///
+    /// Of concurrent deletions in a directory, exactly one returns true. A bucket does not tell what it
+    /// deleted. So there several processes that delete the cloud at once may all return true.
     ///
     /// # Errors
-    /// [`Unavailable`]: the cloud may be there, or not.
+    /// [`Unavailable`]: the cloud may exist, or not.
     pub async fn delete_cloud(&self, owner: &OwnerName, id: CloudId) -> Result<bool, Unavailable> {
         let is_there = self.cloud_bytes(owner, id).await?.is_some();
         let was_there = is_there && self.delete(&self.cloud(owner, id)).await?;
-        // The cloud is gone now, whatever becomes of the rest, which a sweep lets go as well.
+        // The cloud is gone now. If deleting the rest fails, a sweep deletes it later.
         if let Err(error) = self.delete_remains(owner, id).await {
             tracing::warn!(%error, cloud = %id, "what belonged to a deleted cloud is left to the next sweep");
         }
@@ -255,8 +259,7 @@ impl Objects {
         Ok(())
     }
 
-    /// Deletes a cloud that is still the one of this place in the list, and not another one since; says
-    /// whether it did.
+    /// Deletes the cloud at a place of the list, unless it was written again since. Returns whether it did.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -269,7 +272,7 @@ impl Objects {
         Ok(is_same && self.delete_cloud(owner, place.id).await?)
     }
 
-    /// Puts aside what is not what was written, unless somebody has written it again meanwhile.
+    /// Moves a damaged cloud aside, unless it has been written again meanwhile.
     pub async fn put_aside(&self, owner: &OwnerName, id: CloudId, damaged: Damaged) {
         if cloud_object::is_of_bytes(damaged) && matches!(self.check(owner, id).await, Ok(Some(Ok(_)))) {
             return;
@@ -280,13 +283,13 @@ impl Objects {
         tracing::error!(object = %name, %aside, is_aside, "a cloud is put aside");
     }
 
-    /// As many as a head has.
+    /// Reads the first bytes of an object, as many as its head has.
     async fn first_bytes(&self, name: &Path) -> Result<Option<Bytes>, Unavailable> {
         let mut n_bytes = FIRST_BYTES;
         loop {
             let options = GetOptions { range: Some(GetRange::Bounded(0..n_bytes)), ..GetOptions::default() };
             let found = async { self.store.get_opts(name, options).await?.bytes().await }.await;
-            // Of an object without bytes no store gives any range.
+            // No store returns a range of an empty object.
             if found.is_err() && self.store.head(name).await.is_ok_and(|empty| empty.size == 0) {
                 return Ok(Some(Bytes::new()));
             }
@@ -304,14 +307,14 @@ impl Objects {
         self.path(&[&owner.0, FOLDER, &id.to_string()])
     }
 
-    /// Where a damaged one goes.
+    /// Path to which a damaged cloud is moved.
     fn aside(&self, owner: &OwnerName, id: CloudId) -> Path {
         self.path(&[&owner.0, "damaged", &id.to_string()])
     }
 }
 
 impl Listed {
-    /// The place of an object, if it is a cloud.
+    /// Returns the place of an object in the list, if it is a cloud.
     pub(super) fn of(object: &ObjectMeta) -> Option<Self> {
         let id = CloudId::parse(object.location.filename()?)?;
         Some(Self { since: object.last_modified.into(), id })

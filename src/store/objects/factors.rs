@@ -1,7 +1,11 @@
-//! Factorizations as objects: a line of JSON, the weights of 1 and the factor as little-endian float64, and the BLAKE3 of all of it.
+//! Factorizations as objects: a line of JSON, the weights of the constant 1 and the factor as little-endian
+//! float64, and the BLAKE3 of all.
 //!
-//! NAMES. `<owner>/factors/<cloud id>/<fit>`: the fit is the hash of everything else that a factorization depends on. They go with their cloud,
-//! and the oldest when there are too many bytes of them. All of them can be made again.
+//! NAMES. `<owner>/factors/<cloud id>/<fit>`: `fit` is the hash of everything else that a factorization
+//! depends on.
+//!
+//! RETENTION. Factors are deleted with their cloud. The oldest are deleted when all together have too many
+//! bytes. Every factor can be recomputed.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -18,13 +22,14 @@ use super::{CloudId, Damaged, Objects, OwnerName, Unavailable, Verb};
 
 const FOLDER: &str = "factors";
 
-/// Bytes that a first line may have.
+/// Most bytes of a first line.
 const MAX_LINE: u64 = 4096;
 
-/// How a factor is written down; another version of the service may compute another one, or lay it out otherwise.
+/// Version of the format. Another version of the service may compute another factor, or lay it out
+/// differently.
 const FORMAT: &str = concat!("gramian factor 1 ", env!("CARGO_PKG_VERSION"));
 
-/// What is known of a factor beside its numbers, which are read back to the same bits.
+/// Facts about a factor beside its numbers. Floats are stored as bits, so they are read back exactly.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FactorHead {
     format: String,
@@ -33,7 +38,7 @@ pub struct FactorHead {
     reciprocal_condition: u64,
 }
 
-/// Which factor is meant.
+/// Identity of a factor.
 #[derive(Debug, Clone)]
 pub struct FactorName {
     pub owner: OwnerName,
@@ -42,12 +47,12 @@ pub struct FactorName {
     pub fit: String,
 }
 
-/// A factor that is there, as far as its first line.
+/// A factor in the store, read as far as its first line.
 pub struct FoundFactor {
     pub head: FactorHead,
     /// The first line.
     pub line: Bytes,
-    /// Of the object.
+    /// Size of the object in bytes.
     pub n_bytes: u64,
 }
 
@@ -67,7 +72,7 @@ impl FactorHead {
 }
 
 impl Objects {
-    /// Writes a factor, whole or not at all; says how many bytes that took.
+    /// Writes a factor atomically. Returns the bytes written.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -83,14 +88,14 @@ impl Objects {
         self.put_pieces(&self.factor(name), line.into(), pieces, &mut Room::unlimited()).await
     }
 
-    /// A factor, if it is there and of this version.
+    /// Finds a factor of this version.
     ///
     /// # Errors
     /// [`Unavailable`].
     pub async fn find_factor(&self, name: &FactorName) -> Result<Option<FoundFactor>, Unavailable> {
         let path = self.factor(name);
         let found = self.counted(Verb::Find, &path, self.store.head(&path).await)?;
-        // One without bytes has no range that could be read, and is written again.
+        // An empty object has no range that could be read. It counts as absent and is written again.
         let Some(ObjectMeta { size: n_bytes @ 1.., .. }) = found else { return Ok(None) };
         let Some(first) = self.factor_range(name, 0..MAX_LINE.min(n_bytes)).await? else { return Ok(None) };
         let head = first.iter().position(|&byte| byte == b'\n').and_then(|end| {
@@ -101,7 +106,7 @@ impl Objects {
         Ok(head.filter(|found| found.head.format == FORMAT))
     }
 
-    /// Some bytes of a factor, if it is still there.
+    /// Reads a range of bytes of a factor, if it still exists.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -114,7 +119,7 @@ impl Objects {
         self.counted(Verb::Read, &path, self.store.get_range(&path, range).await)
     }
 
-    /// Lets go of a factor that is not what was written.
+    /// Deletes a damaged factor.
     pub async fn drop_factor(&self, name: &FactorName, damaged: Damaged) {
         let path = self.factor(name);
         self.n_damaged.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
@@ -122,7 +127,7 @@ impl Objects {
         tracing::error!(object = %path, reason = damaged.0, is_gone, "a factor is damaged, and made again");
     }
 
-    /// Forgets all factors of a cloud.
+    /// Deletes all factors of a cloud.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -133,8 +138,8 @@ impl Objects {
         Ok(())
     }
 
-    /// Lets go of the factors of clouds that are not `there`, unless their writers may still be at them, and of the oldest until there are no
-    /// more bytes of them than may be; says how many there are.
+    /// Deletes factors of clouds that are not `there`, unless their writers may still be at work. Then
+    /// deletes the oldest until all have at most `most` bytes. Returns the bytes left.
     ///
     /// # Errors
     /// [`Unavailable`].

@@ -1,21 +1,21 @@
-//! What outlives the process: clouds as objects in a directory or in object storage.
+//! Objects that outlive the process: clouds, factors and jobs, in a directory or in object storage.
 //!
-//! NAMES. `<owner>/clouds/<cloud id>` is a cloud. The names and times of these objects are the list of
-//! clouds: see clouds.rs.
+//! NAMES. `<owner>/clouds/<cloud id>` is a cloud. The names and times of these objects are the list of clouds
+//! (clouds.rs).
 //!
-//! WRITES are whole or not at all: a file is written beside its name, flushed and then renamed; a bucket has an object when all of it has come. A
-//! cloud is written once: whoever comes second finds it.
+//! FACTORS are under `<owner>/factors/` and are deleted with their clouds (factors.rs).
 //!
-//! LEFT-OVERS of processes that were killed while they wrote a file, of deleted clouds and of jobs go by themselves: see retention.rs.
+//! JOBS are under `<owner>/jobs/`, `<owner>/open/` and `<owner>/claims/` (jobs/).
 //!
-//! FACTORS are under `<owner>/factors/`, see factors.rs, and go with their clouds.
+//! WRITES are atomic. A file is written under a temporary name, flushed and renamed. A bucket shows an object
+//! when all of it has arrived. A cloud is written once: a second writer finds it.
 //!
-//! JOBS are under `<owner>/jobs/`, `<owner>/open/` and `<owner>/claims/`: see jobs/.
+//! READS return exactly what was written, or nothing (cloud_object.rs). A damaged cloud is reported and moved
+//! to `damaged/`. It then no longer exists under its name and can be posted again.
 //!
-//! READS are of what was written, or of nothing: see cloud_object.rs. What is damaged is put aside, under `damaged/`, and reported; it is not there
-//! any more then, and can be posted again.
-//!
-//! WHAT GOES. Clouds beyond an age or a number of bytes: see retention.rs.
+//! RETENTION. A sweep deletes clouds beyond an age or a number of bytes. It also deletes left-overs of
+//! processes killed while writing a file, and of deleted clouds (retention.rs). Left-overs of jobs and claims
+//! are swept in jobs/.
 
 pub mod cloud_object;
 mod clouds;
@@ -46,12 +46,12 @@ pub use place::Place;
 pub use retention::{Retention, Swept};
 pub use tally::{Tally, Verb};
 
-/// Why an object is not what was written.
+/// Reason why an object is not what was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Damaged(pub &'static str);
 
-/// Why the store does not answer.
+/// A failed call to the store.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("the store failed to {verb} {name}: {reason}")]
 pub struct Unavailable {
@@ -60,14 +60,14 @@ pub struct Unavailable {
     reason: String,
 }
 
-/// How long a store may take to say whether it works, at the start.
+/// Time in which a store must show at the start that it works.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The store behind all memory.
+/// The store behind all caches in memory.
 pub struct Objects {
     store: Arc<dyn ObjectStore>,
     root: Path,
-    /// Where files are, if it is a directory.
+    /// Directory of the files, if the store is a directory.
     directory: Option<PathBuf>,
     /// Whether objects are kept in the memory of this process.
     in_memory: bool,
@@ -75,15 +75,15 @@ pub struct Objects {
     n_damaged: AtomicU64,
 }
 
-/// Whose objects are meant, by a name that outlives the order of keys in a configuration.
+/// Name of an owner of objects. It does not depend on the order of keys in a configuration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OwnerName(pub String);
 
 impl Objects {
-    /// Opens a place, and sees that it can be written to and read.
+    /// Opens a place, and checks that it can be written to and read.
     ///
     /// # Errors
-    /// Says what is wrong with it.
+    /// Returns what is wrong with the place.
     pub async fn open(
         place: &Place,
         variables: impl IntoIterator<Item = (String, String)>,
@@ -107,41 +107,41 @@ impl Objects {
         }
     }
 
-    /// A store in memory, as large as memory.
+    /// Creates a store in memory, limited only by memory.
     pub fn in_memory() -> Self {
         let memory = Arc::new(object_store::memory::InMemory::new());
         Self { in_memory: true, ..Self::over(memory, Path::default()) }
     }
 
-    /// A store of any kind, with what stands before all names.
+    /// Creates a store over any backend, with the prefix of all names.
     pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
         let store = Arc::new(Patient::new(store));
         let (tally, n_damaged) = (Tally::default(), AtomicU64::new(0));
         Self { store, root, directory: None, in_memory: false, tally, n_damaged }
     }
 
-    /// Whether objects are kept in the memory of this process alone.
+    /// Returns whether objects are kept in the memory of this process alone.
     pub fn in_memory_alone(&self) -> bool {
         self.in_memory
     }
 
-    /// What was asked of the store since the start.
+    /// Counts of calls to the store since the start.
     pub fn tally(&self) -> &Tally {
         &self.tally
     }
 
-    /// Objects that were not what was written.
+    /// Number of damaged objects found since the start.
     pub fn n_damaged(&self) -> u64 {
         self.n_damaged.load(Ordering::Relaxed)
     }
 
-    /// Counts an object that is not what was written.
+    /// Counts and logs a damaged object.
     fn report(&self, name: &Path, damaged: Damaged) {
         self.n_damaged.fetch_add(1, Ordering::Relaxed);
         tracing::error!(object = %name, reason = damaged.0, "an object is damaged");
     }
 
-    /// Says whether it was there, as far as the store tells: buckets do not.
+    /// Deletes an object. Returns whether it existed, as far as the store tells: buckets do not.
     async fn delete(&self, name: &Path) -> Result<bool, Unavailable> {
         Ok(self.counted(Verb::Delete, name, self.store.delete(name).await)?.is_some())
     }
@@ -153,7 +153,7 @@ impl Objects {
             .map_err(|error| self.failed(Verb::Write, name, error))
     }
 
-    /// Writes an object that is not there; says whether it was not.
+    /// Writes an object unless it exists. Returns whether it was written.
     async fn create(&self, name: &Path, payload: PutPayload) -> Result<bool, Unavailable> {
         match self.store.put_opts(name, payload, PutOptions::from(PutMode::Create)).await {
             Ok(_) => {
@@ -165,7 +165,7 @@ impl Objects {
         }
     }
 
-    /// What the store answered, nothing where there is no such object.
+    /// Counts an answer of the store. A missing object becomes `None`.
     fn counted<T>(
         &self,
         verb: Verb,

@@ -1,5 +1,5 @@
-//! A store whose calls have an end. The clients of buckets repeat what is not answered for minutes; whoever asks would hold place and memory
-//! for as long, until nobody else has any, although memory could answer.
+//! A store whose calls time out. Clients of buckets retry for minutes. A caller would hold its place and
+//! memory for as long, until nobody else has any, although memory could answer.
 
 use std::fmt;
 use std::ops::Range;
@@ -16,33 +16,33 @@ use object_store::{
     ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, RenameOptions, Result, UploadPart,
 };
 
-/// How long an answer may take that is not about bytes, and the next piece of one that is.
+/// Most time for an answer without bytes, and for each next piece of an answer with bytes.
 const ANSWERING: Duration = Duration::from_secs(5);
 
-/// Bytes that a store takes at least in the time after that.
+/// Least rate at which a store must take bytes beyond [`ANSWERING`].
 const BYTES_PER_SECOND: f64 = (4 << 20) as f64;
 
-/// A store that has failed where it takes too long.
+/// A store whose slow calls fail.
 #[derive(Debug, Clone)]
 pub(super) struct Patient {
     inner: Arc<dyn ObjectStore>,
     patience: Patience,
 }
 
-/// How long is waited.
+/// Time limits of calls.
 #[derive(Debug, Clone, Copy)]
 struct Patience {
     answering: Duration,
 }
 
 impl Patience {
-    /// What comes of a call, or an error where it takes longer than it may with so many bytes.
+    /// Returns the result of a call, or an error if it takes longer than allowed for `n_bytes`.
     async fn wait<T>(self, n_bytes: usize, call: impl Future<Output = Result<T>>) -> Result<T> {
         let most = self.answering + Duration::from_secs_f64(n_bytes as f64 / BYTES_PER_SECOND);
         tokio::time::timeout(most, call).await.unwrap_or_else(|_| Err(late(most)))
     }
 
-    /// Items that each come in time; nothing comes after one that does not.
+    /// Streams items, each of which must arrive in time. A late item becomes an error that ends the stream.
     fn each<T: 'static + Send>(self, items: BoxStream<'static, Result<T>>) -> BoxStream<'static, Result<T>> {
         let next = move |items: Option<BoxStream<'static, Result<T>>>| async move {
             let mut items = items?;
@@ -72,7 +72,8 @@ impl fmt::Display for Patient {
     }
 }
 
-// All of them: what the trait does by default, copying in place of renaming among it, is not what the store does.
+// Every method is forwarded. A default one would do something else than the inner store, such as copy instead
+// of rename.
 #[async_trait]
 #[deny(clippy::missing_trait_methods)]
 impl ObjectStore for Patient {
@@ -132,7 +133,7 @@ impl ObjectStore for Patient {
     }
 }
 
-/// An object that comes in parts.
+/// An upload in parts.
 #[derive(Debug)]
 struct PatientUpload {
     inner: Box<dyn MultipartUpload>,
@@ -149,7 +150,7 @@ impl MultipartUpload for PatientUpload {
         Box::pin(patience.wait(n_bytes, part))
     }
 
-    /// A directory has all of it on the disk only now.
+    /// Waits for all bytes of the upload, because a directory only now writes them to the disk.
     async fn complete(&mut self) -> Result<PutResult> {
         self.patience.wait(self.n_bytes, self.inner.complete()).await
     }

@@ -1,10 +1,11 @@
-//! Objects that are written and read piece by piece: a line of JSON, a body, and the BLAKE3 of both, 32 bytes.
+//! Objects written and read piece by piece: a line of JSON, a body, and the BLAKE3 of both, 32 bytes.
 //!
-//! WRITES are whole or not at all. READS end with the hash: who reads a body that is not what was written finds it broken off, and never whole.
+//! WRITES are atomic. READS end with a check of the hash: a damaged body breaks off and never appears
+//! complete.
 //!
-//! READERS get slices of what the store hands out, without copies. In memory these are slices of the object
-//! itself, which hold its [`Room`]. So a result is in memory once, however many clients read it, and stays
-//! paid for while it is read, even after its deletion.
+//! READERS get slices of what the store returns, without copies. In memory these are slices of the object
+//! itself, which hold its [`Room`]. So a result is in memory once, however many clients read it. Its bytes
+//! stay reserved while it is read, even after its deletion.
 
 use std::collections::VecDeque;
 use std::time::SystemTime;
@@ -18,22 +19,22 @@ use object_store::{Error, ObjectStoreExt, PutPayload, WriteMultipart};
 use super::room::Room;
 use super::{Damaged, Objects, Unavailable, Verb};
 
-/// Bytes of the hash behind everything.
+/// Bytes of the hash at the end of an object.
 pub const HASH_BYTES: usize = 32;
 
-/// Bytes that a first line may have.
+/// Most bytes of a first line.
 pub(super) const MAX_LINE: usize = 64 << 10;
 
-/// What has no more bytes is written at once, all else in parts.
+/// Objects up to this many bytes are written at once, larger ones in parts.
 const AT_ONCE: usize = 8 << 20;
 
-/// Parts that are on their way at once.
+/// Number of parts under way at once.
 const PARTS_UNDER_WAY: usize = 4;
 
-/// Bytes that a reader is given at a time: some 50 µs of hashing.
+/// Bytes handed to a reader at a time: some 50 µs of hashing.
 const PIECE: usize = 64 << 10;
 
-/// An object that is there, as far as its first line.
+/// An object in the store, read as far as its first line.
 pub struct Found {
     pub line: Bytes,
     pub written_at: SystemTime,
@@ -41,7 +42,7 @@ pub struct Found {
     pub body: BoxStream<'static, Result<Bytes, BrokenOff>>,
 }
 
-/// Why a body ends before its end.
+/// Reason why a body breaks off.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum BrokenOff {
     #[error("the store does not go on: {0}")]
@@ -51,9 +52,10 @@ pub enum BrokenOff {
 }
 
 impl Objects {
-    /// Writes an object within its room. Returns the number of its bytes. If the process ends meanwhile, a
-    /// directory keeps what was written under another name until the next sweep, and a bucket as parts of an
-    /// upload that was not completed.
+    /// Writes an object within its room. Returns its size in bytes.
+    ///
+    /// If the process ends meanwhile, a directory keeps the written part under another name until the next
+    /// sweep. A bucket keeps it as parts of an incomplete upload.
     ///
     /// # Errors
     /// [`Unavailable`], also if the pieces break off or exceed the room. [`Room::is_exceeded`] tells the
@@ -78,7 +80,7 @@ impl Objects {
             }
             (Err(reason), parts) => {
                 if let Some(parts) = parts {
-                    // What was begun takes room in the store.
+                    // An incomplete upload takes room in the store.
                     let _ = parts.abort().await;
                 }
                 Err(reason)
@@ -90,7 +92,8 @@ impl Objects {
         written.map_err(|reason| Unavailable { verb: Verb::Write, name: name.to_string(), reason })
     }
 
-    /// Sends what is more than is written at once, in parts; says how many bytes there are, and those that were held back.
+    /// Sends the pieces in parts once they exceed [`AT_ONCE`]. Returns the bytes of the object, and the
+    /// pieces not sent.
     async fn send(
         &self,
         name: &Path,
@@ -127,7 +130,7 @@ impl Objects {
             if is_last {
                 return Ok((n_bytes as u64, held));
             }
-            // However fast the store is, others have their turn.
+            // Other tasks run between pieces, however fast the store is.
             tokio::task::yield_now().await;
         }
     }
@@ -177,16 +180,16 @@ struct Pieces<'a, S> {
     room: &'a mut Room,
 }
 
-/// A short object as it is written: a line and its hash.
+/// Encodes a short object: a line and its hash.
 pub(super) fn sealed(line: Bytes) -> PutPayload {
     let hash = Bytes::copy_from_slice(blake3::hash(&line).as_bytes());
     [line, hash].into_iter().collect()
 }
 
-/// The line of a short object.
+/// Decodes the line of a short object.
 ///
 /// # Errors
-/// [`Damaged`] unless it is as it was written.
+/// [`Damaged`] unless the object is as it was written.
 pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], Damaged> {
     let end = bytes.len().checked_sub(HASH_BYTES).ok_or(Damaged("it ends too early"))?;
     let (line, hash) = bytes.split_at(end);
@@ -194,7 +197,7 @@ pub(super) fn unsealed(bytes: &[u8]) -> Result<&[u8], Damaged> {
     if is_whole { Ok(line) } else { Err(Damaged("its bytes are not those that were written")) }
 }
 
-/// Received bytes that were not handed on.
+/// Received bytes that are not handed out yet.
 #[derive(Default)]
 struct Unread {
     pieces: VecDeque<Bytes>,
@@ -207,7 +210,7 @@ impl Unread {
         self.pieces.push_back(piece);
     }
 
-    /// Takes a piece from the front, and leaves the last `n_last` bytes.
+    /// Takes a piece from the front. The last `n_last` bytes stay.
     fn pop_before_last(&mut self, n_last: usize) -> Option<Bytes> {
         let n_free = self.n_bytes.saturating_sub(n_last).min(PIECE);
         let front = self.pieces.front_mut().filter(|_| n_free > 0)?;
@@ -220,7 +223,7 @@ impl Unread {
     }
 }
 
-/// The state of a reader: a body with its hash behind it.
+/// State of a reader of a body with its hash at the end.
 struct Checked {
     hasher: blake3::Hasher,
     unread: Unread,
@@ -228,7 +231,7 @@ struct Checked {
 }
 
 impl Checked {
-    /// Returns the last bytes of the body if the hash is right.
+    /// Returns the last bytes of the body if the hash matches.
     fn end(mut self) -> Result<Bytes, BrokenOff> {
         let mut body = self.unread.pieces.iter().flatten().copied().collect::<Vec<u8>>();
         let hash = body.split_off(body.len().saturating_sub(HASH_BYTES));
@@ -238,7 +241,7 @@ impl Checked {
     }
 }
 
-/// Streams the body. Its last byte is held back until the hash is checked, so that a damaged body breaks off.
+/// Streams the body. Its last byte is held back until the hash is checked, so a damaged body breaks off.
 fn checked(state: Checked) -> impl Stream<Item = Result<Bytes, BrokenOff>> {
     futures_util::stream::unfold(Some(state), |state| async move {
         let mut state = state?;

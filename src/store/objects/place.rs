@@ -1,4 +1,4 @@
-//! Where objects are kept: a directory, or a bucket.
+//! Place of the objects: a directory or a bucket.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -41,11 +41,11 @@ impl FromStr for Place {
 }
 
 impl Place {
-    /// The store, and what stands before all names in it. Credentials and endpoints of buckets come from the variables that the tools
-    /// of their makers read.
+    /// Opens the store. Returns it with the prefix of all names in it. Credentials and endpoints of buckets
+    /// come from `variables`, under the names that the tools of their vendors read.
     ///
     /// # Errors
-    /// Says why it cannot be.
+    /// Returns what prevents it.
     pub(super) fn open(
         &self,
         variables: impl IntoIterator<Item = (String, String)>,
@@ -54,7 +54,8 @@ impl Place {
             Self::Directory(directory) => {
                 std::fs::create_dir_all(directory).map_err(|error| format!("cannot be made: {error}"))?;
                 let store = LocalFileSystem::new_with_prefix(directory).map_err(|error| error.to_string())?;
-                // An answer says that the cloud is there: also after the machine has lost its power. Folders go with what was last in them.
+                // An answer promises that the cloud is stored, even after a power failure: hence fsync. A
+                // folder is removed with its last file.
                 let store = store.with_fsync(true).with_automatic_cleanup(true);
                 Ok((Arc::new(store), Path::default()))
             }

@@ -1,4 +1,5 @@
-//! What goes by itself: clouds beyond an age or a number of bytes, oldest first of whoever has most, and what was damaged.
+//! Sweeps of the store. Clouds beyond an age or a number of bytes are deleted, the oldest first of the owner
+//! who holds most. Damaged objects are deleted after a week.
 
 use std::cmp::Reverse;
 use std::collections::{HashSet, VecDeque};
@@ -12,25 +13,25 @@ use super::clouds::FOLDER;
 use super::tally::Verb;
 use super::{CloudId, Listed, Objects, OwnerName, Unavailable};
 
-/// How long what is damaged is kept, for whoever wants to know why.
+/// Time for which damaged objects are kept for diagnosis.
 const DAMAGED: Duration = Duration::from_secs(7 * 24 * 3600);
 
-/// How long whoever writes something may be at it.
+/// Longest time that a writer may take to write an object.
 pub(super) const AT_WORK: Duration = Duration::from_secs(3600);
 
 /// A folder of drafts of this service before 0.1.0, which listed clouds by empty objects.
 const FORMER_LIST: &str = "listed";
 
-/// How long clouds are kept, and how much of them.
+/// Limits on the age and the bytes of stored clouds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Retention {
     pub age: Option<Duration>,
     pub n_bytes: Option<u64>,
-    /// Bytes of factors, which can be made again.
+    /// Most bytes of factors, which can be recomputed.
     pub n_factor_bytes: u64,
 }
 
-/// What is there, and what is not any more.
+/// Result of a sweep: what is left, and which clouds were deleted.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Swept {
     pub n_clouds: u64,
@@ -44,7 +45,7 @@ struct Kept {
     n_bytes: u64,
 }
 
-/// The clouds of an owner, the oldest first.
+/// Clouds of an owner, the oldest first.
 struct Holding {
     owner: OwnerName,
     clouds: VecDeque<Kept>,
@@ -69,8 +70,9 @@ impl Holding {
     }
 }
 
-/// The next cloud that is to go: one that is too old, or the oldest of who has most where there is too much, so that nobody loses what is
-/// within an equal share to another.
+/// Removes and returns the next cloud to delete, if any. First come clouds that are too old. Beyond the byte
+/// limit it is the oldest of the owner who holds most. So no owner loses clouds within an equal share to
+/// another.
 fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> Option<(OwnerName, Listed)> {
     let is_too_old = |cloud: &Kept| {
         let age = now.duration_since(cloud.listed.since).unwrap_or_default();
@@ -91,10 +93,10 @@ fn next_to_go(holdings: &mut [Holding], limits: Retention, now: SystemTime) -> O
 }
 
 impl Objects {
-    /// Deletes what is beyond the limits at a moment, and counts the rest.
+    /// Deletes what exceeds the limits at time `now`, and counts the rest.
     ///
     /// # Errors
-    /// [`Unavailable`]: what was to go is gone in part then.
+    /// [`Unavailable`]. Part of the deletions may then be done.
     pub async fn sweep(&self, limits: Retention, now: SystemTime) -> Result<Swept, Unavailable> {
         let mut holdings = Vec::new();
         for owner in self.owners().await? {
@@ -116,7 +118,7 @@ impl Objects {
         Ok(swept)
     }
 
-    /// Removes files that were begun, by processes that ended before they were whole: they have names that no list shows.
+    /// Removes unfinished files of processes that ended while writing. No list shows their names.
     async fn remove_half_written(&self, now: SystemTime) {
         let Some(directory) = self.directory.clone() else { return };
         let removed = tokio::task::spawn_blocking(move || remove_half_written(&directory, now)).await;
@@ -127,7 +129,7 @@ impl Objects {
         }
     }
 
-    /// All who have something in the store.
+    /// Owners of any object in the store.
     pub(super) async fn owners(&self) -> Result<Vec<OwnerName>, Unavailable> {
         let found = self.store.list_with_delimiter(Some(&self.root)).await;
         let found = self.counted(Verb::List, &self.root, found)?;
@@ -136,7 +138,7 @@ impl Objects {
         Ok(folders.filter_map(name).filter(|owner| owner.0 != "probe").collect())
     }
 
-    /// The clouds of an owner with their sizes.
+    /// Clouds of an owner with their sizes.
     async fn kept(&self, owner: &OwnerName) -> Result<Vec<Kept>, Unavailable> {
         let found = self.objects_in(owner, &[FOLDER]).await?;
         let kept = |object: &ObjectMeta| Some(Kept { listed: Listed::of(object)?, n_bytes: object.size });
@@ -171,7 +173,8 @@ impl Objects {
     }
 }
 
-/// Looks into all folders below this one; says how many files it removed. What cannot be read or removed has its turn next time.
+/// Removes unfinished files in this folder and all folders below. Returns their number. Files that cannot be
+/// read or removed are tried again in the next sweep.
 fn remove_half_written(directory: &Path, now: SystemTime) -> usize {
     let mut n_removed = 0;
     for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
@@ -189,7 +192,7 @@ fn remove_half_written(directory: &Path, now: SystemTime) -> usize {
     n_removed
 }
 
-/// As the library of the store names files until they are whole: with a number behind.
+/// Recognises the names that the `object_store` crate gives to unfinished files: a number after `#`.
 fn is_half_written(name: &str) -> bool {
     name.rsplit_once('#')
         .is_some_and(|(_, number)| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))

@@ -29,23 +29,23 @@ impl AsRef<[u8]> for Paid {
 }
 
 impl Room {
-    /// Room without a bound.
+    /// Creates room without a bound.
     pub fn unlimited() -> Self {
         Self { reservation: None, is_exceeded: false }
     }
 
-    /// Room for an object of `n_bytes` of an owner, if the budget has as many.
+    /// Reserves room for an object of `n_bytes`, if the owner may have so many bytes of the budget now.
     pub fn of(budget: &Budget, owner: Owner, n_bytes: usize) -> Option<Self> {
         let reservation = budget.try_reserve(owner, n_bytes.saturating_add(OVERHEAD))?;
         Some(Self { reservation: Some(reservation), is_exceeded: false })
     }
 
-    /// Whether an object was refused because it needed more.
+    /// Returns whether an object was refused because it needed more.
     pub fn is_exceeded(&self) -> bool {
         self.is_exceeded
     }
 
-    /// The reservation, unless an object in memory took it over.
+    /// Returns the reservation, unless an object in memory took it over.
     pub fn into_reservation(self) -> Option<Reservation> {
         self.reservation
     }

@@ -1,16 +1,16 @@
-//! What was asked of the store, and how often it failed.
+//! Counts of calls to the store and of their failures.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What a store is asked.
+/// A kind of call to the store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verb {
     Read,
     Write,
     List,
     Delete,
-    /// Whether an object is there.
+    /// Asks whether an object exists.
     Find,
 }
 
@@ -34,7 +34,7 @@ impl fmt::Display for Verb {
     }
 }
 
-/// Counts since the start, by verb: answered, failed.
+/// Counts of calls since the start, by verb: answered, failed.
 #[derive(Default)]
 pub struct Tally([[AtomicU64; 2]; Verb::ALL.len()]);
 
@@ -43,7 +43,7 @@ impl Tally {
         self.0[verb as usize][usize::from(!is_answered)].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often the store answered a verb, and how often it failed.
+    /// Returns how often the store answered a verb, and how often it failed.
     pub fn of(&self, verb: Verb) -> [u64; 2] {
         self.0[verb as usize].each_ref().map(|count| count.load(Ordering::Relaxed))
     }

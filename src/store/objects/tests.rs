@@ -29,7 +29,7 @@ async fn put(objects: &Objects, owner: &OwnerName, cloud: &Arc<RegisteredCloud>)
     objects.put_cloud(owner, cloud.id, pieces).await.unwrap()
 }
 
-/// Ids of a list behind a place of it, `n` of them at most, with the place of the last.
+/// Lists at most `n` ids after a place, and returns the place of the last.
 async fn listed(objects: &Objects, owner: &OwnerName, window: ListWindow) -> (Vec<CloudId>, Option<Listed>) {
     let (places, _) = objects.list_first(owner, window, HashMap::new()).await.unwrap();
     (places.iter().map(|place| place.id).collect(), places.last().copied())
@@ -39,7 +39,7 @@ async fn all_listed(objects: &Objects, owner: &OwnerName) -> Vec<CloudId> {
     listed(objects, owner, ListWindow { after: None, n: 99 }).await.0
 }
 
-/// Objects in a directory that goes with the test, whose times can be set.
+/// Objects in a temporary directory, whose times can be set.
 struct Dated {
     directory: PathBuf,
     objects: Objects,
@@ -72,7 +72,7 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     for cloud in &clouds {
         assert_eq!(put(&objects, &owner, cloud).await, Written::Now);
     }
-    // The same points at another time are the cloud that is there.
+    // The same points posted again are the cloud that exists already.
     let again = registered(2.0, 3);
     assert_eq!(put(&objects, &owner, &again).await, Written::Before(clouds[2].created_at()));
     let ids: Vec<_> = clouds.iter().map(|cloud| cloud.id).collect();
@@ -81,8 +81,8 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     assert_eq!(first, ids[..2]);
     assert_eq!(listed(&objects, &owner, ListWindow { after: second, n: 2 }).await.0, ids[2..4]);
     assert_eq!(listed(&objects, &owner, ListWindow { after: second, n: 9 }).await.0, ids[2..]);
-    // One that was taken to be in memory alone is where the store has it, and one that is has a place of its
-    // own.
+    // A cloud that was taken to be in memory alone keeps its place in the store. A cloud in memory alone has
+    // a place of its own.
     let alone = registered(9.0, 3).id;
     let since = SystemTime::UNIX_EPOCH;
     let unstored = [ids[4], alone].map(|id| (id, Listed { since, id }));
@@ -101,7 +101,7 @@ async fn clouds_are_written_once_read_listed_and_deleted() {
     assert_eq!(objects.heads(&owner, ids).await.unwrap().len(), 4);
     assert_eq!(objects.n_damaged(), 0);
     assert!(Verb::ALL.into_iter().all(|verb| objects.tally().of(verb)[1] == 0));
-    // Six of clouds, and one of factors with each deletion.
+    // Six lists of clouds, and one of factors with each deletion.
     assert_eq!(objects.tally().of(Verb::List), [8, 0]);
 }
 
@@ -138,19 +138,19 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     objects.put_aside(&owner, cloud.id, damaged).await;
     assert_eq!((objects.n_damaged(), objects.get_cloud(&owner, cloud.id).await.unwrap()), (1, None));
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
-    // Also where it is found on writing.
+    // Damage is also found when the cloud is written again.
     objects.store.put(&name, PutPayload::from_static(b"something else")).await.unwrap();
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     let bytes = objects.get_cloud(&owner, cloud.id).await.unwrap().unwrap();
     assert!(cloud_object::decode(cloud.id, &bytes).is_ok() && objects.n_damaged() == 2);
-    // Also where nothing is left of it: no store gives a range of that.
+    // An empty object is found too, although no store returns a range of it.
     objects.store.put(&name, PutPayload::new()).await.unwrap();
     assert!(objects.heads(&owner, vec![cloud.id]).await.unwrap()[0].1.is_err());
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Now);
     objects.store.put(&name, PutPayload::new()).await.unwrap();
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
     assert_eq!((put(&objects, &owner, &cloud).await, objects.n_damaged()), (Written::Now, 3));
-    // Also where it is in the points alone, or behind them.
+    // Damage in the points alone, or behind them, is found too.
     for at in [bytes.len() - 1, bytes.len() - 40] {
         let mut other = bytes.to_vec();
         other[at] ^= 1;
@@ -159,7 +159,7 @@ async fn what_is_damaged_is_put_aside_and_can_be_written_again() {
     }
     assert_eq!(put(&objects, &owner, &cloud).await, Written::Before(cloud.created_at()));
     assert_eq!((objects.n_damaged(), all_listed(&objects, &owner).await.len()), (5, 1));
-    // One that is whole again is left where it is, and what was put aside goes with it.
+    // A cloud that is intact again stays in place. Its damaged copy is deleted with it.
     objects.put_aside(&owner, cloud.id, CUT).await;
     assert_eq!(objects.n_damaged(), 5);
     assert!(objects.delete_cloud(&owner, cloud.id).await.unwrap());
@@ -178,13 +178,13 @@ async fn factors_go_with_their_clouds_whoever_wrote_them_last() {
         let pieces = [Bytes::from_static(b"numbers")].into_iter();
         objects.put_factor(&name_of(cloud), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
     }
-    // One without bytes is none, and can be written.
+    // An empty object is no factor, and can be written.
     objects.store.put(&objects.factor(&name_of(&kept)), PutPayload::new()).await.unwrap();
     assert!(objects.find_factor(&name_of(&kept)).await.unwrap().is_none());
     let pieces = [Bytes::from_static(b"numbers")].into_iter();
     objects.put_factor(&name_of(&kept), &FactorHead::new(2, 1.0, 1.0), pieces).await.unwrap();
     let limits = Retention { n_factor_bytes: 1 << 20, ..Retention::default() };
-    // Its writer may be at it: the cloud, too.
+    // At first its writer may still be at work, and its cloud may still be written.
     for (seconds, is_there) in [(0, true), (7200, false)] {
         let now = SystemTime::now() + Duration::from_secs(seconds);
         objects.sweep(limits, now).await.unwrap();
@@ -218,7 +218,7 @@ async fn the_oldest_clouds_go_by_age_and_by_bytes() {
     let clouds: Vec<_> = (0..6).map(|k| registered(f64::from(k), 3)).collect();
     let mut n_bytes = 0;
     for (k, cloud) in clouds.iter().enumerate() {
-        // A day between two of them, of two owners in turn; the last one is of today.
+        // Ages differ by a day, owners alternate, and the last cloud is of today.
         let since = now - Duration::from_secs(86400 * (5 - k as u64));
         n_bytes = cloud_object::encode(cloud.stored()).iter().map(|piece| piece.len() as u64).sum();
         dated.put_at([&one, &two][k % 2], cloud, since).await;
@@ -253,7 +253,7 @@ async fn who_has_most_makes_room() {
     let limits = Retention { age: None, n_bytes: Some(2 * n_bytes), n_factor_bytes: 0 };
     let gone = objects.sweep(limits, now).await.unwrap().gone;
     assert_eq!(gone, [1, 2, 3].map(|k| (greedy.clone(), clouds[k].id)));
-    // Where all have as much, it is the oldest of all.
+    // If all owners hold as much, the oldest cloud of all is deleted.
     let limits = Retention { n_bytes: Some(n_bytes), ..limits };
     assert_eq!(objects.sweep(limits, now).await.unwrap().gone, [(modest, clouds[0].id)]);
 }

@@ -4,6 +4,7 @@ use tokio::sync::oneshot;
 use super::*;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::model::Recipe;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::System;
@@ -20,7 +21,8 @@ fn key(alpha: f64) -> FitKey {
     let cloud = Cloud::new(vec![0.0, 1.0], 1).unwrap();
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let id = CloudId::of(&cloud, None);
-    FitKey::of(SolverKind::Dense, Owner(0), id, &kernel, &Regularization::Uniform(alpha), false)
+    let recipe = Recipe::of_values(SolverKind::Dense, kernel, Regularization::Uniform(alpha));
+    FitKey::of(Owner(0), id, &recipe, false)
 }
 
 async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'static str> {
@@ -29,7 +31,7 @@ async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'stati
     let factor = System::new(cloud, kernel, Regularization::Uniform(1.0))
         .and_then(|system| Solver::dense(system, &Unobserved))
         .unwrap();
-    Ok(PreparedFit::new(factor, Duration::ZERO, Duration::ZERO, memory))
+    Ok(PreparedFit::new(Model::System(Arc::new(factor)), Duration::ZERO, Duration::ZERO, memory))
 }
 
 async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
@@ -97,7 +99,7 @@ async fn what_is_kept_makes_room_for_work_unless_it_is_in_use() {
     drop(work);
 }
 
-/// Work that runs elsewhere, as on a pool: it is told to stop, but takes its time.
+/// Returns work that runs elsewhere, as on a pool: it is told to stop, but takes its time.
 fn working<V>(
     ended: oneshot::Receiver<()>,
 ) -> impl FnOnce(Reservation) -> BoxFuture<'static, Result<V, &'static str>> {

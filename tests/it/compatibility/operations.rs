@@ -1,4 +1,4 @@
-//! The rules for operations: what is called by whom, and what comes back.
+//! Rules for operations: names, security, parameters, bodies and responses.
 
 use serde_json::Value;
 
@@ -21,7 +21,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Generated code names its types after the components.
+    /// Compares the names of components, after which generated code names its types.
     pub fn compare_component_names(&mut self) {
         let (released, current) = (self.released, self.current);
         for (name, _) in members(&released["components"]["schemas"]) {
@@ -39,7 +39,8 @@ impl Comparison<'_> {
         self.compare_responses(pointer, old, new);
     }
 
-    /// Generated code names its functions after the operation id, and its modules after the tags.
+    /// Compares the operation id, after which generated code names its functions, and the tags, which name
+    /// its modules.
     fn compare_names(&mut self, pointer: &str, old: &Value, new: &Value) {
         for name in ["operationId", "tags"] {
             if old[name] != new[name] {
@@ -48,7 +49,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Whoever was let in still is.
+    /// Checks that every credential that was sufficient still is.
     fn compare_security(&mut self, pointer: &str, old: &Value, new: &Value) {
         let (old, new) = (ways_in(self.released, old), ways_in(self.current, new));
         for way in old.iter().filter(|way| !new.contains(way)) {
@@ -93,7 +94,8 @@ impl Comparison<'_> {
         self.compare_content(Direction::Request, &pointer, old, new);
     }
 
-    /// Clients treat statuses from 400 that they do not know as the first of their hundred; others they cannot guess.
+    /// Compares the statuses. A new status from 400 on is compatible: clients treat an unknown one as the
+    /// first of its hundred. Any other new status is breaking.
     fn compare_responses(&mut self, pointer: &str, old: &Value, new: &Value) {
         let pointer = below(pointer, "responses");
         let (old, new) = (&old["responses"], &new["responses"]);
@@ -134,7 +136,8 @@ impl Comparison<'_> {
         self.compare_schema(Direction::Answer, &below(&pointer, "schema"), &old["schema"], &new["schema"]);
     }
 
-    /// Media types may come, since clients ask for them.
+    /// Compares bodies by media type. New media types are compatible, since clients ask for the one they
+    /// want.
     fn compare_content(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         for (media_type, content) in members(&old["content"]) {
             let pointer = below(&below(pointer, "content"), media_type);
@@ -149,7 +152,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// The types of the problems that a response may be, which clients decide by, are the names of its examples.
+    /// Compares the types of problems, by which clients decide. They are the names of the examples of a
+    /// response.
     fn compare_problems(&mut self, pointer: &str, old: &Value, new: &Value) {
         for (slug, _) in members(&old["examples"]) {
             if new["examples"].get(slug).is_none() {
@@ -159,13 +163,14 @@ impl Comparison<'_> {
     }
 }
 
-/// The parameters of an operation, references followed.
+/// Returns the parameters of an operation, with references resolved.
 fn parameters(document: &Value, operation: &Value) -> Vec<Value> {
     let listed = operation["parameters"].as_array().into_iter().flatten();
     listed.map(|parameter| followed(document, "", parameter).1.clone()).collect()
 }
 
-/// The alternatives of an operation's security, its own or the document's; none declared is one that everyone has.
+/// Returns the alternatives of an operation's security, its own or the document's default. If neither is
+/// declared, the one alternative is the empty one, which everybody satisfies.
 fn ways_in(document: &Value, operation: &Value) -> Vec<Value> {
     let declared = operation["security"].as_array().or(document["security"].as_array());
     declared.cloned().unwrap_or_else(|| vec![serde_json::json!({})])

@@ -1,4 +1,4 @@
-//! The rules for schemas, each for both directions.
+//! Rules for schemas, each for requests and for answers.
 
 use std::collections::BTreeSet;
 
@@ -6,21 +6,22 @@ use serde_json::Value;
 
 use super::{Comparison, below, members};
 
-/// Who writes the value: what a client writes must still be read, what the service writes must still be understood.
+/// Direction of a value. The service must still read what clients write, and clients must still understand
+/// the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Direction {
     Request,
     Answer,
 }
 
-/// Says nothing about values.
+/// Keywords that do not restrict values.
 const ANNOTATIONS: [&str; 8] =
     ["description", "title", "example", "examples", "deprecated", "externalDocs", "$comment", "$ref"];
 
-/// Compared by a rule of their own.
+/// Keywords with their own rule.
 const RULED: [&str; 8] = ["type", "enum", "properties", "required", "items", "allOf", "anyOf", "oneOf"];
 
-/// Bounds from below, where more is stricter, and from above, where less is.
+/// Lower bounds, where a larger value is stricter, and upper bounds, where a smaller one is.
 const LOWER_BOUNDS: [&str; 5] = ["minimum", "exclusiveMinimum", "minItems", "minLength", "minProperties"];
 const UPPER_BOUNDS: [&str; 5] = ["maximum", "exclusiveMaximum", "maxItems", "maxLength", "maxProperties"];
 
@@ -28,12 +29,13 @@ impl Comparison<'_> {
     pub fn compare_schema(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         let are_references = old.get("$ref").is_some() && new.get("$ref").is_some();
         if are_references {
-            // What stands beside the references.
+            // Keywords may stand beside the references.
             self.compare_keywords(direction, pointer, old, new);
         }
         let (old_at, old) = followed(self.released, pointer, old);
         let (new_at, new) = followed(self.current, pointer, new);
-        // Every cycle goes through references in both documents. What is written out in one ends there.
+        // Every cycle passes through references in both documents, so recursion ends here. A schema written
+        // inline in one of them is finite.
         if are_references && !self.compared.insert((direction, old_at.clone(), new_at)) {
             return;
         }
@@ -76,7 +78,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Members may come: requests need not have them, clients pass over them.
+    /// Compares the members of objects. New members are compatible: requests need not have them, and clients
+    /// ignore them.
     fn compare_members(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         for (name, old) in members(&old["properties"]) {
             let pointer = below(&below(pointer, "properties"), name);
@@ -106,7 +109,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Compositions keep their parts, in their order.
+    /// Compares compositions, which must keep their parts in order.
     fn compare_parts(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         for keyword in ["allOf", "anyOf", "oneOf"] {
             let pointer = below(pointer, keyword);
@@ -121,7 +124,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Bounds of requests may be loosened, bounds of answers tightened.
+    /// Compares bounds. Bounds of requests may be loosened, bounds of answers tightened.
     fn compare_bounds(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         for (keywords, sign) in [(LOWER_BOUNDS, 1.0), (UPPER_BOUNDS, -1.0)] {
             for keyword in keywords {
@@ -136,7 +139,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Anything else must stay as it is, or be a restriction that requests lose or answers gain.
+    /// Compares all other keywords. Each must stay as it is, unless it is a restriction that requests lose or
+    /// answers gain.
     fn compare_other_keywords(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         let is_known = |name: &str| {
             [&ANNOTATIONS[..], &RULED, &LOWER_BOUNDS, &UPPER_BOUNDS].concat().contains(&name)
@@ -145,7 +149,7 @@ impl Comparison<'_> {
         let names: BTreeSet<_> = members(old).chain(members(new)).map(|(name, _)| name).collect();
         for name in names.into_iter().filter(|name| !is_known(name)) {
             let (written, read) = direction.written_and_read(old.get(name), new.get(name));
-            // A default is no restriction: it says what the absence of a member means.
+            // A default is no restriction. It defines what the absence of a member means.
             let is_lifted = read.is_none() && name != "default";
             if written != read && !is_lifted {
                 let show = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
@@ -155,7 +159,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Without a schema of its own an item may be anything.
+    /// Compares the schemas of items. A missing schema allows any item.
     fn compare_items(&mut self, direction: Direction, pointer: &str, old: &Value, new: &Value) {
         let (old, new) = (old.get("items"), new.get("items"));
         if old.is_none() && new.is_none() {
@@ -168,7 +172,8 @@ impl Comparison<'_> {
 }
 
 impl Direction {
-    /// What is written must be part of what is read: requests are written as released, answers as now.
+    /// Orders two values as (written, read). Everything written must be allowed by the reader: clients write
+    /// requests as released, and the service writes answers as now.
     fn written_and_read<T>(self, released: T, current: T) -> (T, T) {
         match self {
             Self::Request => (released, current),
@@ -184,7 +189,7 @@ impl Direction {
     }
 }
 
-/// The types that a schema admits; none said, any admitted.
+/// Returns the types that a schema admits. Empty if it admits any.
 fn types(schema: &Value) -> BTreeSet<String> {
     let one_or_many = match &schema["type"] {
         Value::Array(many) => many.as_slice(),
@@ -193,7 +198,7 @@ fn types(schema: &Value) -> BTreeSet<String> {
     one_or_many.iter().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
-/// What a reference refers to, or the value itself, with its place.
+/// Returns the target of a reference, or the value itself, with its pointer.
 pub fn followed<'a>(document: &'a Value, pointer: &str, value: &'a Value) -> (String, &'a Value) {
     let Some(target) = value["$ref"].as_str().and_then(|target| target.strip_prefix('#')) else {
         return (pointer.to_owned(), value);

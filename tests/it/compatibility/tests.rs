@@ -1,4 +1,4 @@
-//! Each rule by a change of the document that must be found, or must not.
+//! Tests of the rules: each by a change of the document that must be reported, or must not.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ const OPERATION: &str = "/paths/~1v1~1curvatures/post";
 const REQUEST: &str = "/components/schemas/CurvaturesRequest";
 const ANSWER: &str = "/components/schemas/CurvaturesResponse";
 
-/// The pointers of what is broken by a change.
+/// Returns the pointers of the breaking changes that `change` makes to the document.
 fn broken(change: impl FnOnce(&mut Value)) -> Vec<String> {
     let (released, mut current) = (document(), document());
     change(&mut current);
@@ -17,7 +17,7 @@ fn broken(change: impl FnOnce(&mut Value)) -> Vec<String> {
     breaking_changes(&released, &current).into_iter().map(|change| change.pointer).collect()
 }
 
-/// The part of a document at a pointer.
+/// Returns the part of a document at a pointer.
 fn at<'a>(document: &'a mut Value, pointer: &str) -> &'a mut Value {
     document.pointer_mut(pointer).unwrap_or_else(|| panic!("no {pointer}"))
 }
@@ -32,16 +32,17 @@ fn remove(pointer: &str, name: &str) -> Vec<String> {
     })
 }
 
-/// Adds to an array, or takes an entry out.
+/// Returns the pointers broken by adding `value` to the array at `pointer`.
 fn push(pointer: &str, value: Value) -> Vec<String> {
     broken(|document| at(document, pointer).as_array_mut().unwrap().push(value))
 }
 
+/// Returns the pointers broken by removing `value` from the array at `pointer`.
 fn take(pointer: &str, value: &str) -> Vec<String> {
     broken(|document| at(document, pointer).as_array_mut().unwrap().retain(|item| item != value))
 }
 
-/// The pointers of what is broken where a value was released as one and is now another.
+/// Returns the pointers broken if the value at `pointer` was `released` and is now `current`.
 fn became(pointer: &str, released: Value, current: Value) -> Vec<String> {
     let [released, current] = [released, current].map(|value| {
         let mut document = document();
@@ -147,7 +148,7 @@ fn a_header_that_was_promised_is_required() {
     assert_eq!(became(header, sometimes(), always()), NOTHING);
     let number = json!({"schema": {"type": "integer"}});
     assert_eq!(became(header, sometimes(), number), [format!("{header}/schema/type")]);
-    // A component is named once, however many answers have it.
+    // A change of a shared component is reported once, however many answers use it.
     let shared = "/components/headers/X-Request-Id/schema";
     assert_eq!(set(shared, "type", json!("integer")), [format!("{shared}/type")]);
 }
@@ -161,7 +162,7 @@ fn members_of_answers_stay_and_may_grow() {
     assert_eq!(push(&required, json!("radii")), NOTHING);
     let curvatures = property(ANSWER, "mean_curvatures");
     assert_eq!(set(&curvatures, "type", json!("object")), [format!("{curvatures}/type")]);
-    // A null where there was none.
+    // A value becomes nullable.
     let norms = format!("{}/items", property(ANSWER, "gradient_norms"));
     assert_eq!(set(&norms, "type", json!(["number", "null"])), [format!("{norms}/type")]);
     assert_eq!(set(&format!("{curvatures}/items"), "type", json!("number")), NOTHING);
@@ -212,13 +213,13 @@ fn a_value_of_a_request_is_still_accepted() {
     assert_eq!(became(&nu, json!({"type": "number"}), json!({"type": ["number", "string"]})), NOTHING);
     assert_eq!(became(&nu, json!({}), json!({"enum": [0.5, 1.5]})), [format!("{nu}/enum")]);
     assert_eq!(became(&nu, json!({"enum": [0.5, 1.5]}), json!({})), NOTHING);
-    // What the absence of a member means is part of its meaning.
+    // A default defines what an absent member means, so changing it is breaking.
     let defaults = [2.5, 1.5].map(|value| number("default", json!(value)));
     let [released, current] = defaults;
     assert_eq!(became(&nu, released, current), [format!("{nu}/default")]);
 }
 
-/// What stands inside of a component is compared wherever it is used in the place of another one.
+/// Follows a reference that now names another component. The change inside that component must be found.
 #[test]
 fn a_reference_may_not_change_what_it_means() {
     let (diagnostics, answer) = ("/components/schemas/Diagnostics", "/components/schemas/PosteriorResponse");
@@ -239,7 +240,7 @@ fn types_of_problems_stay() {
     assert_eq!(set(&examples, "cloud-too-flat", json!({})), NOTHING);
 }
 
-/// A component of both directions may neither grow nor shrink.
+/// Checks a component of both requests and answers, which may neither grow nor shrink.
 #[test]
 fn what_is_both_sent_and_answered_stays_as_it_is() {
     let families = "/components/schemas/KernelFamily/enum";
@@ -270,7 +271,7 @@ fn additions_and_words_are_compatible() {
         NOTHING
     );
     assert_eq!(set("/components/schemas", "Spectrum", json!({"type": "object"})), NOTHING);
-    // The same schema, written where it is used.
+    // The same schema, written inline where it is used.
     let inline = broken(|document| {
         let schema = at(document, "/components/schemas/SurfaceUsed").clone();
         *at(document, &format!("{}/items", property(ANSWER, "surfaces"))) = schema;

@@ -1,11 +1,11 @@
-//! An answer as it came over the socket.
+//! An answer as received from the socket.
 
 use std::io::Read;
 
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 use serde_json::Value;
 
-/// An answer, read to its end; the body as it was sent, compressed or not.
+/// An answer, read to its end. The body is as it was sent, compressed or not.
 #[derive(Clone)]
 pub struct Received {
     pub status: u16,
@@ -14,7 +14,7 @@ pub struct Received {
 }
 
 impl Received {
-    /// An answer of HTTP/1.1 as read from a socket, with a body that is neither chunked nor compressed.
+    /// Parses an HTTP/1.1 answer whose body is neither chunked nor compressed.
     pub fn parse(text: &str) -> Self {
         let (head, body) = text.split_once("\r\n\r\n").unwrap();
         let (first, fields) = head.split_once("\r\n").unwrap();
@@ -39,7 +39,7 @@ impl Received {
         self.header("content-type").split(';').next().unwrap().trim().to_ascii_lowercase()
     }
 
-    /// The body as JSON, decompressed; nothing if it is none.
+    /// Returns the decompressed body as JSON, or `None` if it is not JSON.
     pub fn json(&self) -> Option<Value> {
         match self.header("content-encoding") {
             "" => serde_json::from_slice(&self.bytes).ok(),
@@ -53,7 +53,7 @@ pub fn decompressed(coding: &str, bytes: &[u8]) -> Vec<u8> {
         return zstd::decode_all(bytes).unwrap();
     }
     let mut plain = Vec::new();
-    // One member, as browsers read no others.
+    // Reads a single gzip member, as browsers read only the first.
     let mut decoder = flate2::bufread::GzDecoder::new(bytes);
     decoder.read_to_end(&mut plain).unwrap();
     assert!(decoder.into_inner().is_empty());

@@ -1,4 +1,4 @@
-//! The document, made ready to check answers: paths as templates, schemas compiled.
+//! The OpenAPI document, prepared for checking answers: paths as templates, schemas compiled.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::closed::{close_parts, closed};
 
 pub struct Contract {
     paths: Vec<Path>,
-    /// The form that every problem has.
+    /// Schema of every problem.
     pub problem: Arc<Validator>,
 }
 
@@ -20,16 +20,16 @@ struct Path {
     operations: BTreeMap<String, Operation>,
 }
 
-/// What an operation may answer, by status.
+/// The declared answers of an operation, by status.
 pub type Operation = BTreeMap<String, Response>;
 
 #[derive(Default)]
 pub struct Response {
-    /// By media type.
+    /// Schemas of bodies by media type.
     pub content: BTreeMap<String, Arc<Validator>>,
-    /// By name in lower case.
+    /// Headers by name in lower case.
     pub headers: BTreeMap<String, Header>,
-    /// The slugs of the problems that it may be.
+    /// Slugs of the declared problems.
     pub problems: BTreeSet<String>,
 }
 
@@ -38,10 +38,10 @@ pub struct Header {
     pub schema: Arc<Validator>,
 }
 
-/// Where the document has a request.
+/// The result of looking up a request in the document.
 pub enum Served<'a> {
     By(&'a Operation),
-    /// The path has other methods, these.
+    /// The path exists, with these methods instead.
     OtherMethods(Vec<String>),
     Nowhere,
 }
@@ -57,14 +57,14 @@ impl Contract {
         Self { paths: paths.collect(), problem }
     }
 
-    /// The operation for a request. A path without parameters goes before one with.
+    /// Finds the operation for a request. A literal path takes precedence over one with parameters.
     pub fn find(&self, method: &str, path: &str) -> Served<'_> {
         let literal = self.paths.iter().find(|known| known.template == path);
         let Some(known) = literal.or_else(|| self.paths.iter().find(|known| fits(&known.template, path)))
         else {
             return Served::Nowhere;
         };
-        // HEAD is GET without its body, wherever it is not an operation of its own.
+        // HEAD is GET without its body, unless it is an operation itself.
         let by_get = || known.operations.get("GET").filter(|_| method == "HEAD");
         match known.operations.get(method).or_else(by_get) {
             Some(operation) => Served::By(operation),
@@ -74,7 +74,7 @@ impl Contract {
 }
 
 impl Path {
-    /// All methods of the path, sorted.
+    /// Returns all methods of the path, sorted.
     fn methods(&self) -> Vec<String> {
         let mut methods: Vec<_> = self.operations.keys().cloned().collect();
         if self.operations.contains_key("GET") && !self.operations.contains_key("HEAD") {
@@ -85,7 +85,7 @@ impl Path {
     }
 }
 
-/// A parameter stands for one segment that is not empty.
+/// Checks whether a path matches a template. A parameter matches one non-empty segment.
 fn fits(template: &str, path: &str) -> bool {
     let (template, path): (Vec<_>, Vec<_>) = (template.split('/').collect(), path.split('/').collect());
     let is_same = |(known, found): (&&str, &&str)| {
@@ -105,7 +105,7 @@ impl<'a> Schemas<'a> {
     fn new(document: &'a Value) -> Self {
         let mut components = document["components"].clone();
         for schema in components["schemas"].as_object_mut().unwrap().values_mut() {
-            // Where a component is used, it is closed; there it may be a part of a composition.
+            // A component is closed where it is used, because there it may be a part of a composition.
             close_parts(schema);
         }
         Self { document, components, compiled: HashMap::new() }
@@ -135,7 +135,7 @@ impl<'a> Schemas<'a> {
         Response { content, headers, problems: problems.map(|(slug, _)| slug.clone()).collect() }
     }
 
-    /// What a response or header refers to, or itself.
+    /// Returns the target of a reference to a response or header, or the value itself.
     fn resolve(&self, value: &'a Value) -> &'a Value {
         let target = value["$ref"].as_str().and_then(|target| target.strip_prefix('#'));
         target.map_or(value, |target| self.document.pointer(target).unwrap())
@@ -145,7 +145,8 @@ impl<'a> Schemas<'a> {
         if let Some(validator) = self.compiled.get(&schema.to_string()) {
             return validator.clone();
         }
-        // The components stand where the references of the document look for them. Without a schema, anything goes.
+        // The components are placed where the document's references point. Without a schema, anything is
+        // valid.
         let mut used = if schema.is_null() { Value::Bool(true) } else { schema.clone() };
         closed(&mut used);
         let root = serde_json::json!({"allOf": [used], "components": self.components});
@@ -156,7 +157,7 @@ impl<'a> Schemas<'a> {
     }
 }
 
-/// The members of an object; none of anything else.
+/// Iterates over the members of an object. Empty for any other value.
 fn members(value: &Value) -> impl Iterator<Item = (&String, &Value)> {
     value.as_object().into_iter().flat_map(Map::iter)
 }

@@ -1,4 +1,4 @@
-//! The checker finds what is wrong: answers of the service pass, and fail once one thing about them is changed.
+//! Tests of the checker: answers of the service pass, and fail once one thing about them is changed.
 
 use reqwest::header::HeaderValue;
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use crate::support::{Server, document, receive};
 
 const PATH: &str = "/v1/curvatures";
 
-/// A request to its right answer, and what the checker says once the answer is changed.
+/// A request with its correct answer, which the tests then alter.
 struct Case {
     contract: Contract,
     method: &'static str,
@@ -56,7 +56,7 @@ fn set(answer: &mut Received, name: &'static str, value: &'static str) {
 async fn a_body_of_another_form_is_found() {
     let case = Case::of("POST", PATH, &route_of(PATH).request()).await;
     case.finds_in_body("body/mean_curvatures/0", |body| body["mean_curvatures"][0] = json!("1"));
-    // Null stands for a whole entry only.
+    // Null may only replace a whole entry.
     case.finds_in_body("body/normals/0", |body| body["normals"][0] = json!([null, null, null]));
     case.finds_in_body("body/surfaces/1", |body| body["surfaces"][1] = json!("plane"));
     case.finds_in_body("body/diagnostics/rank", |body| body["diagnostics"]["rank"] = json!(-1));
@@ -146,7 +146,7 @@ async fn what_the_document_does_not_have_is_refused_as_such() {
     }
 }
 
-/// Schemas that are none would be passed over by validators.
+/// Validates the schemas themselves, since validators would ignore an invalid one.
 #[test]
 fn every_component_is_a_schema() {
     for (name, schema) in document()["components"]["schemas"].as_object().unwrap() {

@@ -1,4 +1,4 @@
-//! The neighbourhoods of several queries side by side, one in each lane.
+//! Batches: the neighbourhoods of several queries side by side, one in each lane.
 
 use super::parts::{COLUMNS, Parts};
 use super::quantities::Sized;
@@ -8,36 +8,39 @@ use crate::points::neighbours::{Neighbour, on_grid};
 use crate::solver::System;
 use crate::solver::trend::Basis;
 
-/// The nearest points of a few queries, as many for each.
+/// The nearest points of a few queries, equally many for each.
 pub(super) struct Batch {
     pub dimension: usize,
-    /// Points of a neighbourhood.
+    /// Points per neighbourhood.
     pub count: usize,
     lanes: usize,
-    /// From the nearest point to each of the others as the kernel stretches it, `[d, places, lanes]`, unit L:
-    /// differences are what distances are made of, and from a query far away all of them would be the same.
+    /// Differences of the points from the nearest one, stretched by the kernel: `[d, places, lanes]`, unit L.
     ///
-    /// Differences are rounded to the grid of the neighbours, so that no square of one is subnormal. The step of the
-    /// grid is 1e-14 of the shortest length scale that a kernel takes.
+    /// Distances are made of differences. Taken from a distant query, the differences of all points would
+    /// round to the same.
+    ///
+    /// They are rounded to the grid of the neighbour search, so that none has a subnormal square. The step of
+    /// the grid is 1e-14 of the shortest length scale that a kernel takes.
     pub points: Vec<f64>,
-    /// From the nearest point to the query, likewise, `[d, lanes]`.
+    /// Difference of the query from the nearest point, stretched and rounded like `points`: `[d, lanes]`,
+    /// unit L.
     pub query: Vec<f64>,
-    /// `[places, lanes]`, unit V; 0 in places that are left empty.
+    /// Values without their mean, `[places, lanes]`, unit V; 0 in empty places.
     pub values: Vec<f64>,
-    /// `[places, lanes]`, unit V².
+    /// Variances of the noise, `[places, lanes]`, unit V²; 0 in empty places.
     pub noise: Vec<f64>,
     /// The functions of the mean at the points, `[p, places, lanes]`.
     pub functions: Vec<f64>,
-    /// Coefficients of functionals on derivatives in units of ℓ, `[functionals, derivatives, lanes]`.
+    /// Coefficients of the functionals on derivatives in units of ℓ, `[functionals, derivatives, lanes]`.
     pub functionals: Vec<f64>,
 }
 
-/// What is known at the points of a cloud.
+/// Observations at the points of a cloud.
 pub(super) struct Observations<'a> {
     pub system: &'a System,
-    /// Without their mean, `[n]`, unit V.
+    /// Values without their mean, `[n]`, unit V.
     pub values: &'a [f64],
-    /// The functions of the mean, if its coefficients are not known exactly.
+    /// The functions of the mean, if its coefficients are uncertain.
     pub basis: Option<&'a Basis>,
 }
 
@@ -64,12 +67,12 @@ impl Batch {
         }
     }
 
-    /// Places for points, of which the last few may be left empty.
+    /// Places for points per lane, a multiple of [`COLUMNS`]. The last few may stay empty.
     pub(super) fn n_places(&self) -> usize {
         self.count.next_multiple_of(COLUMNS)
     }
 
-    /// Puts a query with its nearest points, the nearest one first, into a lane.
+    /// Writes a query and its nearest points, nearest first, into a lane.
     pub(super) fn put(
         &mut self,
         lane: usize,
@@ -99,14 +102,14 @@ impl Batch {
         }
     }
 
-    /// Puts the functionals of a query into a lane.
+    /// Writes the functionals of a query into a lane.
     pub(super) fn put_functionals(&mut self, lane: usize, functionals: &[Sized], kernel: &Kernel) {
         let coefficients = functionals.iter().flat_map(|functional| functional.coefficients(kernel));
         let slots = self.functionals[lane..].iter_mut().step_by(self.lanes);
         slots.zip(coefficients).for_each(|(slot, coefficient)| *slot = coefficient);
     }
 
-    /// Fills an unused lane with what another has, so that it takes no exceptions.
+    /// Copies a lane into an unused one, so that unused lanes need no special cases.
     pub(super) fn copy_lane(&mut self, from: usize, to: usize) {
         let lanes = self.lanes;
         let Self { points, query, values, noise, functions, functionals, .. } = self;

@@ -1,4 +1,4 @@
-//! Local kriging of means of near points, whose neighbourhoods reach further at the same cost.
+//! Local kriging of means of near points. Their neighbourhoods reach further at the same cost.
 
 use std::sync::Arc;
 
@@ -17,16 +17,18 @@ use crate::solver::choose::NEIGHBOURS;
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 
-/// Points of a mean, from one size to the next: neighbourhoods of surfaces reach twice as far.
+/// Growth of the number of points per mean from one size to the next.
+///
+/// On a surface, neighbourhoods then reach twice as far.
 const FACTOR: usize = 4;
 
-/// Queries at which sizes are compared.
+/// Queries at which sizes are compared, at most.
 const COMPARED: usize = 32;
 
-/// The share of the deviations of derivatives that means of a size have to leave, for larger ones to be tried.
+/// Ratio of deviations of derivatives from one size to the next, up to which larger means are kept.
 const SURER: f64 = 0.95;
 
-/// Means of near points, kriged around each query.
+/// Local kriging of means of near points, one mean for each cell.
 pub struct Coarse {
     cells: Cells,
     moving: Moving,
@@ -38,7 +40,7 @@ impl Coarse {
         &self.moving
     }
 
-    /// The mean of the values `[n]` of each cell.
+    /// Returns the mean of the values `[n]` in each cell.
     pub fn means(&self, values: &[f64]) -> Vec<f64> {
         let mean =
             |cell: &[u32]| cell.iter().map(|&point| values[point as usize]).sum::<f64>() / cell.len() as f64;
@@ -47,14 +49,17 @@ impl Coarse {
 }
 
 impl Moving {
-    /// Means of the points in which derivatives up to an order are surer at some queries than in the points themselves, if there are such.
+    /// Returns the means of points that give derivatives with smaller deviations than the points themselves.
     ///
-    /// The nearest points of a dense cloud with noise lie so close together that their differences are noise: deviations of derivatives
-    /// fall with the reach of a neighbourhood until the field bends within one mean. Sizes grow fourfold for as long as the
-    /// deviations fall.
+    /// The comparison takes derivatives of order `order` at a sample of the queries. Returns `None` if no
+    /// size is better, or if the kernel's process has no second derivatives.
+    ///
+    /// The nearest points of a dense noisy cloud lie so close together that their differences are noise.
+    /// Deviations of derivatives therefore fall as a neighbourhood reaches further, until the field bends
+    /// within one mean. Sizes grow fourfold as long as the deviations fall.
     ///
     /// # Errors
-    /// Those of [`Moving::at`].
+    /// Returns the errors of [`Moving::at`].
     pub fn surest(
         &self,
         queries: &Cloud,
@@ -79,10 +84,11 @@ impl Moving {
         Ok(surest)
     }
 
-    /// Means of cells of at most `size` points.
+    /// Averages cells of at most `size` points.
     ///
-    /// The mean of m points has the m-th part of their noise. That the field bends within a cell counts as more noise: with M the second
-    /// moments of the points about their mean, the mean of the field is off by `½ M : D²u` from the field at the mean.
+    /// The noise of a mean of m points is 1/m of theirs. Bending of the field within a cell counts as
+    /// additional noise. With M the second moments of the points about their mean, the mean of the field
+    /// differs by `½ M : D²u` from the field at the mean point.
     fn coarse(&self, size: usize, observer: &dyn Observer) -> Result<Coarse, NumericsError> {
         let (cloud, kernel) = (self.system.cloud(), self.system.kernel());
         let cells = Cells::of_all(cloud, size);
@@ -103,7 +109,9 @@ impl Moving {
         Ok(Coarse { cells, moving: Moving { system, near } })
     }
 
-    /// Root mean square deviation of the highest derivatives at some queries; values do not matter to it.
+    /// Returns the root mean square deviation of the derivatives of highest order at some queries.
+    ///
+    /// Deviations do not depend on the values, so zeros take their place.
     fn uncertainty(
         &self,
         queries: &Cloud,
@@ -115,7 +123,7 @@ impl Moving {
         let all = found.deviations.unwrap_or_default();
         let highest = [all.hessians, all.gradients, all.values].into_iter().find(|list| !list.is_empty());
         let highest = highest.unwrap_or_default();
-        // In units of the greatest, whose square may have no number.
+        // In units of the greatest deviation, since its square may overflow.
         let unit = highest.iter().copied().fold(0.0, f64::max);
         if unit == 0.0 {
             return Ok(0.0);
@@ -125,7 +133,7 @@ impl Moving {
     }
 }
 
-/// The variance of `½ M : D²u`.
+/// Returns the prior variance of `½ M : D²u`, M the second moments of a cell, `[d, d]`.
 fn of_bending(moments: &[f64], kernel: &Kernel, d: usize) -> f64 {
     let mut functional = JetFunctional::value(0, d);
     functional.of_value = 0.0;

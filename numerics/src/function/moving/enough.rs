@@ -1,4 +1,4 @@
-//! Whether neighbourhoods are large enough.
+//! A check that neighbourhoods are large enough.
 
 use super::{Asked, Moving, MovingRequest, Quantities, Raw};
 use crate::error::NumericsError;
@@ -10,20 +10,24 @@ use crate::solver::choose::NEIGHBOURS;
 use crate::solver::trend::Trend;
 use crate::sums::jets::JetOrder;
 
-/// Queries at which it is looked, at most.
+/// Queries that are checked, at most.
 const LOOKED_AT: usize = 32;
 
-/// A difference of so many deviations between the answers of a neighbourhood and of its nearer half, in root mean square, is one too many.
+/// Root mean square difference, in deviations, above which neighbourhoods count as too small.
 ///
-/// Points beyond a neighbourhood change its answer less than its outer half does, so that what is left out stays well below a deviation.
+/// The difference is between the values from a neighbourhood and from its nearer half. Points beyond a
+/// neighbourhood change its value less than its outer half does. Up to this limit, their effect is thus well
+/// below a deviation.
 const UNSETTLED: f64 = 0.1;
 
 impl Moving {
-    /// By how many deviations, in root mean square over a sample of the queries, values from the nearer half of a neighbourhood differ from those of
-    /// all of it; `None` where that is a tenth at most, or a neighbourhood is the whole cloud.
+    /// Returns the difference between values from neighbourhoods and from their nearer halves, in deviations.
+    ///
+    /// It is the root mean square over a sample of at most 32 queries. `None` if it is at most 0.1, or if
+    /// every neighbourhood is the whole cloud.
     ///
     /// # Errors
-    /// Those of [`Moving::at`].
+    /// Returns the errors of [`Moving::at`].
     pub fn unsettled(
         &self,
         values: &[f64],
@@ -44,7 +48,7 @@ impl Moving {
         let (Raw { jets: half, .. }, Raw { jets, sure, .. }) = (by(NEIGHBOURS / 2)?, by(NEIGHBOURS)?);
         let of_query = |query: usize| match half.value(query) - jets.value(query) {
             0.0 => 0.0,
-            // Infinite where there is no variance left.
+            // Infinite where the variance is 0.
             difference => difference * difference / sure[query].max(0.0),
         };
         let m = sample.n_points();

@@ -1,4 +1,4 @@
-//! Batches of queries: neighbourhoods in, jets and deviations out.
+//! Evaluation of batches of queries: from neighbourhoods to jets and deviations.
 
 use super::batch::{Batch, Observations};
 use super::kriging::{Krige, Workspace};
@@ -13,7 +13,7 @@ use crate::points::neighbours::Neighbour;
 use crate::solver::trend::{Trend, TrendUncertainty};
 use crate::sums::jets::{JetOrder, Layout};
 
-/// What all batches share.
+/// Data shared by all batches of a request.
 pub(super) struct Fit<'a> {
     pub(super) moving: &'a Moving,
     pub(super) observations: Observations<'a>,
@@ -21,22 +21,22 @@ pub(super) struct Fit<'a> {
     pub(super) parts: Parts,
     pub(super) layout: Layout,
     pub(super) quantities: Quantities<'a>,
-    /// Of the mean.
+    /// Uncertainty of the mean's coefficients.
     pub(super) uncertainty: Option<TrendUncertainty<'a>>,
-    /// Whether queries must not be points.
+    /// Whether queries at points of the cloud are refused.
     pub(super) needs_smooth: bool,
-    /// Points of a neighbourhood.
+    /// Points per neighbourhood.
     pub(super) n_neighbours: usize,
 }
 
-/// Room that a thread keeps from one batch to the next.
+/// Buffers that a thread reuses from one batch to the next.
 pub(super) struct Room {
     set: InstructionSet,
     batch: Batch,
     workspace: Workspace,
     nearest: Vec<Neighbour>,
     sums: Vec<f64>,
-    /// Quantities of each lane, if they differ between queries.
+    /// Functionals, lane by lane, if the quantities are functionals.
     functionals: Vec<Sized>,
 }
 
@@ -83,7 +83,10 @@ impl Room {
         }
     }
 
-    /// Puts the neighbourhoods of some consecutive queries side by side.
+    /// Loads the neighbourhoods of `n_queries` consecutive queries from `first` on, one in each lane.
+    ///
+    /// # Errors
+    /// [`NumericsError::KernelNotSmooth`] if a query is a point of the cloud and that is refused.
     pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
         let Moving { system, near, .. } = fit.moving;
         self.functionals.clear();
@@ -107,7 +110,7 @@ impl Room {
         Ok(())
     }
 
-    /// The numbers of one query.
+    /// Reads the results of one query into `sums`.
     fn read(&mut self, lane: usize) {
         let numbers = self.workspace.found[lane..].iter().step_by(self.set.n_lanes());
         self.sums.iter_mut().zip(numbers).for_each(|(sum, number)| *sum = *number);
@@ -115,7 +118,12 @@ impl Room {
 }
 
 impl Fit<'_> {
-    /// Answers the queries of a batch; says at how many of them neighbours were left out.
+    /// Evaluates the queries of a batch and returns at how many of them neighbours were left out.
+    ///
+    /// Writes `jets`, `[queries, width]`, and `sure`, laid out as [`Raw::sure`](super::Raw::sure).
+    ///
+    /// # Errors
+    /// [`NumericsError::Overflow`]. [`NumericsError::NotPositiveDefinite`] if a variance is below −τ.
     pub(super) fn answer(
         &self,
         room: &mut Room,
@@ -133,7 +141,7 @@ impl Fit<'_> {
             let query = first + lane;
             room.read(lane);
             self.layout.finish(kernel, &room.sums, jet);
-            // It has the variance already.
+            // The sum for the value, unlike the others, contains the kernel's variance already.
             jet[0] = room.sums[0];
             if jet.iter().any(|x| !x.is_finite()) {
                 return Err(NumericsError::Overflow { query });
@@ -149,7 +157,7 @@ impl Fit<'_> {
                 let explained = room.sums[places.of_quantities() + at];
                 let unexplained = self.of_mean(query, quantity, (&room.sums, 1 + at));
                 let variance = quantity.prior_variance(kernel) - explained + unexplained;
-                // What is no number stays none.
+                // NaN propagates.
                 *slot = if variance < 0.0 { -0.0 } else { quantity.unit() * variance.sqrt() };
             }
             if sure[1..].iter().any(|deviation| !deviation.is_finite()) {
@@ -159,8 +167,11 @@ impl Fit<'_> {
         Ok(n_thinned)
     }
 
-    /// What not knowing the mean adds to a variance: `hᵀCh`, h what the neighbours leave unexplained of the functions of the mean, C the
-    /// covariance of their coefficients (Rasmussen and Williams 2006, eq. 2.42). The quantity has this place among all, from 0 for the value.
+    /// Returns the part of a variance that is due to the unknown mean: `hᵀCh`.
+    ///
+    /// h is the part of the mean's functions that the neighbours do not explain. C is the covariance of the
+    /// functions' coefficients (Rasmussen and Williams 2006, eq. 2.42). `place` is that of the quantity: 0
+    /// for the value, then the others in order.
     fn of_mean(&self, query: usize, quantity: Quantity<'_>, (sums, place): (&[f64], usize)) -> f64 {
         let Some(TrendUncertainty { basis, covariance }) = self.uncertainty else { return 0.0 };
         let mut unexplained = quantity.on_mean(basis, self.queries.point(query));
@@ -172,6 +183,7 @@ impl Fit<'_> {
         self.moving.system.kernel().variance() * form
     }
 
+    /// Checks that a negative variance is at least −τ, the tolerance of [`Moving::at`].
     fn check_is_rounding(
         &self,
         query: usize,
@@ -183,7 +195,7 @@ impl Fit<'_> {
             return Ok(());
         }
         let k0 = self.moving.system.kernel().at_zero();
-        // At least the norm of the matrix: no entry of K is greater than k₀.
+        // An upper bound of the norm of the matrix, since no entry of K exceeds k₀.
         let norm = batch.count as f64 * k0 + batch.noise.iter().copied().fold(0.0, f64::max);
         if -variance <= 4.0 * f64::EPSILON * (k0 + norm * norm_squared) {
             return Ok(());

@@ -1,9 +1,11 @@
-//! Kriging of several queries at once: one in each lane of a register.
+//! Kriging of several queries at once, one in each lane of a register.
 //!
-//! With K the covariances of the values at the points N around a query q, noise included, c = k(N, q) and K = LLᵀ, forward
-//! substitution of the values and of c gives `u(q) = (L⁻¹c)·(L⁻¹y)` and the variance `k₀ − |L⁻¹c|²` (simple kriging; Rasmussen and
-//! Williams 2006, alg. 2.1). Derivatives need the weights `Λ = L⁻ᵀL⁻¹y` as well, and each of their variances a row of its own: with its
-//! covariances `c′` with the values it is the prior's without `|L⁻¹c′|²`.
+//! Let N be the points around a query q, K = LLᵀ the covariances of their values y, noise included, and
+//! `c = k(N, q)`. Forward substitution of y and c gives `u(q) = (L⁻¹c)·(L⁻¹y)` and the variance
+//! `k₀ − |L⁻¹c|²`. This is simple kriging (Rasmussen and Williams 2006, alg. 2.1).
+//!
+//! Derivatives also need the weights `Λ = L⁻ᵀL⁻¹y`. The variance of a derivative needs a row of its own, the
+//! covariances `c′` of the derivative with the values. It is the prior variance minus `|L⁻¹c′|²`.
 
 use pulp::{Simd, WithSimd};
 
@@ -15,20 +17,24 @@ use crate::machine::registers::{BLOCK, Pack};
 /// Numbers in the widest register.
 const MAX_LANES: usize = 8;
 
-/// Conditional variances up to this multiple of k₀ are rounding: such a point follows from those before it, and is left out. The
-/// fallback of the dense solver stops there as well.
+/// Conditional variances up to this multiple of k₀ are rounding. Such a point follows from those before it
+/// and is left out.
+///
+/// The fallback of the dense solver stops at the same multiple.
 const DEPENDENT: f64 = 64.0 * f64::EPSILON;
 
-/// 2⁻⁵⁰⁰: correlations below this count as 0, as do entries of the factor below this times √k₀.
+/// 2⁻⁵⁰⁰. Correlations below this are set to 0, and so are entries of the factor below this times √k₀.
 ///
-/// With a variance k₀ near 1 no product of two other entries is subnormal then. Some processors take a hundred cycles
-/// for each that is. Values that are tiny beside the greatest of their neighbourhood may still lead there.
+/// With k₀ near 1, no product of two remaining entries is subnormal. Some processors take a hundred cycles
+/// for each subnormal product. Values that are tiny beside the greatest of their neighbourhood may still lead
+/// to some.
 const VANISHES: f64 = f64::from_bits((1023 - 500) << 52);
 
-/// Room for one batch, and what was found for it, `[numbers, lanes]`.
+/// Buffers for one batch.
 pub(super) struct Workspace {
     matrix: Vec<f64>,
     start: usize,
+    /// Results, `[numbers, lanes]`, in the order of [`Found`].
     pub found: Vec<f64>,
 }
 
@@ -38,14 +44,14 @@ impl Workspace {
         let n_rows = N_ROWS + parts.n_rows();
         let n_registers = triangle(n).next_multiple_of(BLOCK) + n_rows * n.next_multiple_of(BLOCK);
         let matrix = vec![0.0; (n_registers + 1) * MAX_LANES];
-        // On the boundary of a cache line.
+        // Start at the boundary of a cache line.
         let start = matrix.as_ptr().align_offset(64).min(MAX_LANES);
         let found = vec![0.0; parts.n_numbers(dimension) * MAX_LANES];
         Self { matrix, start, found }
     }
 }
 
-/// Kriging in each lane.
+/// A pass that kriges one query in each lane.
 pub(super) struct Krige<'a> {
     pub batch: &'a Batch,
     pub kernel: &'a Kernel,
@@ -74,8 +80,10 @@ impl WithSimd for Krige<'_> {
     }
 }
 
-/// A batch on its way through the factorization: rows of the lower triangle one after the other, and from `below` on the rows of the
-/// right-hand sides, at places of their own.
+/// A batch during its factorization.
+///
+/// `matrix` holds the rows of the lower triangle one after the other. From `below` on it holds the rows of
+/// the right-hand sides, each from a multiple of [`BLOCK`].
 struct Factored<'a, S: Simd> {
     simd: S,
     n: usize,
@@ -85,13 +93,13 @@ struct Factored<'a, S: Simd> {
     matrix: &'a mut [S::f64s],
 }
 
-/// `variance · φ`, or 0 where that is negligible.
+/// Returns `variance · φ`, or 0 where φ is below [`VANISHES`].
 #[inline(always)]
 fn covariance<S: Simd>(kernel: &Kernel, correlation: Pack<S>) -> Pack<S> {
     correlation.select_below(VANISHES, 0.0, kernel.variance()) * correlation
 }
 
-/// `variance · φ` over squared distances that are there already.
+/// A pass that overwrites squared distances by `variance · φ`.
 struct Values<'a, S: Simd> {
     simd: S,
     entries: &'a mut [S::f64s],
@@ -112,7 +120,7 @@ impl<S: Simd> Pairs<S> for Values<'_, S> {
     }
 }
 
-/// The same with φ′ and φ″.
+/// A pass that overwrites squared distances by `variance · φ` and also writes φ′ and φ″.
 struct Derivatives<'a, S: Simd> {
     simd: S,
     entries: &'a mut [S::f64s],
@@ -161,13 +169,13 @@ impl<S: Simd> Factored<'_, S> {
         Pack::read(self.simd, registers, at)
     }
 
-    /// Entry of D = q − x_j.
+    /// Returns the entry of D = q − x_j along an axis, stretched by the kernel.
     #[inline(always)]
     fn difference(&self, axis: usize, j: usize) -> Pack<S, 1> {
         self.of(&self.batch.query, axis) - self.of(&self.batch.points, axis * self.n + j)
     }
 
-    /// `K + noise`; places that are left empty have rows of the identity.
+    /// Fills the triangle with `K + noise`. Rows of empty places are those of the identity.
     #[inline(always)]
     fn fill_triangle(&mut self) {
         let (n, count) = (self.n, self.batch.count);
@@ -198,6 +206,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Fills the rows of values, of covariances with the query and, for derivatives, of φ′ and φ″.
     #[inline(always)]
     fn fill_rows(&mut self, order: usize) {
         let (values, cross) = (self.row(VALUES), self.row(CROSS));
@@ -230,7 +239,9 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// Covariances of the derivatives in units of ℓ with the values: with s = D/ℓ, `2vφ′s_a` and `4vφ″s_as_b + 2vφ′δ_ab`.
+    /// Fills the rows of the derivatives with their covariances with the values, derivatives in units of ℓ.
+    ///
+    /// With s = D/ℓ they are `2vφ′s_a` and `4vφ″s_as_b + 2vφ′δ_ab`.
     #[inline(always)]
     fn fill_derivatives(&mut self, parts: Parts) {
         let (d, v, inverse) =
@@ -249,7 +260,7 @@ impl<S: Simd> Factored<'_, S> {
                 if parts.order < 2 {
                     continue;
                 }
-                // In this order, as in sum_derivatives.
+                // Multiplied in this order for the reason given in `sum_derivatives`.
                 let first = bend * step;
                 for b in a..d {
                     let along = if a == b { slope } else { self.splat(0.0) };
@@ -266,7 +277,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// Covariances of functionals of the derivatives with the values.
+    /// Fills the rows of the functionals with their covariances with the values.
     #[inline(always)]
     fn fill_functionals(&mut self, parts: Parts) {
         for functional in 0..parts.n_functionals {
@@ -283,7 +294,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// The functions of the mean at the points.
+    /// Fills the rows of the functions of the mean with their values at the points.
     #[inline(always)]
     fn fill_functions(&mut self, parts: Parts) {
         for function in 0..parts.n_functions {
@@ -294,7 +305,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// Left-looking, in tiles: K = LLᵀ, and below it the right-hand sides times L⁻ᵀ.
+    /// Factorizes K = LLᵀ and multiplies the rows of right-hand sides below by L⁻ᵀ: left-looking, in tiles.
     #[inline(always)]
     fn factorize(&mut self, parts: Parts) {
         for column in (0..self.n).step_by(COLUMNS) {
@@ -304,7 +315,7 @@ impl<S: Simd> Factored<'_, S> {
             }
             let mut i = column + COLUMNS;
             while i < self.n {
-                // As many as there are registers for.
+                // As many rows as there are registers for.
                 if S::F64_LANES == MAX_LANES {
                     self.tile::<4>(
                         [triangle(i), triangle(i + 1), triangle(i + 2), triangle(i + 3)],
@@ -324,7 +335,10 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// Some rows by the columns from `column` on, once all columns before are done; the pivot is at `pivot` of the columns, if any.
+    /// Computes a tile: R rows by the [`COLUMNS`] columns from `column` on. All columns before must be done.
+    ///
+    /// The diagonal entry of the row is at column `column + pivot`. If `pivot` is [`COLUMNS`], it is not in
+    /// the tile.
     #[inline(always)]
     fn tile<const R: usize>(&mut self, rows: [usize; R], column: usize, pivot: usize) {
         let zero = self.splat(0.0);
@@ -357,11 +371,13 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// The entries of a row from `first` on, without what the columns before account for.
+    /// Computes the entries of one row of a tile, from place `first` on.
+    ///
+    /// `sums` are the products of the columns before, which are subtracted.
     #[inline(always)]
     fn finish(&mut self, first: usize, column: usize, pivot: usize, sums: [Pack<S, 1>; COLUMNS]) {
         let mut entries = [self.splat(0.0); COLUMNS];
-        // Values have a unit of their own, and may be small.
+        // Values have a unit of their own and may be small, so none is set to 0.
         let is_values = (self.row(VALUES)..self.row(CROSS)).contains(&first);
         let least = if is_values { 0.0 } else { VANISHES * self.kernel.at_zero().sqrt() };
         for c in 0..COLUMNS {
@@ -380,13 +396,17 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// The inverse of the diagonal is kept in its place: rows below multiply by it. With 0 for it a point counts for nothing.
+    /// Returns the inverse of a diagonal entry of L, from its square, the conditional variance of a point.
+    ///
+    /// The inverse is stored in place of the entry, since rows below multiply by it. It is 0 for a dependent
+    /// point, which is thereby left out.
     #[inline(always)]
     fn inverse_root(&self, variance: Pack<S, 1>) -> Pack<S, 1> {
         let least = DEPENDENT * self.kernel.at_zero();
         variance.select_below(least, 0.0, 1.0) / variance.at_least(least).sqrt()
     }
 
+    /// Writes the results of the batch, in the order of [`Found`].
     #[inline(always)]
     fn sum_up(&mut self, parts: Parts, found: &mut [S::f64s]) {
         let (d, n) = (self.batch.dimension, self.n);
@@ -423,6 +443,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Returns the inner product of two rows, given by the places where they start.
     #[inline(always)]
     fn product(&self, a: usize, b: usize) -> Pack<S, 1> {
         let mut sums = [self.splat(0.0); 4];
@@ -435,7 +456,7 @@ impl<S: Simd> Factored<'_, S> {
         (sums[0] + sums[1]) + (sums[2] + sums[3])
     }
 
-    /// Writes L⁻ᵀ times the row `from` into the row `to`, row by row of L.
+    /// Writes L⁻ᵀ times the row at `from` into the row at `to`, row by row of L.
     #[inline(always)]
     fn back_substitute(&mut self, from: usize, to: usize) {
         for i in 0..self.n {
@@ -452,7 +473,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′`.
+    /// Writes `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′`, and overwrites the rows of φ′ and φ″ by λφ′ and λφ″.
     #[inline(always)]
     fn sum_derivatives(&mut self, order: usize, found: &mut [S::f64s]) {
         let (d, count) = (self.batch.dimension, self.batch.count);
@@ -478,7 +499,8 @@ impl<S: Simd> Factored<'_, S> {
             for b in a..d {
                 let mut sum = self.splat(0.0);
                 for j in 0..count {
-                    // In this order the product of two long differences meets the 0 that φ″ is there.
+                    // φ″ is 0 at long differences. Multiplied first, it keeps the product of two of them
+                    // finite.
                     let first = self.at(bends + j) * self.difference(a, j);
                     sum = first.mul_add(self.difference(b, j), sum);
                 }

@@ -1,14 +1,18 @@
-//! Kriging in a moving neighbourhood: value, derivatives and variance at a query from the points nearest to it.
+//! Kriging in a moving neighbourhood: value, derivatives and variance at a query from its nearest points.
 //!
-//! Nothing is factorized beforehand and the work grows with the queries alone, so clouds may have any size. With N the nearest points of a
-//! query q and `w = (K_NN + α_N)⁻¹ k(N, q)`, the mean is `wᵀy_N` and the variance `k₀ − wᵀk(N, q)`: the posterior given these
-//! values alone (Chilès and Delfiner 2012, sec. 3.6). A cloud of no more than [`NEIGHBOURS`] points is its own
-//! neighbourhood everywhere, and this is the dense posterior.
+//! Nothing is factorized beforehand, and the work grows only with the number of queries. So clouds may have
+//! any size.
 //!
-//! Points whose correlation with the query is below 2⁻⁵⁰⁰ do not count: far from all points the mean is exactly that of the process.
+//! Let N be the nearest points of a query q and `w = (K_NN + α_N)⁻¹ k(N, q)`. The mean is `wᵀy_N` and the
+//! variance `k₀ − wᵀk(N, q)`, the posterior given only these values (Chilès and Delfiner 2012, sec. 3.6). If
+//! the cloud has at most [`NEIGHBOURS`] points, every neighbourhood is the whole cloud, and this is the dense
+//! posterior.
 //!
-//! Gradient and Hessian are those of the function that the neighbours define: exact for it, but the means of two queries with other
-//! neighbours are not values of one function.
+//! Points whose correlation with the query is below 2⁻⁵⁰⁰ are ignored. Far from all points, the posterior
+//! mean is therefore exactly the mean of the process.
+//!
+//! Gradient and Hessian are exact for the function that the neighbours of the query define. Queries with
+//! different neighbours use different functions.
 
 mod batch;
 mod coarse;
@@ -45,56 +49,58 @@ use near::Near;
 pub(crate) use quantities::Functionals;
 use quantities::Quantities;
 
-/// A system that is solved around each query anew.
+/// Local kriging of a system: a small solve around each query.
 pub struct Moving {
     system: System,
     near: Near,
 }
 
-/// What is asked at queries.
+/// A request for jets at queries, with variances or deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MovingRequest<'a> {
     pub order: JetOrder,
+    /// Whether variances of the latent function are wanted.
     pub has_variances: bool,
-    /// Deviations of all that is asked for, derivatives included.
+    /// Whether deviations of the jet are wanted, derivatives included.
     pub has_deviations: bool,
     /// The mean of the function, if it has one.
     pub trend: Option<&'a Trend>,
 }
 
-/// What is found there.
+/// Jets at queries, with variances or deviations.
 pub struct MovingAnswer {
     pub jets: Jets,
     /// Variances of the latent function, if asked for.
     pub variances: Option<Variances>,
-    /// Of the jets, if asked for.
+    /// Deviations of the jets, if asked for.
     pub deviations: Option<JetDeviations>,
-    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    /// Queries where neighbours were left out, since within rounding they follow from nearer ones.
     pub n_dependent: usize,
 }
 
-/// What is asked of functionals of derivatives, up to an order.
+/// A request for jets at queries with the deviations of functionals of their derivatives.
 #[derive(Clone, Copy)]
 pub(crate) struct FunctionalsRequest<'a> {
+    /// Order of the jets. The functionals use derivatives up to this order.
     pub(crate) order: JetOrder,
     pub(crate) functionals: Functionals<'a>,
-    /// Of each query.
+    /// Functionals per query.
     pub(crate) count: usize,
     /// The mean of the function, if it has one.
     pub(crate) trend: Option<&'a Trend>,
 }
 
-/// What is found of them.
+/// Jets at queries, with the deviations of functionals of their derivatives.
 pub(crate) struct MovingFunctionals {
     pub(crate) jets: Jets,
-    /// `[m, count]`.
+    /// Deviations of the functionals, `[m, count]`.
     pub(crate) deviations: Vec<f64>,
-    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    /// Queries where neighbours were left out, since within rounding they follow from nearer ones.
     pub(crate) n_dependent: usize,
 }
 
 impl Moving {
-    /// Local kriging of a system, with how its cloud is sampled.
+    /// Prepares local kriging of a system, given the sampling of its cloud.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -114,27 +120,30 @@ impl Moving {
         &self.system
     }
 
-    /// Points of a neighbourhood.
+    /// Points per neighbourhood.
     pub fn n_neighbours(&self) -> usize {
         NEIGHBOURS.min(self.system.n_points())
     }
 
-    /// Bytes held on the heap, those of the cloud and its sampling included.
+    /// Bytes held on the heap, including those of the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
         self.system.n_bytes() + self.near.n_bytes()
     }
 
-    /// Answers at queries `[m, d]` for values `[n]`, unit V.
+    /// Evaluates at queries `[m, d]` for values `[n]`, unit V.
     ///
-    /// Variances and deviations take in what is not known of the mean.
+    /// Variances and deviations include the uncertainty of the mean.
     ///
-    /// A negative variance is clamped only within `τ = 4ε(k₀ + (k k₀ + max α)|w|²)`, k the neighbours, and reported.
+    /// A negative variance is set to 0 and reported, but only if it is at least −τ. Here
+    /// `τ = 4ε(k₀ + (k k₀ + max α)|w|²)`, with k the number of neighbours.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`]; [`NumericsError::KernelNotSmooth`] if derivatives
-    /// are asked of a kernel with a kink at a point of the cloud; [`NumericsError::DerivativesVary`] if their deviations are, where the process
-    /// has no such derivatives; [`NumericsError::NotPositiveDefinite`] with a variance below −τ;
-    /// [`NumericsError::Overflow`]; [`NumericsError::Cancelled`].
+    /// - [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`].
+    /// - [`NumericsError::KernelNotSmooth`] if derivatives are asked for at a point of the cloud and the
+    ///   kernel has a kink there.
+    /// - [`NumericsError::DerivativesVary`] if deviations are asked for derivatives that the process lacks.
+    /// - [`NumericsError::NotPositiveDefinite`] if a variance is below −τ.
+    /// - [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub fn at(
         &self,
         values: &[f64],
@@ -171,10 +180,10 @@ impl Moving {
         Ok(MovingAnswer { jets, variances, deviations, n_dependent })
     }
 
-    /// Jets at queries with the deviations `[m, count]` of functionals of their derivatives, `count` at each query.
+    /// Evaluates jets at queries, with the deviations `[m, count]` of functionals of their derivatives.
     ///
     /// # Errors
-    /// Those of [`Moving::at`].
+    /// Returns the errors of [`Moving::at`].
     pub(crate) fn functionals_at(
         &self,
         values: &[f64],
@@ -232,25 +241,28 @@ impl Moving {
     }
 }
 
-/// What is asked of batches.
+/// A request to [`Moving::run`], which splits it into batches.
 struct Asked<'a> {
     set: InstructionSet,
     request: MovingRequest<'a>,
     quantities: Quantities<'a>,
-    /// Points of a neighbourhood.
+    /// Points per neighbourhood.
     n_neighbours: usize,
 }
 
-/// What batches find.
+/// The joined results of all batches.
 struct Raw {
     jets: Jets,
-    /// The variance of the value, then deviations of the other quantities, `[m, n_sure]`; −0 where rounding made a variance negative.
+    /// The variance of the value, then the deviations of the other quantities, `[m, n_sure]`.
+    ///
+    /// Rounding may make a variance negative. That of the value is kept so, and any other deviation is then
+    /// −0.
     sure: Vec<f64>,
     n_sure: usize,
     n_dependent: usize,
 }
 
-/// The queries with a deviation of −0, which says that rounding made its variance negative; it is 0 then.
+/// Returns the queries with a deviation of −0, the mark of a negative variance, and turns each −0 into 0.
 fn of_clamped(deviations: &mut [f64], per_query: usize) -> Vec<usize> {
     let mut clamped = Vec::new();
     for (query, deviations) in deviations.chunks_exact_mut(per_query).enumerate() {
@@ -262,7 +274,7 @@ fn of_clamped(deviations: &mut [f64], per_query: usize) -> Vec<usize> {
     clamped
 }
 
-/// Variances that rounding made negative, served as 0.
+/// Sets negative variances to 0 and lists their queries.
 fn clamped(mut latent: Vec<f64>) -> Variances {
     let clamped = (0..latent.len()).filter(|&query| latent[query] < 0.0).collect();
     latent.iter_mut().for_each(|variance| *variance = variance.max(0.0));

@@ -1,4 +1,4 @@
-//! The points around a query.
+//! Search for the points around a query.
 
 use std::sync::Arc;
 
@@ -8,15 +8,16 @@ use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::sampling::Sampling;
 use crate::solver::System;
 
-/// Who knows which points are near: those with the greatest covariances.
+/// An index of the points nearest to a query, i.e. with the greatest covariances.
 pub(super) enum Near {
+    /// The index of the cloud as it is, kept with its sampling.
     Sampled(Arc<Sampling>),
-    /// In coordinates in which the kernel has one length scale.
+    /// An index in stretched coordinates, in which the kernel has one length scale.
     Stretched(Neighbours),
 }
 
 impl Near {
-    /// The nearest points, nearest first.
+    /// Writes the `count` points nearest to x into `found`, nearest first.
     pub(super) fn nearest_into(&self, system: &System, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
         match self {
             Self::Sampled(sampling) => sampling.neighbours().nearest_into(x, count, found),

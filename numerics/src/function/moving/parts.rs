@@ -1,9 +1,11 @@
-//! What is found for a query, and the rows of right-hand sides that it takes.
+//! The layout of a query's results, and of the rows of right-hand sides that they need.
 
-/// Columns that are solved for at once: with as many rows, 16 chains of products that do not wait for one another.
+/// Columns solved for at once. With as many rows they make 16 independent chains of products.
 pub(super) const COLUMNS: usize = 4;
 
-/// Rows below the triangle: values, covariances with the query, weights, φ′ and φ″ at the query, then those of derivatives.
+/// Rows of any query below the triangle: values, covariances with the query, weights, φ′ and φ″.
+///
+/// The rows of derivatives, functionals and functions of a mean follow.
 pub(super) const N_ROWS: usize = 5;
 pub(super) const VALUES: usize = 0;
 pub(super) const CROSS: usize = 1;
@@ -11,37 +13,40 @@ pub(super) const WEIGHTS: usize = 2;
 pub(super) const SLOPES: usize = 3;
 pub(super) const BENDS: usize = 4;
 
+/// Returns the number of entries in a triangle of n rows, which is where row n starts.
 pub(super) const fn triangle(n: usize) -> usize {
     n * (n + 1) / 2
 }
 
-/// What is summed up beyond the value.
+/// The results to compute besides the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Parts {
     /// 0, 1 for the gradient, 2 for the Hessian.
     pub order: usize,
     pub variances: bool,
-    /// Derivatives whose variances are asked for, or those of functionals of them: none, those of first order, or with them the upper triangle
-    /// of those of second.
+    /// Derivatives whose covariances with the values are needed, for their own variances or those of
+    /// functionals.
+    ///
+    /// None, the d first ones, or these and the upper triangle of the second ones.
     pub n_derivatives: usize,
-    /// Functionals of derivatives whose variances are asked for, instead of theirs.
+    /// Functionals of derivatives whose variances are asked for, in place of those of derivatives.
     pub n_functionals: usize,
-    /// Functions of a mean whose coefficients are not known exactly, so that variances are greater.
+    /// Functions of a mean with uncertain coefficients, which make variances larger.
     pub n_functions: usize,
 }
 
 impl Parts {
-    /// Quantities beside the value whose variances are asked for.
+    /// Quantities besides the value whose variances are asked for.
     pub(super) const fn n_quantities(&self) -> usize {
         if self.n_functionals > 0 { self.n_functionals } else { self.n_derivatives }
     }
 
-    /// Rows of right-hand sides beside those of any query.
+    /// Rows of right-hand sides after the [`N_ROWS`] of any query.
     pub(super) const fn n_rows(&self) -> usize {
         self.n_derivatives + self.n_functionals + self.n_functions
     }
 
-    /// The first row of those quantities.
+    /// The first row of the quantities whose variances are asked for.
     pub(super) const fn quantities(&self) -> usize {
         N_ROWS + if self.n_functionals > 0 { self.n_derivatives } else { 0 }
     }
@@ -51,20 +56,25 @@ impl Parts {
         N_ROWS + self.n_derivatives + self.n_functionals
     }
 
-    /// Numbers of a query, in dimension d.
+    /// Numbers per query in dimension d, laid out as [`Found`] says.
     pub(super) const fn n_numbers(&self, dimension: usize) -> usize {
         Found::of(dimension).of_functions(self) + self.n_functions * (1 + self.n_quantities())
     }
 }
 
-/// Numbers of a query: those of a jet as sums over the points, `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b`, `Σλφ′`, then three more, `|L⁻¹c′|²` of the
-/// derivatives or functionals, and with f the values of a function of the mean at the points, `L⁻¹f·L⁻¹c` and all `L⁻¹f·L⁻¹c′`, function by function.
+/// Positions of the results of a query.
+///
+/// 1. The sums of a jet over the points: `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b`, `Σλφ′`.
+/// 2. The three numbers of the fields below.
+/// 3. `|L⁻¹c′|²` of each derivative or functional.
+/// 4. Function by function of the mean, with f its values at the points: `L⁻¹f·L⁻¹c`, then `L⁻¹f·L⁻¹c′` of
+///    each derivative or functional.
 pub(super) struct Found {
     /// `|L⁻¹c|²`.
     pub explained: usize,
     /// `|K⁻¹c|²`.
     pub norm_squared: usize,
-    /// Points left out.
+    /// Number of points left out.
     pub n_dependent: usize,
 }
 
@@ -74,12 +84,12 @@ impl Found {
         Self { explained: trace + 1, norm_squared: trace + 2, n_dependent: trace + 3 }
     }
 
-    /// Of the quantities beside the value.
+    /// The first position of the quantities besides the value.
     pub(super) const fn of_quantities(&self) -> usize {
         self.n_dependent + 1
     }
 
-    /// Of the functions of the mean.
+    /// The first position of the functions of the mean.
     pub(super) const fn of_functions(&self, parts: &Parts) -> usize {
         self.of_quantities() + parts.n_quantities()
     }

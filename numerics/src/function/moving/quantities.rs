@@ -1,4 +1,4 @@
-//! What deviations are asked of beside the value.
+//! Quantities besides the value whose deviations are asked for.
 
 use crate::error::NumericsError;
 use crate::function::functionals::{JetFunctional, has_variance};
@@ -6,18 +6,18 @@ use crate::kernel::Kernel;
 use crate::machine::small::{Small, zeros};
 use crate::solver::trend::Basis;
 
-/// The functionals of a query, as many for each.
+/// A function that returns the functionals of a query, equally many for each.
 pub(crate) type Functionals<'a> = &'a (dyn Fn(usize) -> Vec<JetFunctional> + Sync);
 
-/// Beside the value.
+/// The quantities besides the value whose deviations are asked for.
 pub(super) enum Quantities<'a> {
-    /// Derivatives, the same at each query.
+    /// Derivatives: identical for all queries.
     Derivatives(Vec<Derivative>),
-    /// Functionals of derivatives up to an order, so many at each query.
+    /// Functionals of derivatives up to `order`, `count` of them at each query.
     Functionals { of: Functionals<'a>, count: usize, order: usize },
 }
 
-/// One of them, at a query.
+/// The value or another quantity, at a query.
 #[derive(Clone, Copy)]
 pub(super) enum Quantity<'a> {
     Value,
@@ -25,17 +25,17 @@ pub(super) enum Quantity<'a> {
     Functional(&'a Sized),
 }
 
-/// A derivative.
+/// A first or second derivative of the function.
 pub(super) struct Derivative {
-    /// The axis, for a first one.
+    /// The axis of a first derivative, `None` for a second one.
     axis: Option<usize>,
-    /// In units of ℓ.
+    /// Prior variance of the derivative in units of ℓ.
     prior_variance: f64,
-    /// What turns its deviation in units of ℓ into one along the axes.
+    /// Factor from a deviation in units of ℓ to one along the axes.
     unit: f64,
 }
 
-/// A functional over its size, so that its square has a number.
+/// A functional divided by its size, so that squares do not overflow.
 pub(super) struct Sized {
     functional: JetFunctional,
     size: f64,
@@ -47,17 +47,19 @@ impl Sized {
         Self { functional: functional.over(size), size }
     }
 
-    /// Its coefficients on derivatives in units of ℓ: `[d]`, then the upper triangle of those of second order.
+    /// Returns the coefficients on derivatives in units of ℓ.
+    ///
+    /// First `[d]` for the gradient, then the upper triangle of the Hessian.
     pub(super) fn coefficients(&self, kernel: &Kernel) -> Small {
         self.functional.coefficients(kernel)
     }
 }
 
 impl<'a> Quantities<'a> {
-    /// Derivatives up to an order.
+    /// Returns the derivatives up to `order`: the first ones, then the upper triangle of the second ones.
     ///
     /// # Errors
-    /// [`NumericsError::DerivativesVary`] where the process has none.
+    /// [`NumericsError::DerivativesVary`] if the process has no derivatives of this order.
     pub(super) fn derivatives(kernel: &Kernel, d: usize, order: usize) -> Result<Self, NumericsError> {
         if !has_variance(kernel, order) {
             return Err(NumericsError::DerivativesVary { order });
@@ -83,8 +85,10 @@ impl<'a> Quantities<'a> {
         Self::Derivatives(Vec::new())
     }
 
+    /// Returns `count` functionals per query, of derivatives up to `order`.
+    ///
     /// # Errors
-    /// [`NumericsError::DerivativesVary`] where the process has none of this order.
+    /// [`NumericsError::DerivativesVary`] if the process has no derivatives of this order.
     pub(super) fn functionals(
         kernel: &Kernel,
         of: Functionals<'a>,
@@ -97,7 +101,7 @@ impl<'a> Quantities<'a> {
         }
     }
 
-    /// Rows of derivatives that are needed, and those made of them.
+    /// Returns the numbers of rows for derivatives, and for the functionals that are made of them.
     pub(super) fn n_rows(&self, d: usize) -> [usize; 2] {
         match self {
             Self::Derivatives(derivatives) => [derivatives.len(), 0],
@@ -107,7 +111,7 @@ impl<'a> Quantities<'a> {
         }
     }
 
-    /// One of them, in a lane of which the functionals are at hand.
+    /// Returns quantity number `at` of a lane. `functionals` are those of all lanes, `count` for each.
     pub(super) fn get<'b>(&'b self, functionals: &'b [Sized], (lane, at): (usize, usize)) -> Quantity<'b> {
         match self {
             Self::Derivatives(derivatives) => Quantity::Derivative(&derivatives[at]),
@@ -117,7 +121,7 @@ impl<'a> Quantities<'a> {
 }
 
 impl Quantity<'_> {
-    /// In squares of its unit.
+    /// Returns the prior variance, in units of the square of `unit`.
     pub(super) fn prior_variance(&self, kernel: &Kernel) -> f64 {
         match self {
             Self::Value => kernel.at_zero(),
@@ -126,7 +130,7 @@ impl Quantity<'_> {
         }
     }
 
-    /// What its deviation is in units of.
+    /// Returns the unit in which the quantity's prior variance and deviation are computed.
     pub(super) fn unit(&self) -> f64 {
         match self {
             Self::Value => 1.0,
@@ -135,7 +139,7 @@ impl Quantity<'_> {
         }
     }
 
-    /// On the functions of a mean, at a position.
+    /// Returns the quantity divided by `unit`, applied to each function of a mean at position x, `[p]`.
     pub(super) fn on_mean(&self, basis: &Basis, x: &[f64]) -> Small {
         let mut functions = zeros(basis.n_functions());
         match self {

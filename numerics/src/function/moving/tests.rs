@@ -73,7 +73,7 @@ fn a_small_cloud_has_the_dense_deviations_of_derivatives_on_every_instruction_se
     let cloud = fibonacci_sphere(NEIGHBOURS - 1);
     let values = vec![1.0; NEIGHBOURS - 1];
     let queries: Vec<f64> = (0..57).map(|i| 1.3 * (0.37 * i as f64).sin()).collect();
-    // One of them at a point, where differences are 0.
+    // The last query is a point of the cloud, where differences are 0.
     let queries = Cloud::new([&queries, cloud.point(5)].concat(), 3).unwrap();
     for family in all_families() {
         let solver = Arc::new(Solver::dense(system(&cloud, family, 1e-3), &Unobserved).unwrap());
@@ -139,7 +139,7 @@ fn are_close(found: &[f64], expected: &[f64], tolerance: f64, context: &str) {
     }
 }
 
-/// A thousand points of a spiral that fills a cube, and values of size 1 there.
+/// Returns 1000 points of a spiral that fills a cube, and values of size 1 at them.
 fn spiral() -> (Cloud, Vec<f64>) {
     let coordinate =
         |i: usize| 2.0 * ((i / 3) as f64 * [0.819_172_51, 0.671_043_61, 0.549_700_48][i % 3]).fract() - 1.0;
@@ -187,7 +187,7 @@ fn values_are_met_without_noise_and_variances_lie_between_nothing_and_the_prior(
         let found = moving.at(&values, &cloud, request, &Unobserved).unwrap();
         let (k0, variances) = (moving.system().kernel().at_zero(), found.variances.unwrap());
         for (query, value) in values.iter().enumerate() {
-            // What is left out where neighbours depend on each other is lost to rounding: a thousandth of a millionth of k₀.
+            // Dependent neighbours are left out, which costs as much as rounding: 1e-9 of k₀.
             assert!((found.jets.value(query) - value).abs() < 1e-5, "{family:?}: {query}");
             assert!((0.0..1e-9 * k0).contains(&variances.latent[query]), "{family:?}: {query}");
         }
@@ -211,7 +211,7 @@ fn far_from_the_cloud_the_prior_is_all_there_is() {
 
 #[test]
 fn repeated_observations_with_noise_count_as_often_as_they_are_there() {
-    // Three observations of noise 0.3 at one place say what one of noise 0.1 does.
+    // Three observations with noise 0.3 at one place are equivalent to one with noise 0.1.
     let place = [0.2, 0.4, 0.1];
     let kernel = Kernel::new(Family::Gauss, 0.9, 1.7).unwrap();
     let of = |n: usize, noise: f64| {
@@ -236,8 +236,9 @@ fn what_follows_from_nearer_points_is_left_out_and_counted() {
     assert_eq!(found.n_dependent, queries.n_points());
     for (query, x) in queries.points().enumerate() {
         let expected = (2.0 * x[0] + x[1]).sin() * x[2];
-        // The error is at most the deviation that a point may have beside those before it, √(64ε) = 1e-7, times the native norm of
-        // the function, which for a kernel four times as wide as the cloud is some 1e5: 3e-3 was found.
+        // A point that is left out has at most the deviation √(64ε) = 1e-7 given those before it. The error
+        // is at most this times the native norm of the function. With a kernel four times as wide as the
+        // cloud, the norm is some 1e5. Measured: 3e-3.
         assert!(
             (found.jets.value(query) - expected).abs() < 1e-2,
             "{query}: {}",
@@ -290,7 +291,7 @@ fn wrong_lengths_values_beyond_float64_and_a_caller_who_is_gone_are_refused() {
     assert_eq!(gone.err(), Some(NumericsError::Cancelled));
 }
 
-/// Nobody waits any more.
+/// An observer that always cancels.
 struct Gone;
 
 impl Observer for Gone {

@@ -1,19 +1,25 @@
-//! What the curvature of a surface entails beyond second order.
+//! The entailed height: the part of a surface's height beyond second order that follows from its curvature.
+//!
+//! If the shape operator S stays the same along the surface, the height is `z = II(t,t)/(1 + √(1 − |St|²))`.
+//! II is the second fundamental form. The formula is exact on spheres, cylinders and planes. Its part of
+//! second order is `½ II(t,t)`. The rest is the entailed height.
 
 use super::grown::Grown;
 use super::quadric::{add_products, backward, factorize, forward, second_derivatives};
 use super::{Scratch, Support};
 use crate::points::neighbours::Neighbour;
 
-/// |St|² up to which the closed form of a surface of parallel shape operator is asked; it ends at 1.
+/// Greatest |St|² at which the closed form is evaluated. Larger values are clamped to it. The form ends at 1.
 const MAX_TURN: f64 = 0.8;
 
-/// Rounds in which curvature and what it entails in higher orders are made to agree.
+/// Number of rounds in which the curvature and the entailed height are made to agree.
 const ROUNDS: usize = 3;
 
 impl<const D: usize, const P: usize> Grown<D, P> {
-    /// Takes off the heights what the curvature entails beyond second order: a surface whose shape operator S goes along unchanged is
-    /// `z = II(t,t)/(1 + √(1 − |St|²))`, for spheres, cylinders and planes exactly.
+    /// Subtracts the entailed height from the heights.
+    ///
+    /// The entailed height depends on the curvature, and the curvature is fitted to what is left. So the two
+    /// are computed in turn.
     pub(super) fn entail(
         &mut self,
         support: &Support,
@@ -23,7 +29,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         self.look(support, nearest, scratch);
         std::mem::swap(&mut scratch.raw, &mut scratch.heights);
         scratch.heights.clone_from(&scratch.raw);
-        // Every mean counts once: what is wanted here is not noise but what a quadric lacks.
+        // Every mean counts once: the fit is not to average noise but to show what a quadric lacks.
         let mut matrix = [[0.0; P]; P];
         scratch.terms.as_chunks::<P>().0.iter().for_each(|terms| add_products(&mut matrix, terms, 1.0));
         factorize(&mut matrix)?;
@@ -62,7 +68,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
     }
 }
 
-/// `f/(1 + √(1 − u)) − f/2` for f = tᵀSt and u = |St|².
+/// Entailed height at a point: `f/(1 + √(1 − u)) − f/2` for f = tᵀSt and u = |St|².
 #[inline(always)]
 fn beyond_second_order<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64; P]) -> f64 {
     let (t, turned) = (&terms[1..D], turn(shape, &terms[1..D]));
@@ -71,7 +77,8 @@ fn beyond_second_order<const D: usize, const P: usize>(shape: &[[f64; D]; D], te
     0.5 * form * (1.0 - root) / (1.0 + root)
 }
 
-/// The same averaged over the points of a mean: f exactly, the rest to first order in their moments.
+/// Mean of [`beyond_second_order`] over the points of a mean: exact in f, to first order in their moments in
+/// the rest.
 fn averaged<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64; P]) -> f64 {
     let t = &terms[1..D];
     let turned = turn(shape, t);
@@ -80,7 +87,7 @@ fn averaged<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64;
     let mut turn: f64 = turned.iter().map(|s| s * s).sum();
     let mut mixed = 0.0;
     for (next, (a, b)) in second_derivatives(D - 1).enumerate() {
-        // Moments about the mean, in units of the radius; off the diagonal they stand for two.
+        // Moments about the mean, in units of the radius. An entry off the diagonal stands for two.
         let product = terms[D + next] * if a == b { 2.0 } else { 1.0 };
         let moment = (product - t[a] * t[b]) * if a == b { 1.0 } else { 2.0 };
         form += moment * shape[a][b];
@@ -93,7 +100,7 @@ fn averaged<const D: usize, const P: usize>(shape: &[[f64; D]; D], terms: &[f64;
     0.5 * form * share + 2.0 * slope * mixed
 }
 
-/// St.
+/// The product St.
 #[inline(always)]
 fn turn<const D: usize>(shape: &[[f64; D]; D], t: &[f64]) -> [f64; D] {
     let mut product = [0.0; D];

@@ -1,4 +1,4 @@
-//! A neighbourhood that grows while the surface over it is known to bend little.
+//! Construction of a neighbourhood, which grows while the surface over it bends little.
 
 use super::growth::Growth;
 use super::quadric::{Sums, largest_curvature, principal_axes};
@@ -7,16 +7,17 @@ use super::{Batch, Neighbourhood, Scratch, Support};
 use crate::machine::vector::{dot, norm, tangent_basis};
 use crate::points::neighbours::Neighbour;
 
-/// Cosine of 75°, and distance in units of the radius below which points have no direction.
+/// Cosine of 75°, the half angle of an empty sector at a rim.
 const RIM_COSINE: f64 = 0.26;
+/// Distance in units of the radius below which points have no direction.
 const RIM_LEAST: f64 = 0.01;
 
-/// A neighbourhood that grows, in D dimensions with P terms of the trend.
+/// A growing neighbourhood in D dimensions with P terms of the trend.
 pub(super) struct Grown<const D: usize, const P: usize> {
-    /// The points are the first ones of the scratch.
+    /// Number of points in use: the first ones of the scratch.
     n_used: usize,
     radius: f64,
-    /// D − 1 tangents, then the normal.
+    /// Axes of the frame as rows: D − 1 tangents, then the normal.
     frame: [[f64; D]; D],
     /// Coefficients of the quadric, in units of the radius: value, slopes, second derivatives.
     pub(super) quadric: [f64; P],
@@ -46,9 +47,11 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         Some(Neighbourhood { frame, radius, is_at_rim })
     }
 
-    /// The frame of the principal axes of the nearest points, or of the sheet of the query where there are two, whose
-    /// points then come first; turned to the tangent plane of their quadric. With the height up to which points are of
-    /// that sheet.
+    /// Makes the first frame from the nearest points: their principal axes, turned to the tangent plane of
+    /// their quadric.
+    ///
+    /// Where there are two sheets, the frame is that of the sheet of the query, whose points are moved to the
+    /// front. The second result is then the height up to which points belong to that sheet.
     fn start(
         support: &Support,
         nearest: &mut [Neighbour],
@@ -67,7 +70,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         frame.as_flattened_mut().copy_from_slice(&axes);
         let sheet = Sheet::of_two(&scratch.arms, &frame[D - 1]);
         if let Some(sheet) = &sheet {
-            // A sheet has more than half of the points that are looked at: enough to start from.
+            // A sheet has more than half of the points examined: enough to start from.
             bring_forward(sheet, nearest, &mut scratch.arms);
             frame.as_flattened_mut()[..D * (D - 1)].copy_from_slice(&tangent_basis(&sheet.normal));
             frame[D - 1] = sheet.normal;
@@ -84,7 +87,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         Some((grown, sheet.map(|sheet| sheet.reach)))
     }
 
-    /// Takes in more points while the surface that is known bends little over them, without those of other sheets.
+    /// Takes in more points while the surface known so far bends little over them. Points of other sheets are
+    /// left out.
     fn grow(
         &mut self,
         reach: Option<f64>,
@@ -107,7 +111,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         (self.n_used, self.radius) = (kept, nearest[kept - 1].squared_distance.sqrt());
     }
 
-    /// Coordinates in the frame, in units of the radius.
+    /// Computes the terms and heights of the points in the frame, in units of the radius.
     pub(super) fn look(&self, support: &Support, nearest: &[Neighbour], scratch: &mut Scratch) {
         scratch.terms.clear();
         scratch.heights.clear();
@@ -134,7 +138,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         }
     }
 
-    /// Adds to products of the coordinates of a mean those of its points about it.
+    /// Adds the moments of the points of a mean to the products of its coordinates.
     fn spread(&self, support: &Support, at: usize, terms: &mut [f64; P]) {
         let mut next = D;
         for a in 0..D - 1 {
@@ -156,7 +160,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         super::quadric::hessian(&self.quadric)
     }
 
-    /// Turns the frame into the tangent plane of the quadric at the query.
+    /// Turns the frame so that its tangents span the tangent plane of the quadric at the query.
     fn turn(&mut self) {
         let mut normal = self.frame[D - 1];
         for (slope, tangent) in self.quadric[1..D].iter().zip(&self.frame) {
@@ -168,7 +172,8 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         self.frame[D - 1] = normal;
     }
 
-    /// Whether the query is at the rim: in the plane, a sector of 150° has no points (see [`crate::points`], patches).
+    /// Returns whether the query is at the rim: in the plane, a sector of 150° has no points (see
+    /// [`crate::points`], patches).
     fn is_at_rim(&self, scratch: &Scratch) -> bool {
         let terms = scratch.terms.as_chunks::<P>().0;
         let mut away = [0.0; D];
@@ -178,7 +183,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
         let length = norm(&away);
         let along = |terms: &[f64; P]| (0..D - 1).map(|a| away[a] * terms[1 + a]).sum::<f64>();
         let size = |terms: &[f64; P]| (0..D - 1).map(|a| terms[1 + a].powi(2)).sum::<f64>().sqrt();
-        // Points closer than a hundredth of the neighbourhood have no direction to speak of.
+        // Points closer than a hundredth of the neighbourhood have no reliable direction.
         length > 0.0
             && terms
                 .iter()
@@ -211,7 +216,7 @@ impl<const D: usize, const P: usize> Grown<D, P> {
     }
 }
 
-/// Brings the points of a sheet to the front, both parts ascending by their distance.
+/// Moves the points of a sheet to the front. Both parts stay ascending by distance.
 fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], arms: &mut [f64]) {
     let is_of_sheet = |arm: &[f64; D]| dot(arm, &sheet.normal).abs() <= sheet.reach;
     let mut order: Vec<(bool, Neighbour, [f64; D])> = nearest
@@ -219,7 +224,7 @@ fn bring_forward<const D: usize>(sheet: &Sheet<D>, nearest: &mut [Neighbour], ar
         .zip(arms.as_chunks::<D>().0)
         .map(|(found, arm)| (!is_of_sheet(arm), *found, *arm))
         .collect();
-    // Stable: the order of distances stays.
+    // The sort is stable, so the order by distance stays.
     order.sort_by_key(|(is_of_other, ..)| *is_of_other);
     for ((slot, place), (_, found, arm)) in nearest.iter_mut().zip(arms.as_chunks_mut::<D>().0).zip(&order) {
         (*slot, *place) = (*found, *arm);

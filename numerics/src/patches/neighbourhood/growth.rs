@@ -1,4 +1,4 @@
-//! How far a neighbourhood may grow, and which points are not of its sheet.
+//! Growth of a neighbourhood: how far it may reach, and which points belong to other sheets.
 
 use smallvec::SmallVec;
 
@@ -6,34 +6,36 @@ use super::quadric::{Sums, largest_curvature};
 use super::{Scratch, Support};
 use crate::points::neighbours::Neighbour;
 
-/// Curvature times radius up to which a neighbourhood may grow: about the angle by which the normal turns.
+/// Greatest product of curvature and radius of a neighbourhood: about the angle by which the normal turns.
 const MAX_BEND: f64 = 0.7;
 
 /// Standard error of a second derivative times √k, from k heights of unit noise over the unit disc.
 const DISC_ERROR: f64 = 8.5;
 
-/// Height above the quadric of nearer points, over the distance, beyond which a point is not of the same sheet; and how many
-/// deviations of what the quadric leaves come to that.
+/// Height above the quadric of nearer points, relative to the distance, beyond which a point is on another
+/// sheet. [`RESIDUALS`] standard deviations are allowed on top.
 const OTHER_SHEET: f64 = 0.3;
+/// Standard deviations of the heights from the quadric that are allowed on top of [`OTHER_SHEET`].
 const RESIDUALS: f64 = 3.0;
 
 /// A quadric over more and more points, in one frame and one unit.
 pub(super) struct Growth<const D: usize, const P: usize> {
     sums: Sums<P>,
     pub(super) quadric: [f64; P],
-    /// Deviation of the heights from it.
+    /// Standard deviation of the heights from the quadric.
     residual: f64,
     /// Largest curvature that noise does not explain.
     curvature: f64,
+    /// Number of nearest points considered so far.
     n_seen: usize,
-    /// Places that are taken, ascending.
+    /// Places in the list of the nearest points that were taken in, ascending.
     taken: SmallVec<[u32; 64]>,
-    /// Height above the quadric beyond which a point is not of the same sheet in any case.
+    /// Greatest height above the quadric, beside the residual, of a point on the sheet.
     reach: f64,
 }
 
 impl<const D: usize, const P: usize> Growth<D, P> {
-    /// Nothing yet.
+    /// Returns a quadric over no points yet.
     pub(super) fn up_to(reach: f64) -> Self {
         Self {
             sums: Sums::default(),
@@ -46,7 +48,8 @@ impl<const D: usize, const P: usize> Growth<D, P> {
         }
     }
 
-    /// Takes in the points up to `count`; `None` if the surface bends too much over them, or is not determined.
+    /// Takes in the points up to `count`. Returns `None` if the surface bends too much over them, or is not
+    /// determined.
     pub(super) fn take(
         &mut self,
         count: usize,
@@ -76,7 +79,7 @@ impl<const D: usize, const P: usize> Growth<D, P> {
         found
     }
 
-    /// The quadric of these points, if the surface bends little over them.
+    /// Fits the quadric to the points taken in. Returns `None` if the surface bends too much over them.
     fn settle(&mut self, sums: &Sums<P>, radius: f64) -> Option<()> {
         let (quadric, residual) = sums.fit()?;
         let n_used = self.taken.len() as f64;
@@ -84,7 +87,7 @@ impl<const D: usize, const P: usize> Growth<D, P> {
         let noise = DISC_ERROR * (residual / freedom / n_used).sqrt() / (radius * radius);
         let bend = largest_curvature::<D, P>(&quadric);
         let curvature = (bend - 2.0 * noise).max(0.0);
-        // The first points are all that is known.
+        // The first points are kept however much they bend: nothing else is known.
         if !bend.is_finite() || self.n_seen > 0 && curvature * radius > MAX_BEND {
             return None;
         }
@@ -100,7 +103,7 @@ impl<const D: usize, const P: usize> Growth<D, P> {
         (height - expected).abs() <= most
     }
 
-    /// Keeps what was taken in; the number of points.
+    /// Moves the points that were taken in to the front of both lists and returns their number.
     pub(super) fn keep(&self, nearest: &mut [Neighbour], arms: &mut [f64]) -> usize {
         for (to, from) in self.taken.iter().map(|&at| at as usize).enumerate() {
             nearest.swap(to, from);

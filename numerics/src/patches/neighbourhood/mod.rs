@@ -1,4 +1,4 @@
-//! The surface around a query as a height over a tangent plane of its own.
+//! Neighbourhoods of queries: the surface as a height over a tangent plane of each query.
 
 mod entailed;
 mod grown;
@@ -13,11 +13,12 @@ use crate::points::neighbours::Neighbour;
 use crate::solver::choose::MAX_LOCAL_DIMENSION;
 use grown::Grown;
 
-/// Points per term of the trend in a whole neighbourhood: 30 for surfaces in space.
+/// Points per term of the trend in a whole neighbourhood: 30 points for surfaces in space.
 const POINTS_PER_TERM: usize = 5;
 
-/// Points, or means, in a neighbourhood: even, and at most as many as there are. None in dimensions that have
-/// no regressions, so that nothing is searched or factorized there.
+/// Number of points, or means, in a neighbourhood: even, and at most `available`.
+///
+/// It is 0 in dimensions without regressions, so that nothing is searched or factorized there.
 pub(crate) fn n_neighbours(dimension: usize, available: usize) -> usize {
     if dimension > MAX_LOCAL_DIMENSION {
         return 0;
@@ -25,25 +26,27 @@ pub(crate) fn n_neighbours(dimension: usize, available: usize) -> usize {
     (POINTS_PER_TERM * n_terms(dimension)).next_multiple_of(2).min(available / 2 * 2)
 }
 
-/// A frame at a query with the quadric of the heights above it, in units of its radius.
+/// Frame and size of the neighbourhood of a query. Its points go into a lane of a [`Batch`].
 pub(crate) struct Neighbourhood {
-    /// d − 1 tangents, then the normal, `[d, d]`.
+    /// Axes of the frame as rows: d − 1 tangents, then the normal, `[d, d]`.
     pub frame: Small,
     /// R: greatest distance of a point that is used, unit L.
     pub radius: f64,
-    /// Whether no neighbour lies within 75° of the direction opposite to most of them.
+    /// True if no neighbour lies within 75° of the direction opposite to most of them.
     pub is_at_rim: bool,
 }
 
-/// Room for the coordinates of one neighbourhood.
+/// Buffers for the points of one neighbourhood.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// x_j − x, `[count, d]`, unit L.
+    /// Differences x_j − x, `[count, d]`, unit L.
     pub(super) arms: Vec<f64>,
-    /// Terms of the trend, 1 left out: tangential coordinates and their products in units of the radius at hand, `[count, p]`.
+    /// Terms of the trend in units of the current radius: 1, the tangential coordinates and their products,
+    /// `[count, p]`.
     pub(super) terms: Vec<f64>,
-    /// Heights without what curvature entails, and as they are.
+    /// Heights without the entailed height, in units of the current radius.
     pub(super) heights: Vec<f64>,
+    /// Heights as they are, in units of the current radius.
     pub(super) raw: Vec<f64>,
 }
 
@@ -54,7 +57,8 @@ impl Scratch {
 }
 
 impl Neighbourhood {
-    /// The neighbourhood of x, put into one lane of a batch; `None` if the nearest points determine no surface.
+    /// Puts the neighbourhood of x into one lane of a batch. Returns `None` if the nearest points determine
+    /// no surface.
     pub(crate) fn put(
         support: &Support,
         x: &[f64],

@@ -1,12 +1,12 @@
-//! Least squares of a few terms, and principal axes.
+//! Least squares with a few terms, and principal axes.
 
 use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 
-/// Pivot against the diagonal below which points do not determine a quadric.
+/// Least ratio of a pivot to its diagonal entry. Below it, the points do not determine a quadric.
 const SINGULAR: f64 = 1e-10;
 
-/// Weighted sums of products of terms and heights: the normal equations of a quadric.
+/// Normal equations of a quadric: weighted sums of products of terms and heights.
 #[derive(Clone, Copy)]
 pub(super) struct Sums<const P: usize> {
     matrix: [[f64; P]; P],
@@ -32,7 +32,8 @@ impl<const P: usize> Sums<P> {
         self.n += 1.0;
     }
 
-    /// The quadric, and the sum of squares that it leaves, each mean counting once.
+    /// Returns the quadric and the sum of squared residuals, in which each mean counts once. Returns `None`
+    /// if the points do not determine a quadric.
     pub(super) fn fit(&self) -> Option<([f64; P], f64)> {
         let (mut matrix, mut right) = (self.matrix, self.right);
         factorize(&mut matrix)?;
@@ -64,23 +65,23 @@ pub(super) fn hessian<const D: usize, const P: usize>(quadric: &[f64; P]) -> [[f
     matrix
 }
 
-/// Pairs of tangential axes of the second derivatives, in order.
+/// Pairs of tangential axes of the second derivatives, in the order of the terms.
 pub(super) fn second_derivatives(k: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..k).flat_map(move |a| (a..k).map(move |b| (a, b)))
 }
 
-/// Adds `weight · terms termsᵀ` to an upper triangle.
+/// Adds `weight · terms termsᵀ` to a matrix, of which the upper triangle is used.
 pub(super) fn add_products<const P: usize>(matrix: &mut [[f64; P]; P], terms: &[f64; P], weight: f64) {
     for i in 0..P {
         let scaled = weight * terms[i];
-        // All of the row: shorter to compute than to decide where it begins.
+        // The whole row: computing it is shorter than deciding where it begins.
         for l in 0..P {
             matrix[i][l] += scaled * terms[l];
         }
     }
 }
 
-/// RᵀR = A in the upper triangle; `None` if singular.
+/// Factorizes RᵀR = A in the upper triangle. Returns `None` if A is singular.
 pub(super) fn factorize<const P: usize>(a: &mut [[f64; P]; P]) -> Option<()> {
     for i in 0..P {
         let diagonal = a[i][i];
@@ -89,7 +90,7 @@ pub(super) fn factorize<const P: usize>(a: &mut [[f64; P]; P]) -> Option<()> {
             let factor = row[i];
             rest[0][i..].iter_mut().zip(&row[i..]).for_each(|(x, r)| *x -= factor * r);
         }
-        // Not finite is not greater either.
+        // NaN fails this comparison too.
         let is_determined = a[i][i] > SINGULAR * diagonal;
         if !is_determined {
             return None;
@@ -100,7 +101,7 @@ pub(super) fn factorize<const P: usize>(a: &mut [[f64; P]; P]) -> Option<()> {
     Some(())
 }
 
-/// R⁻ᵀb.
+/// Replaces b by R⁻ᵀb.
 pub(super) fn forward<const P: usize>(r: &[[f64; P]; P], b: &mut [f64; P]) {
     for i in 0..P {
         b[i] /= r[i][i];
@@ -110,7 +111,7 @@ pub(super) fn forward<const P: usize>(r: &[[f64; P]; P], b: &mut [f64; P]) {
     }
 }
 
-/// R⁻¹b.
+/// Replaces b by R⁻¹b.
 pub(super) fn backward<const P: usize>(r: &[[f64; P]; P], b: &mut [f64; P]) {
     for i in (0..P).rev() {
         let known: f64 = (i + 1..P).map(|l| r[i][l] * b[l]).sum();
@@ -118,7 +119,7 @@ pub(super) fn backward<const P: usize>(r: &[[f64; P]; P], b: &mut [f64; P]) {
     }
 }
 
-/// Principal axes of arms about their mean, the direction of least variance last.
+/// Principal axes of arms about their mean, the direction of least variance last, `[d, d]`.
 pub(super) fn principal_axes(arms: &[f64], d: usize, radius: f64) -> Small {
     let n = (arms.len() / d) as f64;
     let mut mean = zeros(d);

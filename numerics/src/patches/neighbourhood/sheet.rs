@@ -1,37 +1,40 @@
-//! One of two sheets that are nearer to each other than their points.
+//! Separation of two sheets that are nearer to each other than their points.
 //!
-//! The nearest points of a thin plate are those of both of its faces, and the principal axes of them all say
-//! nothing of either. Half of them and more belong to the face of the query, though: of the planes through the
-//! query and some of its neighbours the one that leaves most of the points near it is that face
-//! (least median of squares: Rousseeuw 1984), and the heights of the others are a group of their own.
+//! The nearest points of a thin plate come from both of its faces, and the principal axes of all of them
+//! describe neither face. At least half of them belong to the face of the query, though. Planes are laid
+//! through the query and some of its neighbours. The plane with the least median distance of the points is
+//! the face (least median of squares: Rousseeuw 1984). The heights of the other points form a separate group.
 
 use smallvec::SmallVec;
 
 use crate::machine::vector::{dot, norm};
 
-/// Nearest points that are looked at.
+/// Number of nearest points that are examined.
 const LOOKED_AT: usize = 16;
 
-/// Neighbours that planes are laid through.
+/// Number of neighbours that the planes are laid through.
 const CANDIDATES: usize = 8;
 
-/// Greatest height over distance of the farthest up to which there is one sheet: nothing else is asked then.
+/// Greatest height, relative to the distance of the farthest point, up to which there is only one sheet.
+/// Planes are then not searched for.
 const FLAT: f64 = 0.25;
 
-/// How many times the heights of one sheet those of the other are at least: of one sheet with noise they follow each
-/// other closely.
+/// Least ratio of the heights beyond a gap to those before it, if there are two sheets. In one sheet with
+/// noise successive heights follow each other closely.
 const APART: f64 = 3.0;
 
 /// The sheet of a query.
 pub(super) struct Sheet<const D: usize> {
     pub(super) normal: [f64; D],
-    /// Height up to which points are of it, unit L.
+    /// Height up to which points belong to the sheet, unit L.
     pub(super) reach: f64,
 }
 
 impl<const D: usize> Sheet<D> {
-    /// The sheet of the query, if there are two among the nearest of these arms `[count, D]`, ascending by length;
-    /// `normal` is what all of them together say.
+    /// Finds the sheet of the query if there are two among the nearest of these arms. Returns `None` if there
+    /// is one.
+    ///
+    /// `arms` is `[count, D]`, ascending by length. `normal` is the normal that all of them together suggest.
     pub(super) fn of_two(arms: &[f64], normal: &[f64; D]) -> Option<Self> {
         let arms = &arms.as_chunks::<D>().0;
         let arms = &arms[..arms.len().min(LOOKED_AT)];
@@ -49,7 +52,7 @@ impl<const D: usize> Sheet<D> {
             }
         }
         let (normal, heights) = best?;
-        // Heights up to rounding are none.
+        // Heights below the floor are rounding.
         let floor = 1e-6 * farthest;
         let gap =
             (LOOKED_AT / 2..LOOKED_AT - 1).find(|&at| heights[at + 1] > APART * heights[at].max(floor))?;
@@ -57,7 +60,7 @@ impl<const D: usize> Sheet<D> {
     }
 }
 
-/// Normals of planes through the query and its nearest neighbours.
+/// Normals of planes through the query and its nearest neighbours: lines for D = 2, and none for D = 4.
 fn candidates<const D: usize>(arms: &[[f64; D]], farthest: f64) -> SmallVec<[[f64; D]; 32]> {
     let apart = arms.iter().filter(|arm| norm(*arm) > 1e-6 * farthest);
     let near: SmallVec<[&[f64; D]; CANDIDATES]> = apart.take(CANDIDATES).collect();
@@ -77,7 +80,7 @@ fn candidates<const D: usize>(arms: &[[f64; D]], farthest: f64) -> SmallVec<[[f6
     normals
 }
 
-/// A vector of length 1, unless it is nothing against this size.
+/// Returns the vector scaled to length 1, or `None` if it is negligible against `size`.
 fn unit<const D: usize>(component: impl Fn(usize) -> f64, size: f64) -> Option<[f64; D]> {
     let vector: [f64; D] = std::array::from_fn(component);
     let length = norm(&vector);
@@ -89,7 +92,8 @@ mod tests {
     use super::*;
     use crate::testing::Random;
 
-    /// Arms from a point in the middle of a face of a plate of this thickness in spacings, with noise, ascending.
+    /// Arms from a point in the middle of a face of a plate, ascending. Its thickness is in spacings. The
+    /// points have noise.
     fn plate(thickness: f64, noise: f64, random: &mut Random) -> Vec<f64> {
         let mut arms: Vec<[f64; 3]> = Vec::new();
         for face in [0.0, thickness] {
@@ -118,7 +122,8 @@ mod tests {
                         })
                     })
                     .count();
-                // Less than a spacing apart the faces are told apart at half of the points, else at three quarters.
+                // Faces less than a spacing apart are told apart at half of the points, other faces at three
+                // quarters.
                 let least = if thickness < 1.0 { 30 } else { 55 };
                 assert!(n_right >= least, "{thickness}, {noise}: {n_right}");
             }

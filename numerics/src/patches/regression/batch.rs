@@ -1,19 +1,22 @@
-//! Neighbourhoods side by side, one in each lane of a register.
+//! Batches of neighbourhoods, one in each lane of a register.
 
-/// Neighbourhoods side by side: `count` points each (masked ones make up for neighbourhoods that have less).
+/// Neighbourhoods side by side, with `count` places each. A neighbourhood with fewer points leaves the last
+/// places empty.
 pub(crate) struct Batch {
     pub dimension: usize,
     pub count: usize,
     pub lanes: usize,
     /// Tangential coordinates and height in units of the radius, `[d, count, lanes]`.
     pub(super) coordinates: Vec<f64>,
-    /// Terms of second order: means of ½t_a², t_a t_b over the points of a mean, `[k(k+1)/2, count, lanes]`.
+    /// Terms of second order: means of ½t_a² and t_a t_b over the points of a mean,
+    /// `[k(k+1)/2, count, lanes]`.
     pub(super) products: Vec<f64>,
-    /// What curvature entails beyond second order, which is taken off the heights, `[count, lanes]`.
+    /// Entailed heights, which were subtracted from the heights: what curvature implies beyond second order,
+    /// `[count, lanes]`.
     pub(super) entailed: Vec<f64>,
-    /// w: 1 over the number of points of a mean, `[count, lanes]`.
+    /// Weights w: 1 over the number of points of a mean, `[count, lanes]`.
     pub(super) weights: Vec<f64>,
-    /// 1 for a point, 0 for a place that is left empty, `[count, lanes]`.
+    /// 1 for a point, 0 for an empty place, `[count, lanes]`.
     pub(super) is_point: Vec<f64>,
 }
 
@@ -52,14 +55,14 @@ impl Batch {
         self.weights[j * self.lanes + lane] = weight;
     }
 
-    /// Leaves out the points of a lane from one on: they are the farthest.
+    /// Empties the places of a lane from `n_kept` on.
     pub(crate) fn keep(&mut self, lane: usize, n_kept: usize) {
         for j in n_kept..self.count {
             self.set_point(j, lane, false);
         }
     }
 
-    /// Fills an unused lane with what another has, so that it takes no exceptions.
+    /// Copies one lane into an unused one, so that the unused lane holds valid numbers.
     pub(crate) fn copy_lane(&mut self, from: usize, to: usize) {
         let lanes = self.lanes;
         for list in [

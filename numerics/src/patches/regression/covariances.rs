@@ -1,4 +1,5 @@
-//! Covariances of the heights and their derivatives, the trend and the data, written where they are factorized.
+//! Covariances of the heights and their derivatives, trend and data, written into the matrix to be
+//! factorized.
 
 use pulp::Simd;
 
@@ -6,10 +7,10 @@ use super::{Factored, triangle};
 use crate::kernel::Pairs;
 use crate::machine::registers::{BLOCK, Pack};
 
-/// What every point is given beside its noise, relative to k₀: rounding of the heights.
+/// Variance added to every point besides its noise, relative to k₀. It covers rounding of the heights.
 const NUGGET: f64 = 1e-13;
 
-/// φ over scaled squared distances that are there already.
+/// A pass that replaces squared distances by φ, in place.
 struct Fill<'a, S: Simd> {
     simd: S,
     entries: &'a mut [S::f64s],
@@ -30,7 +31,7 @@ impl<S: Simd> Pairs<S> for Fill<'_, S> {
     }
 }
 
-/// φ, φ′ and φ″ at one block of scaled squared distances.
+/// A pass that computes φ, φ′ and φ″ for one block of squared distances.
 struct Derivatives<'a, S: Simd> {
     simd: S,
     entries: &'a mut [S::f64s],
@@ -56,7 +57,8 @@ impl<S: Simd> Pairs<S> for Derivatives<'_, S> {
 }
 
 impl<S: Simd> Factored<'_, S> {
-    /// φ below the diagonal, 1 + noise on it; rows and columns of empty places are those of the identity.
+    /// Writes φ below the diagonal and 1 + noise onto it. Rows and columns of empty places are those of the
+    /// identity.
     #[inline(always)]
     pub(super) fn fill_triangle(&mut self) {
         let n = self.n;
@@ -90,6 +92,8 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Writes the rows of the trend, of the heights and of the entailed heights. The other extra rows become
+    /// 0.
     #[inline(always)]
     pub(super) fn fill_trend(&mut self) {
         let (n, k) = (self.n, self.k);
@@ -113,15 +117,16 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// Covariances of the derivatives at the query, t = 0, with g at the points: by D = 0 − t_j
-    /// `∂_a k = 2φ′D_a/ℓ²`, `∂_ab k = 4φ″D_aD_b/ℓ⁴ + 2φ′δ_ab/ℓ²`.
+    /// Writes the covariances of the derivatives at the query, t = 0, with g at the points.
+    ///
+    /// For D = 0 − t_j they are `∂_a k = 2φ′D_a/ℓ²` and `∂_ab k = 4φ″D_aD_b/ℓ⁴ + 2φ′δ_ab/ℓ²`.
     #[inline(always)]
     pub(super) fn fill_covariances(&mut self) {
         let (n, k) = (self.n, self.k);
         let scale = self.model.length_scale.powi(-2);
         let per_block = BLOCK / S::F64_LANES;
         let zero = self.simd.splat_f64s(0.0);
-        // As many registers as a block has at most.
+        // A block has at most this many registers.
         let mut q = [zero; BLOCK];
         let mut first = [zero; BLOCK];
         let mut second = [zero; BLOCK];

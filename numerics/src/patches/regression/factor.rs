@@ -1,15 +1,16 @@
-//! K = LLᵀ in tiles of registers.
+//! Cholesky factorization K = LLᵀ in tiles of registers.
 
 use pulp::Simd;
 
 use super::{Factored, ROWS};
 use crate::machine::registers::Pack;
 
-/// Columns that are solved for at once: with [`ROWS`] 8 chains of products that do not wait for one another.
+/// Columns of a tile. With [`ROWS`] rows that makes 8 chains of products that do not wait for one another.
 const COLUMNS: usize = 2;
 
 impl<S: Simd> Factored<'_, S> {
-    /// Left-looking, in tiles: K = LLᵀ, and below it the rows of the right-hand sides times L⁻ᵀ.
+    /// Factorizes K = LLᵀ, left-looking, in tiles. The rows of the right-hand sides below K become their
+    /// products with L⁻ᵀ.
     #[inline(always)]
     pub(super) fn factorize(&mut self, n_rows: usize) {
         let mut column = 0;
@@ -32,7 +33,8 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// R rows from i on by the columns from `column` on, once all columns before are done.
+    /// Computes R rows from i on in the [`COLUMNS`] columns from `column` on. All columns before must be
+    /// done.
     #[inline(always)]
     fn tile<const R: usize>(&mut self, i: usize, column: usize) {
         let zero = Pack::<S, 1>::splat(self.simd, 0.0);
@@ -63,7 +65,7 @@ impl<S: Simd> Factored<'_, S> {
             let row = rows[r];
             let first = self.at(row + column) - sums[r][0];
             if i + r == column {
-                // The inverse of the diagonal is kept in its place: rows below multiply by it.
+                // The inverse of the diagonal is kept in its place, because the rows below multiply by it.
                 (1.0 / first.sqrt()).write(self.matrix, row + column);
                 continue;
             }
@@ -83,6 +85,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
+    /// Inner product of rows i and j over the n points.
     #[inline(always)]
     pub(super) fn product(&self, i: usize, j: usize) -> Pack<S, 1> {
         let (a, b) = (self.row(i), self.row(j));

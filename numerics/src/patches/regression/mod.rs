@@ -1,10 +1,15 @@
 //! Kriging of heights over a tangent plane, several queries at once: one in each lane of a register.
 //!
-//! Around each query the surface is a height `z(t) = f(t)ᵀβ + g(t) + ε` over d − 1 tangential coordinates: a quadratic trend with
-//! flat prior, a Gaussian process `g` with covariance `s² φ(|t − t′|²/ℓ²)`, and noise of variance `s²τ²w_j` at point j (w_j is 1 over
-//! the number of points whose mean it is). With `K = φ + τ²W`, all that is asked for comes from one Cholesky factorization of
-//! K by forward substitution of the trend F, the heights z and the covariances C of the derivatives at the query: universal
-//! kriging (Cressie 1993, sec. 3.4; Rasmussen and Williams 2006, sec. 2.7), with the scale s² integrated out.
+//! Around each query the surface is a height `z(t) = f(t)ᵀβ + g(t) + ε` over d − 1 tangential coordinates. It
+//! has three parts:
+//! - a quadratic trend with a flat prior,
+//! - a Gaussian process `g` with covariance `s² φ(|t − t′|²/ℓ²)`,
+//! - noise of variance `s²τ²w_j` at point j, where w_j is 1 over the number of points whose mean it is.
+//!
+//! With `K = φ + τ²W` everything follows from one Cholesky factorization of K. Forward substitution is
+//! applied to the trend F, the heights z and the covariances C of the derivatives at the query. This is
+//! universal kriging (Cressie 1993, sec. 3.4; Rasmussen and Williams 2006, sec. 2.7) with the scale s²
+//! integrated out.
 
 mod batch;
 mod covariances;
@@ -26,38 +31,39 @@ pub(crate) use model::Model;
 /// Numbers in the widest register.
 pub(crate) const MAX_LANES: usize = 8;
 
-/// Rows that are solved for at once.
+/// Rows of a tile, which are solved for at once.
 const ROWS: usize = 4;
 
 /// Rounding of the heights, in units of the radius.
 const LEAST_HEIGHT: f64 = 1e-16;
 
-/// 1, d − 1 coordinates, their products: `d(d+1)/2`.
+/// Number of terms of a quadric: 1, d − 1 coordinates and their products make `d(d+1)/2`.
 pub(crate) const fn n_terms(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
-/// What a model says at the query of one lane, in units of the radius R of its patch.
+/// Result of one model at the query of one lane, in units of the radius R of its patch.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kriged {
-    /// Logarithm of the restricted likelihood with s² integrated out under 1/s², up to a constant of the patch; NaN where K is not
-    /// positive definite in float64.
+    /// Logarithm of the restricted likelihood, with s² integrated out under the prior 1/s², up to a constant
+    /// of the patch. NaN where K is not positive definite in float64.
     pub log_likelihood: f64,
-    /// s², as `q/(n − p)`.
+    /// Scale s², estimated as `q/(n − p)`.
     pub scale: f64,
-    /// n − p.
+    /// Degrees of freedom, n − p.
     pub freedom: f64,
-    /// z, z_a, z_aa, z_ab at the query, `[p]`.
+    /// Posterior means of z, z_a, z_aa, z_ab at the query, `[p]`.
     pub means: Terms,
-    /// Their covariance, `[p, p]`.
+    /// Covariance of `means`, `[p, p]`.
     pub covariance: Squares,
 }
 
-/// Numbers per term, and per pair of terms, on the stack for surfaces in space.
+/// Numbers, one per term, on the stack for surfaces in space.
 pub(crate) type Terms = SmallVec<[f64; 8]>;
+/// Numbers, one per pair of terms, on the stack for surfaces in space.
 pub(crate) type Squares = SmallVec<[f64; 36]>;
 
-/// Room for one batch.
+/// Memory for the factorization of one batch.
 pub(crate) struct Workspace {
     matrix: Vec<f64>,
     start: usize,
@@ -70,26 +76,28 @@ impl Workspace {
         // Inner products of those rows, and a system of p unknowns with as many right-hand sides.
         let n = n + 2 * n_rows * n_rows * MAX_LANES;
         let matrix = vec![0.0; n + MAX_LANES];
-        // On the boundary of a cache line.
+        // Aligned to a cache line.
         let start = matrix.as_ptr().align_offset(64).min(MAX_LANES);
         Self { matrix, start }
     }
 }
 
+/// Number of rows below K: Fᵀ, zᵀ, eᵀ and Cᵀ, rounded up to whole tiles.
 fn extra_rows(dimension: usize) -> usize {
     (2 * n_terms(dimension) + 2).next_multiple_of(ROWS)
 }
 
+/// Number of entries of a lower triangle with n rows, and the start of row n in it.
 const fn triangle(n: usize) -> usize {
     n * (n + 1) / 2
 }
 
-/// Kriging of each lane.
+/// The computation that kriges every lane of a batch with one model.
 pub(crate) struct Krige<'a> {
     pub batch: &'a Batch,
     pub model: &'a Model,
     pub workspace: &'a mut Workspace,
-    /// Whether derivatives at the query are asked for beside the likelihood.
+    /// True if derivatives at the query are asked for, besides the likelihood.
     pub predicts: bool,
 }
 
@@ -116,14 +124,21 @@ impl WithSimd for Krige<'_> {
     }
 }
 
-/// A batch on its way through the factorization: rows of the lower triangle one after the other, and below it the rows of Fᵀ
-/// `[p]`, zᵀ, Cᵀ `[p]`, all of length n.
+/// A batch during its factorization.
+///
+/// The matrix holds the rows of the lower triangle of K one after the other. Below it come the rows of Fᵀ
+/// `[p]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`, all of length n.
 struct Factored<'a, S: Simd> {
     simd: S,
+    /// Tangential coordinates, d − 1.
     k: usize,
+    /// Places in each lane.
     n: usize,
+    /// Terms of a quadric.
     p: usize,
+    /// Terms of the trend, at most p.
     p_trend: usize,
+    /// Rows of the matrix.
     n_rows: usize,
     batch: &'a Batch,
     model: &'a Model,

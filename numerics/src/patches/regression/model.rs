@@ -1,26 +1,28 @@
-//! The covariance of the heights, up to its scale.
+//! Covariance of the heights, up to its scale.
 
 use smallvec::SmallVec;
 
 use super::{Squares, triangle};
 use crate::kernel::Family;
 
-/// Shape of the covariance: all but its scale.
+/// Hyperparameters of the covariance, except its scale s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Model {
-    /// φ.
+    /// Family of φ.
     pub family: Family,
-    /// ℓ in units of the radius of a patch.
+    /// Length scale ℓ in units of the radius of a patch.
     pub length_scale: f64,
-    /// τ²: variance of the noise of a point over s².
+    /// τ²: variance of the noise of a point divided by s².
     pub noise: f64,
-    /// Terms of the trend: 1 + (d − 1) for a plane, d(d+1)/2 for a quadric.
+    /// Number of terms of the trend: 1 + (d − 1) for a plane, d(d+1)/2 for a quadric.
     pub n_trend: usize,
 }
 
 impl Model {
-    /// Variance of a third derivative of g along an axis over 15 s², in units of the radius: −8φ‴(0)/ℓ⁶ by the mixed derivatives of
-    /// a radial function.
+    /// Variance of a third derivative of g along an axis divided by 15 s², in units of the radius:
+    /// −8φ‴(0)/ℓ⁶.
+    ///
+    /// It follows from the mixed derivatives of a radial function.
     pub(crate) fn third_derivative_variance(&self) -> f64 {
         THIRD_DERIVATIVE * self.length_scale.powi(-6)
     }
@@ -29,7 +31,7 @@ impl Model {
 /// −8φ‴(0) of Matérn's kernel for ν = 9/2: φ‴ = −ν³ θ₁(0)/θ₄(0).
 const THIRD_DERIVATIVE: f64 = 8.0 * 4.5 * 4.5 * 4.5 / 105.0;
 
-/// Covariance of value, gradient and Hessian of g at one place over s².
+/// Covariance of value, gradient and Hessian of g at one place, divided by s², `[p, p]`.
 pub(super) fn prior_covariance(model: &Model, k: usize) -> Squares {
     let p = triangle(k) + k + 1;
     let scale = model.length_scale.powi(-2);

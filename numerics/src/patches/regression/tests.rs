@@ -1,4 +1,4 @@
-//! Kriging in lanes against its formulas, written out for one query with derivatives by differences.
+//! Kriging in lanes against its formulas, written out for one query, with derivatives by differences.
 
 use super::doubt::Doubt;
 use super::*;
@@ -11,7 +11,7 @@ const P: usize = n_terms(3);
 const LENGTH_SCALE: f64 = 0.8;
 const NOISE: f64 = 0.01;
 
-/// One neighbourhood.
+/// Points of one neighbourhood.
 struct Points {
     places: [[f64; 2]; N],
     heights: [f64; N],
@@ -36,7 +36,7 @@ impl Points {
         [1.0, s, t, 0.5 * s * s, s * t, 0.5 * t * t]
     }
 
-    /// All lanes have it; so many of the places are left empty at the end.
+    /// Makes a batch with this neighbourhood in all lanes and `n_empty` empty places at the end.
     fn batch(&self, lanes: usize, n_empty: usize) -> Batch {
         let mut batch = Batch::new(3, N + n_empty, lanes);
         for lane in 0..lanes {
@@ -61,7 +61,7 @@ fn matern(x: [f64; 2], y: [f64; 2]) -> f64 {
     (-r).exp() * (1.0 + r + 3.0 / 7.0 * r * r + 2.0 / 21.0 * r.powi(3) + r.powi(4) / 105.0)
 }
 
-/// A value, first and second derivatives of f at 0 by central differences, in the order of the terms.
+/// Value, first and second derivatives of f at 0 by central differences, in the order of the terms.
 fn derivatives(f: impl Fn([f64; 2]) -> f64) -> [f64; P] {
     const H: f64 = 1e-3;
     let at = |s: f64, t: f64| f([s * H, t * H]);
@@ -104,7 +104,7 @@ fn dot<const M: usize>(x: &[f64; M], y: &[f64; M]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// What [`Kriged`] is to be.
+/// Expected [`Kriged`], by the formulas.
 fn written_out(points: &Points) -> Kriged {
     let covariance = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
@@ -117,7 +117,7 @@ fn written_out(points: &Points) -> Kriged {
     let solved = trend.map(|column| times(&inverse_k, &column));
     let gram = std::array::from_fn(|i| std::array::from_fn(|j| dot(&trend[i], &solved[j])));
     let (inverse_a, log_a) = inverse::<P>(gram);
-    // What the trend leaves of K⁻¹y, with the coefficients of the trend.
+    // Coefficients of the trend for y, and K⁻¹ times the residual of y.
     let fit = |y: &[f64; N]| {
         let coefficients = times(&inverse_a, &solved.map(|column| dot(&column, y)));
         let rest = std::array::from_fn(|j| y[j] - dot(&points.terms(j), &coefficients));
@@ -175,7 +175,8 @@ fn lanes_say_what_the_formulas_say() {
                 assert!((found.log_likelihood - expected.log_likelihood).abs() < 1e-8, "{seed}");
                 assert!((found.scale / expected.scale - 1.0).abs() < 1e-8, "{seed}");
                 assert_eq!(found.freedom, expected.freedom);
-                // Second differences with steps of 1e-3 leave 1e-6 of fourth derivatives, which are in the hundreds.
+                // Second differences with steps of 1e-3 leave errors of 1e-6 of fourth derivatives, which are
+                // in the hundreds.
                 for (x, y) in found.means.iter().zip(&expected.means) {
                     assert!((x - y).abs() < 1e-3, "{seed}: {:?} against {:?}", found.means, expected.means);
                 }
@@ -191,12 +192,13 @@ fn lanes_say_what_the_formulas_say() {
 fn prior_covariances_are_derivatives_of_the_kernel() {
     let model = Model { family: kernel().family(), length_scale: LENGTH_SCALE, noise: NOISE, n_trend: P };
     let prior = model::prior_covariance(&model, 2);
-    // ∂_i of x and ∂_j of y of k(x, y) at 0: differences of differences.
+    // Derivative ∂_i in x and ∂_j in y of k(x, y) at 0: differences of differences.
     for i in 0..P {
         let row = derivatives(|y| derivatives(|x| matern(x, y))[i]);
         for (j, expected) in row.into_iter().enumerate() {
             let found = prior[i * P + j];
-            // Of fourth order, differences of steps 1e-3 lose 1e-16/1e-12 by rounding, and as much of the sixth derivatives.
+            // Differences of fourth order with steps of 1e-3 lose 1e-16/1e-12 by rounding, and as much by the
+            // sixth derivatives.
             assert!(
                 (found - expected).abs() < 2e-3 * (1.0 + found.abs()),
                 "{i}, {j}: {found} against {expected}"

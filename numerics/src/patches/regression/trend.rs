@@ -9,7 +9,7 @@ use super::{Factored, Kriged, LEAST_HEIGHT, MAX_LANES, extra_rows, triangle};
 use crate::machine::registers::Pack;
 
 impl<S: Simd> Factored<'_, S> {
-    /// Inner products of the rows below give the likelihood, the trend and the derivatives.
+    /// Computes the results of all lanes from inner products of the rows below the factor.
     #[inline(always)]
     pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
         let (p, p_trend) = (self.p, self.p_trend);
@@ -41,7 +41,7 @@ impl<S: Simd> Factored<'_, S> {
                 if j < i {
                     continue;
                 }
-                // By columns of R: entry (i, j) of Rᵀ for j < p, of R⁻¹(b, U) beyond.
+                // By columns of R: entry (i, j) is that of Rᵀ for j < p_trend, of R⁻¹(b, U) beyond.
                 for l in 0..i {
                     value = value - self.at(small + l * width + i) * self.at(small + l * width + j);
                 }
@@ -49,7 +49,7 @@ impl<S: Simd> Factored<'_, S> {
                 value.write(self.matrix, small + i * width + j);
             }
         }
-        // Forms of heights and of what is entailed in what the trend leaves of K⁻¹.
+        // Quadratic forms of heights and entailed heights, with the trend projected out of K⁻¹.
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
             let mut quadratic = self.at(entry(p + i, p + j));
             for l in 0..p_trend {
@@ -64,7 +64,7 @@ impl<S: Simd> Factored<'_, S> {
         self.lanes(start, n_kept, small, width, predicts)
     }
 
-    /// Means and covariances over s² of the derivatives, in place of the products with C.
+    /// Computes means and covariances (over s²) of the derivatives, in place of the products with C.
     #[inline(always)]
     fn predict(&mut self, start: usize, n_kept: usize, small: usize, width: usize) {
         let (p, p_trend) = (self.p, self.p_trend);
@@ -91,7 +91,7 @@ impl<S: Simd> Factored<'_, S> {
         }
     }
 
-    /// The numbers of each lane.
+    /// Collects the numbers of each lane.
     #[inline(always)]
     fn lanes(
         &self,
@@ -112,7 +112,7 @@ impl<S: Simd> Factored<'_, S> {
             let form = |i: usize, j: usize| at(start + (p + i) * n_kept + p + j, lane);
             let log_k = log_sum((0..n).map(|i| at(triangle(i) + i, lane)));
             let log_r = log_sum((0..p_trend).map(|i| at(small + i * width + i, lane)));
-            // An exact plane or sphere leaves nothing at all, and nothing has no logarithm.
+            // An exact plane or sphere leaves no residual, and 0 has no logarithm.
             let heights = form(0, 0).max(freedom * LEAST_HEIGHT * LEAST_HEIGHT);
             let doubt = Doubt::of(heights, form(1, 0), form(1, 1).max(0.0), freedom);
             let log_likelihood = log_k - log_r - doubt.log_penalty - 0.5 * freedom * doubt.quadratic.ln();
@@ -133,7 +133,8 @@ impl<S: Simd> Factored<'_, S> {
     }
 }
 
-/// Σ ln of factors, which may be many: products of a few at a time stay within float64.
+/// Sum of the logarithms of factors. There may be many, so 8 at a time are multiplied, which stays within
+/// float64.
 fn log_sum(factors: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut product) = (0.0, 1.0);
     for (i, factor) in factors.enumerate() {

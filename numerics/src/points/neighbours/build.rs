@@ -1,4 +1,4 @@
-//! The tree from a cloud.
+//! Construction of the k-d tree.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -16,7 +16,7 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours,
     let mut builder = Builder { cloud, observer, nodes: Vec::new(), starts: Vec::new() };
     builder.split(&mut order, 0)?;
     let Builder { nodes, mut starts, .. } = builder;
-    // A list of its size from the start: one that grows takes up to three times as much.
+    // Allocated at its final size: a growing list takes up to three times as much.
     let mut coordinates = Vec::with_capacity(starts.len() * cloud.dimension());
     for &start in &starts {
         let first = order[start as usize];
@@ -27,7 +27,8 @@ pub(super) fn tree(cloud: &Cloud, observer: &dyn Observer) -> Result<Neighbours,
     Ok(Neighbours { dimension: cloud.dimension(), coordinates, points: order, starts, nodes })
 }
 
-/// The cloud with coordinates that are on the grid, as those of nearly every cloud are.
+/// Returns the cloud with its coordinates rounded to the grid. Nearly every cloud lies on it already and is
+/// borrowed.
 fn cloud_on_grid(cloud: &Cloud) -> Result<Cow<'_, Cloud>, NumericsError> {
     if is_on_grid(cloud.coordinates()) {
         return Ok(Cow::Borrowed(cloud));
@@ -40,18 +41,18 @@ struct Builder<'a> {
     cloud: &'a Cloud,
     observer: &'a dyn Observer,
     nodes: Vec<Node>,
-    /// Where the points of each position begin, leaf by leaf.
+    /// First point of each position, as an index into the order of the points, leaf by leaf.
     starts: Vec<u32>,
 }
 
-/// The axis along which some points spread most, the first of several.
+/// The axis with the greatest extent of some points. Ties go to the first axis.
 struct Widest {
     axis: usize,
     extent: f64,
 }
 
 impl Builder<'_> {
-    /// Appends the nodes of these points, which come after `start` others.
+    /// Appends the nodes of these points. `start` points come before them.
     fn split(&mut self, order: &mut [u32], start: usize) -> Result<(), NumericsError> {
         self.observer.checkpoint()?;
         let Widest { axis, extent } = self.widest(order);
@@ -71,10 +72,12 @@ impl Builder<'_> {
         self.split(right, start + n_left)
     }
 
-    /// Orders points along an axis into two parts without a coordinate in common, neither empty, and says how many are in the first.
+    /// Partitions points along an axis into two non-empty parts that share no coordinate, and returns the
+    /// size of the first.
     ///
-    /// The border is one of the two at the median, whichever halves better. Were points with the median itself in both parts, a cloud
-    /// with many of them would have parts that lie on top of each other, all of which each search must visit.
+    /// The border lies just below or just above the median, whichever halves better. If both parts held
+    /// points at the median, many such points would make the parts overlap. Every search would have to visit
+    /// both.
     fn partition(&self, order: &mut [u32], axis: usize) -> usize {
         let middle = order.len() / 2;
         let compare = |&a: &u32, &b: &u32| self.at(a, axis).total_cmp(&self.at(b, axis));
@@ -87,11 +90,11 @@ impl Builder<'_> {
         if n_smaller(n_below) >= n_smaller(n_up_to) { n_below } else { n_up_to }
     }
 
-    /// Appends a leaf, its points ordered by position and index.
+    /// Appends a leaf. Its points are ordered by position, then by index.
     fn push_leaf(&mut self, order: &mut [u32], start: usize) {
         let position = |point: u32| self.cloud.point(point as usize);
         order.sort_unstable_by(|&a, &b| {
-            // Coordinates are numbers, so that there always is an order.
+            // Coordinates are never NaN, so there always is an order.
             let by_position = position(a).partial_cmp(position(b)).unwrap_or(Ordering::Equal);
             by_position.then(a.cmp(&b))
         });
@@ -125,7 +128,7 @@ impl Builder<'_> {
     }
 }
 
-/// Moves the points for which `belongs` holds to the front, and says how many there are.
+/// Moves the points for which `belongs` holds to the front and returns their number.
 fn gather(order: &mut [u32], belongs: impl Fn(u32) -> bool) -> usize {
     let mut n_in_front = 0;
     for at in 0..order.len() {

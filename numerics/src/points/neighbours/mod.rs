@@ -13,25 +13,25 @@ use crate::observer::Observer;
 
 pub(crate) use grid::on_grid;
 
-/// Positions per leaf: scanning 12 of them costs about what two more levels of descent do.
+/// Positions per leaf. Scanning 12 of them costs about as much as two more levels of descent.
 const LEAF_SIZE: usize = 12;
 
 /// A k-d tree over the positions of a cloud (Bentley 1975), any dimension.
 ///
-/// Points at the same coordinates are one position, so that the work of a search does not depend on how often a position is
-/// repeated. Positions whose squared distance underflows are one position as well: coordinates are rounded to multiples of
-/// 2⁻⁵¹¹ (grid.rs), which changes none above 1e-137. Two positions therefore never have the distance 0.
+/// Points with equal coordinates form one position, so repeated points do not slow a search down. Positions
+/// whose squared distance underflows are merged as well: coordinates are rounded to multiples of 2⁻⁵¹¹
+/// (grid.rs), which changes none above 1e-137. Two positions therefore never have the distance 0.
 ///
-/// Built in O(p log p) for p positions, by splits of the widest coordinate near its median. Ties of distance are broken by the
-/// smaller index of a point, so answers do not depend on the tree.
+/// The tree is built in O(p log p) for p positions. Each split halves the widest coordinate near its median.
+/// Ties of distance are broken by the smaller point index, so answers do not depend on the tree.
 #[derive(Debug, Clone)]
 pub struct Neighbours {
     dimension: usize,
-    /// Positions leaf by leaf, `[p, d]`.
+    /// Coordinates of the positions, leaf by leaf, `[p, d]`.
     coordinates: Vec<f64>,
     /// Points of the cloud, position by position, ascending within a position, `[n]`.
     points: Vec<u32>,
-    /// Where the points of each position begin, and the end of the last one, `[p + 1]`.
+    /// Start of each position within `points`, followed by the end of the last position, `[p + 1]`.
     starts: Vec<u32>,
     nodes: Vec<Node>,
 }
@@ -40,8 +40,8 @@ pub struct Neighbours {
 enum Node {
     /// A range of positions.
     Leaf { start: u32, end: u32 },
-    /// The left child follows its parent, `right` is the index of the other. Coordinates along `axis` are at most `below` on the
-    /// left and at least `above` on the right.
+    /// Two children. The left child follows its parent, `right` is the index of the right one. Coordinates
+    /// along `axis` are at most `below` on the left and at least `above` on the right.
     Split { axis: u32, right: u32, below: f64, above: f64 },
 }
 
@@ -52,16 +52,17 @@ pub struct Neighbour {
     pub squared_distance: f64,
 }
 
-/// Distances from a position to those around it, unit L.
+/// Distances from a position to its nearest others, unit L.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distances {
     pub nearest: f64,
-    /// Mean over the neighbours that were asked for.
+    /// Mean over the neighbours asked for.
     pub mean: f64,
 }
 
 impl Neighbours {
-    /// Builds the tree. Clouds beyond 2³² points are out of reach of every solver and of the service's limits.
+    /// Builds the tree. It holds at most 2³² points, a number that no solver and no limit of the service
+    /// reaches.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -74,7 +75,7 @@ impl Neighbours {
         self.starts.len() - 1
     }
 
-    /// The points at a position, ascending.
+    /// Returns the points at a position, ascending.
     pub fn points_at(&self, position: usize) -> &[u32] {
         &self.points[self.starts[position] as usize..self.starts[position + 1] as usize]
     }
@@ -83,19 +84,19 @@ impl Neighbours {
         &self.coordinates[position * self.dimension..][..self.dimension]
     }
 
-    /// The first point at a position, which stands for all of them.
+    /// Returns the first point at a position, which represents all of them.
     fn first_point(&self, position: usize) -> usize {
         self.points[self.starts[position] as usize] as usize
     }
 
-    /// The `count` nearest points to `x`, nearest first; fewer if the cloud has fewer.
+    /// Returns the `count` points nearest to `x`, nearest first, or all points if the cloud has fewer.
     pub fn nearest(&self, x: &[f64], count: usize) -> Vec<Neighbour> {
         let mut found = Vec::new();
         self.nearest_into(x, count, &mut found);
         found
     }
 
-    /// [`Neighbours::nearest`] into a list that is there already.
+    /// Writes the result of [`Neighbours::nearest`] into an existing list.
     pub fn nearest_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
         self.search(x, count, found);
         if self.points.len() == self.n_positions() {
@@ -105,35 +106,37 @@ impl Neighbours {
         }
     }
 
-    /// The `count` nearest positions, each by its first point, nearest first: repeated observations count once.
+    /// Returns the `count` nearest positions, each as its first point, nearest first. Repeated observations
+    /// count once.
     pub fn nearest_positions(&self, x: &[f64], count: usize) -> Vec<Neighbour> {
         let mut found = Vec::new();
         self.nearest_positions_into(x, count, &mut found);
         found
     }
 
-    /// [`Neighbours::nearest_positions`] into a list that is there already.
+    /// Writes the result of [`Neighbours::nearest_positions`] into an existing list.
     pub fn nearest_positions_into(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
         self.search(x, count, found);
         self.name_first_points(found);
     }
 
-    /// Distances from a position to its `count` nearest others, with a list to put them into; `None` if there are none.
+    /// Returns the distances from a position to its `count` nearest others, or `None` if there are none.
+    /// `found` is scratch space.
     pub fn distances(&self, position: usize, count: usize, found: &mut Vec<Neighbour>) -> Option<Distances> {
         self.search(self.coordinates_of(position), count.saturating_add(1), found);
-        // The first one is the position itself: no other has the distance 0.
+        // The first entry is the position itself: no other has the distance 0.
         let others = found.get(1..)?;
         let distances = others.iter().map(|neighbour| neighbour.squared_distance.sqrt());
         let nearest = distances.clone().next()?;
         Some(Distances { nearest, mean: distances.sum::<f64>() / others.len() as f64 })
     }
 
-    /// Turns positions into their first points.
+    /// Replaces positions by their first points.
     fn name_first_points(&self, found: &mut [Neighbour]) {
         found.iter_mut().for_each(|neighbour| neighbour.point = self.first_point(neighbour.point));
     }
 
-    /// Turns positions, nearest first, into the `count` nearest of all their points.
+    /// Replaces positions, nearest first, by the `count` nearest of all their points.
     fn name_all_points(&self, found: &mut Vec<Neighbour>, count: usize) {
         let mut named: Vec<Neighbour> = Vec::with_capacity(count);
         for tied in found.chunk_by(|a, b| a.squared_distance == b.squared_distance) {

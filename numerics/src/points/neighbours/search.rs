@@ -1,4 +1,4 @@
-//! The search for the nearest positions.
+//! Search for the nearest positions in the k-d tree.
 
 use super::grid::{is_on_grid, on_grid};
 use super::{Neighbour, Neighbours, Node};
@@ -9,16 +9,17 @@ struct Search<'a> {
     tree: &'a Neighbours,
     x: &'a [f64],
     count: usize,
-    /// From x to the cell at hand, along each axis (Arya and Mount 1993).
+    /// Distance from x to the current cell along each axis (Arya and Mount 1993).
     offsets: Small,
-    /// Squared distance beyond which nothing can be among the nearest any more.
+    /// Squared distance of the farthest position that can still be among the nearest.
     reach: f64,
     /// Positions found so far, nearest first.
     found: &'a mut Vec<Neighbour>,
 }
 
 impl Neighbours {
-    /// The `count` nearest positions by their index in the tree, nearest first, into a list that is there already.
+    /// Finds the `count` nearest positions as indices in the tree, nearest first, and writes them into
+    /// `found`.
     pub(super) fn search(&self, x: &[f64], count: usize, found: &mut Vec<Neighbour>) {
         found.clear();
         if count == 0 {
@@ -42,7 +43,7 @@ impl Neighbours {
 }
 
 impl Search<'_> {
-    /// Visits a node. D is the dimension where the compiler shall know it, else 0.
+    /// Visits a node. D is the dimension if it is known at compile time, else 0.
     fn visit<const D: usize>(&mut self, node: usize) {
         match self.tree.nodes[node] {
             Node::Leaf { start, end } => self.scan::<D>(start as usize, end as usize),
@@ -61,7 +62,7 @@ impl Search<'_> {
         }
     }
 
-    /// Visits the part of a node on whose side x is not, unless it is too far.
+    /// Visits the child on the side where x is not, unless it is too far.
     fn visit_far<const D: usize>(&mut self, node: usize, axis: usize, offset: f64) {
         let before = std::mem::replace(&mut self.offsets[axis], offset);
         if self.squared_distance_of_cell::<D>() <= self.reach {
@@ -80,7 +81,8 @@ impl Search<'_> {
         }
     }
 
-    /// At most that of any position in the cell, to the last bit: rounding is monotonic, and the terms are added in the same order.
+    /// Squared distance from x to the current cell. It never exceeds the computed distance of a position in
+    /// the cell, not even by rounding: rounding is monotonic, and the terms are added in the same order.
     fn squared_distance_of_cell<const D: usize>(&self) -> f64 {
         let d = if D == 0 { self.offsets.len() } else { D };
         self.offsets[..d].iter().map(|offset| offset * offset).sum()
@@ -101,7 +103,7 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a position is nearer than another, or as near with an earlier first point.
+    /// Returns whether position a comes before b: it is nearer, or as near with an earlier first point.
     fn is_before(&self, a: &Neighbour, b: &Neighbour) -> bool {
         let first = |position: &Neighbour| self.tree.first_point(position.point);
         a.squared_distance < b.squared_distance

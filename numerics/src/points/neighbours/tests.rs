@@ -86,10 +86,10 @@ fn positions_whose_distance_underflows_are_one() {
     let tree = tree_of(&Cloud::new(tiny, 3).unwrap());
     assert_eq!(tree.n_positions(), 1);
     assert_eq!(tree.nearest(&[0.0; 3], 2)[1], Neighbour { point: 1, squared_distance: 0.0 });
-    // Powers of a half are apart until their squares underflow.
+    // Powers of a half are distinct until their squares underflow.
     let powers: Vec<f64> = (0..1000).map(|i| 0.5f64.powi(i)).collect();
     let tree = tree_of(&Cloud::new(powers, 1).unwrap());
-    // 2⁰ to 2⁻⁵¹¹, of which 2⁻⁵¹² is half a step and rounded up, and 0.
+    // The positions are 2⁰ to 2⁻⁵¹¹ and 0. 2⁻⁵¹² is half a step and is rounded up.
     assert_eq!(tree.n_positions(), 513);
     assert!((0..tree.n_positions()).all(|p| tree.distances(p, 4, &mut Vec::new()).unwrap().nearest > 0.0));
 }

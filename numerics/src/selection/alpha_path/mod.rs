@@ -1,10 +1,11 @@
-//! A criterion for many α at once.
+//! Scores of a criterion for many α at once.
 //!
-//! With `K = QDQᵀ`, `(K + αI)⁻¹ = Q(D + αI)⁻¹Qᵀ` for every α. Where there is a mean, likewise `P = U(D + αI)⁻¹Uᵀ` with the eigenvectors U of K
-//! restricted to what is orthogonal to the functions of the mean. One eigendecomposition serves all α (Golub, Heath and Wahba 1979, sec. 3).
+//! With `K = QDQᵀ`, `(K + αI)⁻¹ = Q(D + αI)⁻¹Qᵀ` for every α. One eigendecomposition therefore serves all α
+//! (Golub, Heath and Wahba 1979, sec. 3). With a mean, likewise, `P = U(D + αI)⁻¹Uᵀ`. U holds the
+//! eigenvectors of K restricted to the orthogonal complement of the functions of the mean.
 //!
-//! Nothing looks at the observer within an eigendecomposition. So a large matrix is factorized for each of a few α instead: two to four times as
-//! many flops for 61 of them, but all in products of matrices.
+//! An eigendecomposition cannot be cancelled. A large matrix is therefore factorized for each α if there are
+//! few of them. For 61 α this takes two to four times as many flops, but all of them are in matrix products.
 
 mod spectrum;
 
@@ -28,26 +29,28 @@ use crate::solver::trend::{Mean, solve_gram};
 use crate::sums::regularization::Regularization;
 use spectrum::Spectrum;
 
-/// α that are looked at together, as columns of a matrix.
+/// Number of α that are handled together, as columns of a matrix.
 pub(super) const ALPHAS_AT_ONCE: usize = 256;
 
-/// Points up to which a matrix is decomposed for any number of α, within a second.
+/// Largest number of points for which a matrix is decomposed whatever the number of α. It takes less than a
+/// second.
 const SMALL: usize = 1000;
 
-/// Number of α up to which a larger matrix is factorized for each of them.
+/// Largest number of α for which a larger matrix is factorized for each of them.
 const FEW: usize = 120;
 
-/// Whether one eigendecomposition serves all of so many α.
+/// Returns whether one eigendecomposition serves all α.
 pub(super) fn is_decomposed(n_points: usize, n_alphas: usize) -> bool {
     n_points <= SMALL || n_alphas > FEW
 }
 
-/// The score with each α as the noise of every point, `[len(alphas)]`, greater is better; NaN where `K + αI` is not positive definite in float64.
-/// The noise of the hyperparameters does not count.
+/// Returns the score with each α as the noise of every point, `[len(alphas)]`. Greater is better. Scores are
+/// NaN where `K + αI` is not positive definite in float64. The noise of the hyperparameters is ignored.
 ///
 /// # Errors
-/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite; those of [`Hyperparameters::kernel_on`];
-/// [`NumericsError::LengthMismatch`]; [`NumericsError::MeanNotDetermined`]; [`NumericsError::Cancelled`].
+/// [`NumericsError::InvalidRegularization`] for an α that is negative or not finite.
+/// [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+/// Also the errors of [`Hyperparameters::kernel_on`].
 pub fn alpha_path(
     (cloud, values, mean): (&Cloud, &[f64], Mean),
     at: &Hyperparameters,
@@ -65,7 +68,7 @@ pub fn alpha_path(
     }
 }
 
-/// A factorization for each α.
+/// Scores each α by a factorization of its own.
 fn by_factors(
     subject: &Subject<'_>,
     at: &Hyperparameters,
@@ -81,7 +84,7 @@ fn by_factors(
     alphas.iter().map(score).collect()
 }
 
-/// One eigendecomposition for all α.
+/// Scores all α by one eigendecomposition.
 fn by_spectrum(
     subject: &Subject<'_>,
     at: &Hyperparameters,
@@ -101,7 +104,8 @@ fn by_spectrum(
     }
 }
 
-/// So many α that matter at most, ascending in equal ratios: from where the eigenvalues of K are rounding to where it is all noise.
+/// Returns `n_alphas` values of α, ascending in equal ratios, that cover all α that can matter. At the least,
+/// the eigenvalues of K below α are rounding. At the greatest, n k₀, everything counts as noise.
 pub fn default_alphas(n_points: usize, kernel: &Kernel, n_alphas: usize) -> Vec<f64> {
     let (n, k0) = (n_points as f64, kernel.at_zero());
     let (min, max) = ((16.0 * n * n * f64::EPSILON * k0).max(1e-12 * k0), n * k0);
@@ -110,7 +114,8 @@ pub fn default_alphas(n_points: usize, kernel: &Kernel, n_alphas: usize) -> Vec<
 }
 
 impl Spectrum {
-    /// `Σ w z² + ln det`, with z the values without the mean, in O(np²) for each α.
+    /// Returns the log likelihoods `−½(Σ w z² + ln det(K + αI) + n ln 2π)`, w = 1/(D + α), in O(np²) flops
+    /// for each α. z is the rotated values without their mean.
     fn likelihoods(
         &self,
         subject: &Subject<'_>,
@@ -143,7 +148,8 @@ impl Spectrum {
         alphas.par_iter().map(score).collect()
     }
 
-    /// `P_ii = Σ_k U_ik²/(D_k + α)` and `Λ = U(D + α)⁻¹UᵀY`: two products of matrices for many α.
+    /// Returns the leave-one-out scores, from `P_ii = Σ_k U_ik²/(D_k + α)` and `Λ = U(D + α)⁻¹UᵀY`. Many α
+    /// take two matrix products.
     fn left_out(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let (n, r) = (self.n, self.eigenvalues.len());
         let squares: Vec<f64> = self.vectors.par_iter().map(|u| u * u).collect();
@@ -169,7 +175,7 @@ impl Spectrum {
         Ok(scores)
     }
 
-    /// `−n Σ (w UᵀY)²/(Σ w)²`.
+    /// Returns the scores of generalised cross-validation, `−n Σ (w UᵀY)²/(Σ w)²` with w = 1/(D + α).
     fn cross_validations(&self, alphas: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let score = |&alpha: &f64| {
             observer.checkpoint()?;
@@ -182,7 +188,7 @@ impl Spectrum {
     }
 }
 
-/// `[n, r]` times `[r, m]`, column by column.
+/// Returns the product of an `[n, r]` and an `[r, m]` matrix, column by column.
 fn product(left: MatRef<'_, f64>, right: &[f64], m: usize) -> Vec<f64> {
     let (n, r) = (left.nrows(), left.ncols());
     let mut found = vec![0.0; n * m];

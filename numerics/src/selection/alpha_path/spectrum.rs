@@ -1,4 +1,4 @@
-//! Eigenvalues and eigenvectors of a Gram matrix, or of what a mean leaves of it.
+//! Eigenvalues and eigenvectors of a Gram matrix, or of its restriction to the complement of a mean.
 
 use faer::diag::DiagMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -17,10 +17,11 @@ use crate::selection::subject::Subject;
 use crate::sums::gram::fill_lower_gram;
 use crate::sums::regularization::Regularization;
 
-/// Eigenvalues are off by about this multiple of the greatest one: the least `D_i + α` that means anything.
+/// Least `D_i + α` that is significant, as a multiple of the greatest eigenvalue. Eigenvalues have about this
+/// error.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Eigenvalues and eigenvectors of K, or of what it is orthogonal to the mean.
+/// Eigenvalues and eigenvectors of K, or of K on the orthogonal complement of the mean's functions.
 pub(super) struct Spectrum {
     /// D, ascending, `[r]`.
     pub(super) eigenvalues: Vec<f64>,
@@ -32,6 +33,8 @@ pub(super) struct Spectrum {
 }
 
 impl Spectrum {
+    /// Decomposes the Gram matrix of a kernel, without the functions of the mean if `is_restricted`.
+    ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
     pub(super) fn of(
@@ -52,7 +55,7 @@ impl Spectrum {
         observer.enter(Stage::Factor);
         let (mut eigenvalues, mut vectors) = decompose(&gram, n)?;
         observer.checkpoint()?;
-        // Those that were set apart are the least.
+        // The functions that were set apart belong to the least eigenvalues.
         eigenvalues.drain(..n_removed);
         vectors.drain(..n_removed * n);
         let values = vectors.par_chunks_exact(n).map(|u| dot(u, &subject.values)).collect();
@@ -64,7 +67,7 @@ impl Spectrum {
         MatRef::from_column_major_slice(&self.vectors, self.n, self.eigenvalues.len())
     }
 
-    /// `1/(D + α)`, `[r]`; `None` where that is rounding.
+    /// Returns `1/(D + α)`, `[r]`, or `None` if the least `D + α` is rounding.
     pub(super) fn inverse(&self, alpha: f64) -> Option<Vec<f64>> {
         let (least, greatest) = (self.eigenvalues.first()?, self.eigenvalues.last()?);
         let is_definite = least + alpha > ROUNDING * greatest;
@@ -72,7 +75,8 @@ impl Spectrum {
     }
 }
 
-/// Eigenvalues, ascending, and eigenvectors as columns of a symmetric matrix of which the lower triangle is given.
+/// Returns the eigenvalues, ascending, and the eigenvectors, as columns, of a symmetric matrix. Only its
+/// lower triangle is read.
 ///
 /// # Errors
 /// [`NumericsError::OutOfMemory`].
@@ -91,13 +95,14 @@ fn decompose(matrix: &[f64], n: usize) -> Result<(Vec<f64>, Vec<f64>), NumericsE
         Default::default(),
     );
     if made.is_err() {
-        // It does not converge where entries are not finite: nothing is definite then.
+        // The algorithm does not converge if entries are not finite. With NaN, no α makes the matrix
+        // definite.
         eigenvalues.fill(f64::NAN);
     }
     Ok((eigenvalues, vectors))
 }
 
-/// The upper triangle from the lower one.
+/// Copies the lower triangle to the upper one.
 fn mirror(matrix: &mut [f64], n: usize) {
     for j in 0..n {
         for i in 0..j {
@@ -106,16 +111,18 @@ fn mirror(matrix: &mut [f64], n: usize) {
     }
 }
 
-/// `K ← (I − F̂F̂ᵀ)K(I − F̂F̂ᵀ) − sF̂F̂ᵀ` with F̂ an orthonormal basis of the functions of the mean and s about the norm of K: they become the eigenvectors
-/// of the least eigenvalues, well apart from all others, which are positive.
+/// Sets the functions of the mean apart: `K ← (I − F̂F̂ᵀ)K(I − F̂F̂ᵀ) − sF̂F̂ᵀ`.
+///
+/// F̂ is an orthonormal basis of the functions and s the trace of K, about its norm. The functions become the
+/// eigenvectors of the least eigenvalues, well apart from all others, which are positive.
 fn set_apart(gram: &mut [f64], subject: &Subject<'_>) {
     let (n, p) = (subject.n_points(), subject.n_functions);
     let mut basis = subject.functions.clone();
-    // Without a column of values; their span has been checked.
+    // There is no column of values to reduce. `Subject::of` has checked that the functions are independent.
     let _ = remove_mean(&mut basis, n, p);
     let trace: f64 = (0..n).map(|i| gram[i * n + i]).sum();
     for f in basis.chunks_exact(n) {
-        // K ← K − f(Kf)ᵀ − (Kf)fᵀ + (fᵀKf)ffᵀ, one function after the other: they are orthogonal.
+        // K ← K − f(Kf)ᵀ − (Kf)fᵀ + (fᵀKf)ffᵀ for one function after another, since they are orthogonal.
         let image: Vec<f64> = gram.par_chunks_exact(n).map(|column| dot(column, f)).collect();
         let along = dot(f, &image);
         gram.par_chunks_exact_mut(n).enumerate().for_each(|(j, column)| {

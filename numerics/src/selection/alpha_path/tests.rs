@@ -1,4 +1,4 @@
-//! Paths against single evaluations.
+//! Paths compared with single evaluations.
 
 use super::*;
 use crate::kernel::Family;
@@ -24,7 +24,7 @@ fn every_alpha_has_the_score_that_it_has_alone() {
     let cloud = Cloud::new((0..2 * 70).map(|_| random.uniform()).collect(), 2).unwrap();
     let values: Vec<f64> = cloud.points().map(|x| 5.0 + (4.0 * x[0]).sin() + 0.1 * random.normal()).collect();
     let kernel = at(0.0).kernel_on(&cloud).unwrap();
-    // More than are looked at together.
+    // More α than are handled together.
     let alphas = default_alphas(70, &kernel, 300);
     for mean in [Mean::Zero, Mean::Constant, Mean::Linear] {
         let subject = Subject::of(&cloud, &values, mean).unwrap();

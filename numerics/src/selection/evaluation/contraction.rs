@@ -1,6 +1,7 @@
-//! `Σ_ij G_ij ∂k(x_i, x_j)/∂θ` for all parameters θ of a kernel, in one pass over the pairs.
+//! Contractions `Σ_ij G_ij ∂k(x_i, x_j)/∂θ` for all parameters θ of a kernel, in one pass over the pairs.
 //!
-//! With q = Σ_c D_c²/ℓ_c²: `∂k/∂ ln v = vφ`, `∂k/∂ ln ℓ_c = −2vφ′D_c²/ℓ_c²`, `∂k/∂ε = vφ′` for Laplace, whose φ depends on q + ε.
+//! Let q = Σ_c D_c²/ℓ_c². Then `∂k/∂ ln v = vφ` and `∂k/∂ ln ℓ_c = −2vφ′D_c²/ℓ_c²`. For Laplace, whose φ
+//! depends on q + ε, `∂k/∂ε = vφ′`.
 
 use std::ops::Range;
 
@@ -14,12 +15,12 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::nodes::Nodes;
 
-/// Columns per task: those of a triangle are of all lengths, and are balanced by many tasks.
+/// Columns per task. The columns of a triangle differ in length, which many tasks balance.
 const COLUMNS_PER_TASK: usize = 16;
 
-/// `G = sM + uwᵀ + wuᵀ`, symmetric.
+/// Weights of the pairs, `G = sM + uwᵀ + wuᵀ`, symmetric.
 pub(in crate::selection) struct PairWeights<'a> {
-    /// M, `[n, n]`, of which the lower triangle counts.
+    /// M, `[n, n]`. Only its lower triangle is read.
     pub(in crate::selection) matrix: &'a [f64],
     pub(in crate::selection) scale: f64,
     pub(in crate::selection) left: &'a [f64],
@@ -27,13 +28,14 @@ pub(in crate::selection) struct PairWeights<'a> {
 }
 
 impl PairWeights<'_> {
-    /// `G_ii`, summed.
+    /// Returns the trace of G.
     pub(in crate::selection) fn trace(&self) -> f64 {
         let n = self.left.len();
         (0..n).map(|i| self.scale * self.matrix[i * n + i] + 2.0 * self.left[i] * self.right[i]).sum()
     }
 
-    /// Column j of a block, twice what is below the diagonal, and 0 above it and beyond the last point.
+    /// Writes a block of column j of G. Entries below the diagonal are doubled, since they stand for both
+    /// triangles. Entries above the diagonal and beyond the last point are 0.
     #[inline(always)]
     fn fill(&self, j: usize, block: usize, out: &mut Block) {
         let n = self.left.len();
@@ -53,7 +55,7 @@ impl PairWeights<'_> {
     }
 }
 
-/// The sums over all pairs.
+/// Sums over all pairs of points.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::selection) struct Sums {
     /// `Σ G_ij φ`.
@@ -62,11 +64,12 @@ pub(in crate::selection) struct Sums {
     pub(in crate::selection) of_slopes: f64,
     /// `Σ G_ij φ′ q`.
     pub(in crate::selection) of_scaled_slopes: f64,
-    /// `Σ G_ij φ′ D_c²/ℓ²`, `[d]`; empty if not asked for.
+    /// `Σ G_ij φ′ D_c²/ℓ²`, `[d]`. Empty if not requested.
     pub(in crate::selection) of_axes: Vec<f64>,
 }
 
-/// The sums for a kernel on a cloud; those of single axes only if they are asked for. On one thread for one of many tasks.
+/// Computes the sums for a kernel on a cloud, those of single axes only if `per_axis`. If `is_alone`, all
+/// work stays on the calling thread.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -88,7 +91,7 @@ pub(in crate::selection) fn contract(
         false => tasks.into_par_iter().map(task).collect(),
         true => tasks.map(task).collect(),
     };
-    // One after the other, so that the sum does not depend on the threads.
+    // Adding in the order of the tasks makes the sum independent of the threads.
     let mut total = vec![0.0; FIXED + if per_axis { cloud.dimension() } else { 0 }];
     for part in parts? {
         total.iter_mut().zip(&part).for_each(|(total, part)| *total += part);
@@ -97,10 +100,10 @@ pub(in crate::selection) fn contract(
     Ok(Sums { of_values: total[0], of_slopes: total[1], of_scaled_slopes: total[2], of_axes })
 }
 
-/// Sums beside those of the axes.
+/// Number of sums besides those of the axes.
 const FIXED: usize = 3;
 
-/// The sums over some columns.
+/// The task that computes the sums over some columns.
 struct Columns<'a> {
     nodes: &'a Nodes,
     cloud: &'a Cloud,
@@ -137,7 +140,7 @@ impl WithSimd for Columns<'_> {
     }
 }
 
-/// A block of a column.
+/// A block of rows of one column.
 struct ColumnPairs<'a, 'b, S> {
     simd: S,
     of: &'a Columns<'b>,
@@ -149,7 +152,7 @@ struct ColumnPairs<'a, 'b, S> {
 }
 
 impl<S: Simd> ColumnPairs<'_, '_, S> {
-    /// Adds `a · b`, number by number.
+    /// Adds `a · b` to a sum, element by element.
     #[inline(always)]
     fn add(&mut self, sum: usize, at: usize, a: Pack<S>, b: Pack<S>) {
         let sum = &mut self.sums[sum];
@@ -158,7 +161,7 @@ impl<S: Simd> ColumnPairs<'_, '_, S> {
 }
 
 impl<S: Simd> Pairs<S> for ColumnPairs<'_, '_, S> {
-    /// q.
+    /// The scaled squared distances q.
     type Others = Pack<S>;
 
     #[inline(always)]
@@ -168,13 +171,14 @@ impl<S: Simd> Pairs<S> for ColumnPairs<'_, '_, S> {
         let q = if self.differences.is_empty() {
             nodes.scaled_distances(self.simd, at_block, self.x, kernel, |_, _| ())
         } else {
-            // No more than this: a closure that is larger is not inlined, which makes a call of every instruction.
+            // The closure must stay this small: a larger one is not inlined, which turns every instruction
+            // into a call.
             let differences = &mut *self.differences;
             nodes.scaled_distances(self.simd, at_block, self.x, kernel, |c, difference| {
                 difference.store(&mut differences[c], at);
             })
         };
-        // A slope of 0 times infinity is no number.
+        // A slope of 0 times an infinite q would be NaN.
         (q, q.at_most(HUGE))
     }
 

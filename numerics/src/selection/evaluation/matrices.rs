@@ -1,4 +1,4 @@
-//! The matrices of an evaluation, in memory that is kept from one to the next.
+//! Matrices of an evaluation, whose memory the next evaluation reuses.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -20,19 +20,19 @@ use crate::sums::gram::{fill_kernel_column, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
-/// A pivot up to this multiple of k₀ is rounding, as in a factorization that is kept.
+/// Multiple of k₀ up to which a pivot counts as rounding, as for the factors of solvers.
 const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
-/// Columns of a product of matrices between two looks at the observer.
+/// Columns of a matrix product between two checks for cancellation.
 const COLUMNS_PER_CHECKPOINT: usize = 512;
 
-/// The first column and the width of blocks of n columns.
+/// Splits n columns into blocks. Yields the first column and the width of each.
 fn blocks(n: usize) -> impl Iterator<Item = (usize, usize)> {
     let firsts = (0..n).step_by(COLUMNS_PER_CHECKPOINT);
     firsts.map(move |first| (first, COLUMNS_PER_CHECKPOINT.min(n - first)))
 }
 
-/// `‖A‖₁` of a symmetric matrix, from its lower triangle.
+/// Returns `‖A‖₁` of a symmetric matrix, from its lower triangle.
 fn norm1_of_lower(matrix: &[f64], n: usize) -> f64 {
     let mut sums = vec![0.0; n];
     for (j, column) in matrix.chunks_exact(n).enumerate() {
@@ -43,25 +43,28 @@ fn norm1_of_lower(matrix: &[f64], n: usize) -> f64 {
     sums.into_iter().fold(0.0, f64::max)
 }
 
-/// L with `K + N = LLᵀ`, and two matrices that are made from it; column by column, lower triangles.
+/// The factor L of `K + N = LLᵀ`, and two matrices computed from it. All are lower triangles, stored column
+/// by column.
 pub(in crate::selection) struct Matrices {
     n: usize,
-    /// One of many tasks: threads that wait for parts of it would begin others, with memory of their own.
+    /// True for one of many tasks that run side by side. Its work stays on one thread, since a thread that
+    /// waits for parts would begin other tasks, with memory of their own.
     pub(in crate::selection) is_alone: bool,
     par: Par,
     factor: Vec<f64>,
     /// `‖K + N‖₁`.
     norm1: f64,
-    /// L⁻¹, and then what is multiplied by its own transpose.
+    /// L⁻¹, later overwritten by `P diag(c)^½`, whose product with its transpose is formed.
     inverse_factor: Vec<f64>,
     has_inverse_factor: bool,
     product: Vec<f64>,
-    /// For a factorization alone on its thread.
+    /// Scratch memory for a factorization on one thread.
     scratch: Option<MemBuffer>,
 }
 
 impl Matrices {
-    /// For n points: alone on this thread, or on all of them. Memory is taken when it is needed.
+    /// Creates the matrices of n points, which work on the calling thread alone, if `is_alone`, or on all
+    /// threads. Their memory is allocated when it is needed.
     pub(in crate::selection) fn new(n: usize, is_alone: bool) -> Self {
         let par = if is_alone { Par::Seq } else { parallelism((n as f64).powi(3) / 3.0) };
         let scratch = || llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
@@ -78,7 +81,7 @@ impl Matrices {
         }
     }
 
-    /// Whether `K + N = LLᵀ` in float64.
+    /// Factorizes `K + N = LLᵀ`. Returns whether that succeeds in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -121,7 +124,7 @@ impl Matrices {
         self.norm1
     }
 
-    /// `1/(‖K + N‖₁ ‖(K + N)⁻¹‖₁)`, estimated.
+    /// Estimates `1/(‖K + N‖₁ ‖(K + N)⁻¹‖₁)`.
     pub(in crate::selection) fn reciprocal_condition(&self) -> f64 {
         let solve = |mut columns: MatMut<'_, f64>| {
             solve_lower_triangular_in_place(self.factor(), columns.rb_mut(), self.par);
@@ -152,7 +155,7 @@ impl Matrices {
         solve_upper_triangular_in_place(self.factor().transpose(), right, self.par);
     }
 
-    /// Makes L⁻¹, if it is not there.
+    /// Computes L⁻¹ unless it is there already.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -179,7 +182,7 @@ impl Matrices {
         Ok(())
     }
 
-    /// `W_ii = |L⁻¹e_i|²`, from L⁻¹.
+    /// Returns `W_ii = |L⁻¹e_i|²`, from L⁻¹.
     pub(in crate::selection) fn inverse_diagonal(&self) -> Vec<f64> {
         let entry = |(i, column): (usize, &[f64])| dot(&column[i..], &column[i..]);
         match self.is_alone {
@@ -188,7 +191,7 @@ impl Matrices {
         }
     }
 
-    /// `W = L⁻ᵀL⁻¹`, from L⁻¹.
+    /// Computes `W = L⁻ᵀL⁻¹`, from L⁻¹.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -218,7 +221,7 @@ impl Matrices {
         Ok(())
     }
 
-    /// `P diag(c) P` with `P = W − TTᵀ`, from W; c not negative. Takes the place of L⁻¹.
+    /// Computes `P diag(c) P` from W, with `P = W − TTᵀ` and c ≥ 0. Overwrites W and L⁻¹.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -254,7 +257,7 @@ impl Matrices {
         Ok(())
     }
 
-    /// The last product, `[n, n]`, of which the lower triangle counts.
+    /// Returns the last product, `[n, n]`. Only its lower triangle counts.
     pub(in crate::selection) fn product(&self) -> &[f64] {
         &self.product
     }

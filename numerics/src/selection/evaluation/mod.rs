@@ -1,8 +1,9 @@
-//! A criterion and its slopes at some hyperparameters.
+//! Evaluation of a criterion and its slopes at given hyperparameters.
 //!
-//! A score takes a factorization, n³/3 flops, and its slopes two more for the likelihood: the inverse comes from the factor. Scores made of the
-//! diagonal of the inverse take half of that at once, and their slopes another product of matrices, n³. All parameters of the kernel share one
-//! pass over the pairs (contraction.rs).
+//! A score takes a factorization, n³/3 flops. The slopes of the likelihood take 2n³/3 more, for the inverse
+//! from the factor. Criteria that need the diagonal of the inverse spend half of that already on the score.
+//! Their slopes take another matrix product, n³. All parameters of the kernel share one pass over the pairs
+//! (contraction.rs).
 
 mod contraction;
 mod matrices;
@@ -23,24 +24,24 @@ use contraction::{PairWeights, contract};
 use matrices::Matrices;
 use space::Space;
 
-/// What the mean leaves of `W_ii` at least, as a share: less is rounding.
+/// Least share of `W_ii` that the mean must leave in `P_ii`. Less is rounding.
 pub(super) const UNDETERMINED: f64 = 1e-12;
 
-/// Evaluates a criterion.
+/// An evaluator of a criterion, with the matrices of its last evaluation.
 pub(super) struct Evaluator<'a> {
     pub(super) subject: &'a Subject<'a>,
     criterion: Criterion,
     pub(super) matrices: Matrices,
 }
 
-/// What a factorization says; the evaluator holds the factor.
+/// The result of a factorization. The evaluator keeps the factor.
 pub(super) struct State {
     kernel: Kernel,
     /// Λ, `[n]`.
     pub(super) weights: Vec<f64>,
-    /// T, `L⁻ᵀ` times an orthonormal basis of `L⁻¹F`, `[n, p]`: `P = W − TTᵀ`.
+    /// T, the product of `L⁻ᵀ` and an orthonormal basis of `L⁻¹F`, `[n, p]`. Hence `P = W − TTᵀ`.
     of_mean: Vec<f64>,
-    /// `P_ii`, `[n]`, 0 where the mean leaves nothing of it; empty where it does not count.
+    /// `P_ii`, `[n]`, 0 where the mean leaves nothing of `W_ii`. Empty if the criterion does not need it.
     diagonal: Vec<f64>,
     relative_noise: Vec<f64>,
     energy: f64,
@@ -59,14 +60,14 @@ impl State {
         }
     }
 
-    /// Λ, and `P_ii` where it was asked for.
+    /// Returns Λ, and `P_ii` if the criterion needs it.
     pub(super) fn into_weights_and_diagonal(self) -> (Vec<f64>, Vec<f64>) {
         (self.weights, self.diagonal)
     }
 }
 
 impl<'a> Evaluator<'a> {
-    /// Alone on its thread, or on all of them.
+    /// Creates an evaluator that works on the calling thread alone, if `is_alone`, or on all threads.
     pub(super) fn new(subject: &'a Subject<'a>, criterion: Criterion, is_alone: bool) -> Self {
         Self { subject, criterion, matrices: Matrices::new(subject.n_points(), is_alone) }
     }
@@ -79,10 +80,11 @@ impl<'a> Evaluator<'a> {
         self.subject.n_points()
     }
 
-    /// The score at some hyperparameters; `None` where the matrix is not positive definite in float64, or the score is not finite.
+    /// Returns the state at these hyperparameters. `None` if the matrix is not positive definite in float64,
+    /// or if the score is not finite.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`]; those of [`Hyperparameters::kernel_on`].
+    /// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
     pub(super) fn score(
         &mut self,
         at: &Hyperparameters,
@@ -91,10 +93,11 @@ impl<'a> Evaluator<'a> {
         Ok(self.state(at, observer)?.filter(|state| state.score.is_finite()))
     }
 
-    /// The same, whatever the score; `None` where the matrix is not positive definite in float64.
+    /// Returns the state at these hyperparameters, even if its score is not finite. `None` if the matrix is
+    /// not positive definite in float64.
     ///
     /// # Errors
-    /// Those of [`Evaluator::score`].
+    /// Returns the errors of [`Evaluator::score`].
     pub(super) fn state(
         &mut self,
         at: &Hyperparameters,
@@ -130,7 +133,8 @@ impl<'a> Evaluator<'a> {
         Ok(Some(state))
     }
 
-    /// Derivatives of the score in the logarithms of what is free, at the hyperparameters of the last score.
+    /// Returns the derivatives of the score by the logarithms of the free numbers, at the hyperparameters of
+    /// the last score.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -164,7 +168,7 @@ impl<'a> Evaluator<'a> {
         Ok(space.gradient(at, &sums, weights.trace()))
     }
 
-    /// The mean with its coefficients, `(FᵀWF)⁻¹FᵀWY`, after a score; `None` if there is none.
+    /// Returns the mean with its coefficients `(FᵀWF)⁻¹FᵀWY`, after a score. `None` if there is no mean.
     pub(super) fn trend(&self) -> Option<Trend> {
         let (n, p) = (self.subject.n_points(), self.subject.n_functions);
         let columns = self.whitened();
@@ -174,7 +178,7 @@ impl<'a> Evaluator<'a> {
         self.subject.trend((0..p).map(|a| solved[(a, 0)]).collect())
     }
 
-    /// `L⁻¹` times the functions of the mean and the values, `[n, p + 1]`.
+    /// Returns `L⁻¹` times the functions of the mean and the values, `[n, p + 1]`.
     fn whitened(&self) -> Vec<f64> {
         let mut columns = self.subject.functions.clone();
         columns.extend_from_slice(&self.subject.values);
@@ -182,7 +186,8 @@ impl<'a> Evaluator<'a> {
         columns
     }
 
-    /// `P_ii = W_ii − |T_i|²`; 0 where it is rounding: then nothing but its value says what a point's value is.
+    /// Computes `P_ii = W_ii − |T_i|²`, and 0 where that is rounding: no other value then says anything about
+    /// the value of the point.
     fn diagonal(&mut self, of_mean: &[f64], observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         self.matrices.invert_factor(observer)?;
         let n = self.subject.n_points();
@@ -194,7 +199,7 @@ impl<'a> Evaluator<'a> {
         Ok(self.matrices.inverse_diagonal().into_iter().enumerate().map(entry).collect())
     }
 
-    /// `P` times a vector.
+    /// Returns `P` times a vector.
     fn projected(&self, of_mean: &[f64], vector: Vec<f64>) -> Vec<f64> {
         let n = vector.len();
         let along: Vec<f64> = of_mean.chunks_exact(n).map(|t| dot(t, &vector)).collect();
@@ -208,7 +213,8 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// The refusal of hyperparameters with an α that is enough: `4nε‖K‖₁`, and `‖K‖₁` is `nv` at most.
+/// Returns the refusal of these hyperparameters with an α that is large enough: `4nε‖K‖₁`, where `‖K‖₁` is at
+/// most `nv`.
 pub(super) fn never_definite(at: &Hyperparameters, n: usize) -> NumericsError {
     let minimum_alpha = 4.0 * (n as f64).powi(2) * f64::EPSILON * at.variance;
     NumericsError::NotPositiveDefinite { reason: NotDefinite::Unfactorable, minimum_alpha }

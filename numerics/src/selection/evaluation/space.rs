@@ -1,4 +1,4 @@
-//! The box of logarithms that is searched.
+//! The box of logarithms that a search explores.
 
 use super::contraction::Sums;
 use crate::error::NumericsError;
@@ -6,16 +6,16 @@ use crate::kernel::Family;
 use crate::selection::parameters::{Hyperparameters, Parameter, Variation};
 use crate::sums::regularization::Regularization;
 
-/// The hyperparameters in a box of the logarithms of those that are free.
+/// Hyperparameters as a function of the logarithms of the free numbers, which lie in a box.
 #[derive(Debug, Clone)]
 pub(in crate::selection) struct Space {
     base: Hyperparameters,
-    /// One entry for each free number.
+    /// Variation of each free number. [`Parameter::LengthScales`] is split into its axes.
     free: Vec<Variation>,
 }
 
 impl Space {
-    /// The free numbers of hyperparameters, which are moved into their bounds.
+    /// Creates the space of the free numbers. Starting values are moved into their bounds.
     ///
     /// # Errors
     /// [`NumericsError::InvalidVariation`].
@@ -51,7 +51,7 @@ impl Space {
         Ok(space)
     }
 
-    /// Whether nothing is free twice, and α is one number.
+    /// Checks that no parameter varies twice, and that ℓ and α are single numbers where they vary as such.
     fn check_distinct(&self, vary: &[Variation]) -> Result<(), NumericsError> {
         let last = vary.len().saturating_sub(1);
         let has_axes = self.base.length_scales.len() > 1 || self.per_axis();
@@ -78,27 +78,27 @@ impl Space {
         self.free.len()
     }
 
-    /// What each free number belongs to.
+    /// Parameters of the free numbers.
     pub(in crate::selection) fn parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
         self.free.iter().map(|free| free.parameter)
     }
 
-    /// Whether slopes along single axes are wanted.
+    /// Returns whether slopes along single axes are needed.
     pub(in crate::selection) fn per_axis(&self) -> bool {
         self.free.iter().any(|free| matches!(free.parameter, Parameter::LengthScaleOfAxis(_)))
     }
 
-    /// The bounds of the logarithms.
+    /// Bounds of the logarithms.
     pub(in crate::selection) fn bounds(&self) -> Vec<(f64, f64)> {
         self.free.iter().map(|free| (free.min.ln(), free.max.ln())).collect()
     }
 
-    /// Where the search begins.
+    /// Logarithms at which the search begins.
     pub(in crate::selection) fn start(&self) -> Vec<f64> {
         self.numbers_of(&self.base)
     }
 
-    /// The hyperparameters with these logarithms.
+    /// Returns the hyperparameters with these logarithms.
     pub(in crate::selection) fn at(&self, logarithms: &[f64]) -> Hyperparameters {
         let mut found = self.base.clone();
         for (free, logarithm) in self.free.iter().zip(logarithms) {
@@ -119,7 +119,7 @@ impl Space {
         found
     }
 
-    /// Derivatives in the logarithms, from sums over pairs and the trace of their weights.
+    /// Returns the derivatives by the logarithms, from the sums over pairs and the trace of their weights.
     pub(in crate::selection) fn gradient(&self, at: &Hyperparameters, sums: &Sums, trace: f64) -> Vec<f64> {
         let v = at.variance;
         let slope = |free: &Variation| match free.parameter {
@@ -146,7 +146,7 @@ impl Space {
                 _ => free.min,
             },
         };
-        // Bounds are positive, so that a 0 gets a logarithm.
+        // Bounds are positive, so a number that was 0 has a logarithm as well.
         self.free.iter().map(|free| number(free).clamp(free.min, free.max).ln()).collect()
     }
 }

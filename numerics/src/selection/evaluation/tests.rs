@@ -1,4 +1,4 @@
-//! Scores against their definitions, slopes against differences.
+//! Scores compared with their definitions, and slopes with differences.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn score(subject: &Subject<'_>, criterion: Criterion, at: &Hyperparameters) -> f
     Evaluator::new(subject, criterion, true).score(at, &Unobserved).unwrap().unwrap().score
 }
 
-/// Slopes beside central differences.
+/// Compares slopes with central differences.
 fn check_slopes(subject: &Subject<'_>, criterion: Criterion, base: &Hyperparameters, vary: &[Variation]) {
     let space = Space::of(base, vary, subject.cloud.dimension()).unwrap();
     let x = space.start();
@@ -51,7 +51,7 @@ fn check_slopes(subject: &Subject<'_>, criterion: Criterion, base: &Hyperparamet
             x[k] += by;
             score(subject, criterion, &space.at(&x))
         };
-        // Fourth order.
+        // Difference quotients of fourth order.
         let near = (moved(step) - moved(-step)) / (2.0 * step);
         let far = (moved(2.0 * step) - moved(-2.0 * step)) / (4.0 * step);
         let difference = (4.0 * near - far) / 3.0;
@@ -94,7 +94,7 @@ fn slopes_of_every_family_and_criterion_agree_with_differences() {
 #[test]
 fn slopes_of_many_points_and_of_one_axis_agree_with_differences() {
     let random = &mut Random(2);
-    // More than one block, more than one task.
+    // More than one block and more than one task.
     let cloud = cube(300, 4, random);
     let values = values(&cloud, random);
     let subject = Subject::of(&cloud, &values, Mean::Constant).unwrap();
@@ -110,7 +110,7 @@ fn slopes_of_many_points_and_of_one_axis_agree_with_differences() {
     }
 }
 
-/// A system that was factorized by the solver.
+/// Returns a factorized system and its solution.
 fn solved(cloud: &Cloud, values: &[f64], mean: Mean, at: &Hyperparameters) -> (Solver, Solution) {
     let kernel = at.kernel_on(cloud).unwrap();
     let system = System::new(Arc::new(cloud.clone()), kernel, at.noise.clone()).unwrap();

@@ -1,4 +1,4 @@
-//! A kernel that all groups agree with.
+//! A kernel with which all groups of values agree.
 
 use super::Learned;
 use super::grid::{Cell, Grid, N_FAMILIES};
@@ -6,36 +6,36 @@ use super::search::Search;
 use crate::error::NumericsError;
 use crate::observer::Observer;
 
-/// How many times the variance of all groups that of the deep ones may be.
+/// Largest ratio of the variance of the deep groups to that of all groups.
 const DISAGREEING: f64 = 1.5;
 
-/// All groups, and those that are given more, if there are such.
+/// Searches on all groups and on the deep ones, which are given more points, if there are any.
 pub(super) struct Agreement<'a> {
     pub(super) all: Search<'a>,
     pub(super) deep: Option<Search<'a>>,
     pub(super) grid: &'a Grid,
-    /// Unit V.
+    /// Unit of the values, V.
     pub(super) unit: f64,
 }
 
-/// What both kinds of groups say of a cell.
+/// Verdict of all groups and of the deep ones on a cell.
 struct Verdict {
     learned: Learned,
-    /// Whether those that are given more have about the same variance.
+    /// True if the deep groups have about the same variance as all groups.
     is_of_groups: bool,
-    /// Whether the values of no place contradict it.
+    /// True if the values of no place contradict the cell.
     is_of_places: bool,
 }
 
 impl Agreement<'_> {
-    /// What the best cells of families come to.
+    /// Decides between the best cells of the families.
     ///
-    /// The best one is taken, with the shortest length scale that values leave open; a shorter one where
-    /// groups that are given more contradict its variance, or the values of some place do, which have a
-    /// feature that it does not expect.
+    /// The best cell is taken, with the shortest length scale that the values leave open. A still shorter one
+    /// is taken if the deep groups contradict its variance, or if the values of some place do. Such a place
+    /// has a feature that the cell does not expect.
     ///
     /// # Errors
-    /// [`NumericsError::Cancelled`], [`NumericsError::WeightsOverflow`] of values whose square leaves
+    /// [`NumericsError::Cancelled`]. [`NumericsError::WeightsOverflow`] for values whose squares exceed
     /// float64.
     pub(super) fn decided(
         &mut self,
@@ -57,13 +57,14 @@ impl Agreement<'_> {
             let is_local = |cell: &Cell| of_groups.is_none() || self.grid.is_longer_than_outliers(*cell);
             match shorter.filter(is_local) {
                 Some(shorter) => cell = shorter,
-                // Where groups do not agree with any, the variance that most ask for has to do.
+                // No cell suits all groups and places: the first one that suits the groups is taken, or else
+                // the last one.
                 None => return Ok(of_groups.or(last)),
             }
         }
     }
 
-    /// The first of the best by all groups.
+    /// Returns the best cell by all groups, the first of equals.
     fn best(&mut self, cells: [Cell; N_FAMILIES], observer: &dyn Observer) -> Result<Cell, NumericsError> {
         let mut best = (cells[0], f64::INFINITY);
         for cell in cells {
@@ -80,7 +81,7 @@ impl Agreement<'_> {
         Ok(self.all.height(cell, observer)? + of_deep)
     }
 
-    /// `None` if it does not explain the values in float64.
+    /// Returns the verdict on a cell, or `None` if it does not explain the values in float64.
     fn verdict(&mut self, cell: Cell, observer: &dyn Observer) -> Result<Option<Verdict>, NumericsError> {
         let Some(all) = self.all.score(cell, observer)? else { return Ok(None) };
         let deep = match &mut self.deep {

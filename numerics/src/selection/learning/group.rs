@@ -1,4 +1,4 @@
-//! Values of a group given those of others, without what these explain.
+//! Values of a group given those of others, without what the others explain.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -13,32 +13,32 @@ use crate::points::cloud::Cloud;
 use crate::sums::gram::fill_kernel_column;
 use crate::sums::nodes::Nodes;
 
-/// A conditional with all that it takes to compare kernels on it.
+/// A conditional with the data for comparing kernels on it.
 pub(super) struct Group {
     cloud: Cloud,
     nodes: Nodes,
     n_given: usize,
-    /// The functions of the mean, then the lists of values, at its points: `[n, p + k]` column by column.
+    /// Functions of the mean, then lists of values, at the points: `[n, p + k]` column by column.
     columns: Vec<f64>,
-    /// Variances of the noise in units of their mean, where they differ.
+    /// Noise variances in units of their mean. `None` unless they are given per point.
     noise: Option<Vec<f64>>,
 }
 
-/// What is added to the variances of a process of variance 1.
+/// Noise that is added to the covariances of a process of variance 1.
 #[derive(Clone, Copy)]
 pub(super) struct Nugget {
     /// Mean variance of the noise.
     pub(super) ratio: f64,
-    /// At each point at least, so that points may coincide which have no noise.
+    /// Least variance at each point, so that points without noise may coincide.
     pub(super) least: f64,
 }
 
-/// The functions and values of the responses without what the given ones explain of them, in units of what is
-/// left of the process: rows of `L⁻¹[F Y]`, L the Cholesky factor of the group.
+/// Functions and values of the responses without what the given values explain: rows of `L⁻¹[F Y]`, L the
+/// Cholesky factor of the group. The unit is the deviation that is left of the process.
 pub(super) struct Whitened {
     /// `[r, p + k]`, column by column.
     pub(super) columns: Vec<f64>,
-    /// `ln det` of the covariances of the responses given the others, under a process of variance 1.
+    /// `ln det` of the covariance of the responses given the others, for a process of variance 1.
     pub(super) log_determinant: f64,
 }
 
@@ -62,7 +62,7 @@ impl Group {
         self.cloud.n_points() - self.n_given
     }
 
-    /// `None` where the matrix is not positive definite in float64.
+    /// Returns the whitened responses. `None` if the matrix is not positive definite in float64.
     pub(super) fn whitened(&self, kernel: &Kernel, nugget: Nugget) -> Option<Whitened> {
         let (n, given) = (self.cloud.n_points(), self.n_given);
         let mut gram = self.gram(kernel, nugget);
@@ -86,7 +86,7 @@ impl Group {
         Some(Whitened { columns, log_determinant })
     }
 
-    /// The lower triangle of its covariances under a kernel of variance 1.
+    /// Returns the lower triangle of the covariances under a kernel of variance 1.
     fn gram(&self, kernel: &Kernel, nugget: Nugget) -> Vec<f64> {
         let n = self.cloud.n_points();
         let mut gram = vec![0.0; n * n];

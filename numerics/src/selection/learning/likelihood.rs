@@ -14,23 +14,24 @@ use crate::observer::Observer;
 use crate::solver::trend::{Mean, Trend, solve_gram};
 use crate::solver::{Disagreement, Outlier, Place};
 
-/// Noise over variance that a mean is found with at least.
+/// Least ratio of noise to variance with which a mean is found.
 const LEAST_RATIO_OF_MEAN: f64 = 1e-10;
 
-/// How well a kernel explains values.
+/// Score of a kernel: how well it explains the values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Score {
-    /// `−ln` of the restricted likelihood, but for a constant.
+    /// `−ln` of the restricted likelihood, up to a constant.
     pub(super) negative_log: f64,
-    /// Variance of the process, in units of the values.
+    /// Variance of the process, in the square of the unit of the values.
     pub(super) variance: f64,
-    /// The variance that it would take for the values of some small place to be likely, in the same units.
+    /// Variance at which the values of every small place are likely, in the same unit.
     pub(super) of_places: f64,
 }
 
-/// Values one after the other, which are mostly near ones, whose mean square is looked at. The greatest are
-/// left out, since outliers are no feature. Of the rest of standard normal numbers one in 500,000 has a mean
-/// square beyond `most`: hundreds of places are looked at.
+/// A test of consecutive values, which are mostly near each other: their mean square has a bound.
+///
+/// The greatest values are left out, since outliers are no feature. Of standard normal numbers, the mean
+/// square of the rest exceeds `most` once in 500,000 runs. Hundreds of places are tested.
 struct Run {
     length: usize,
     n_left_out: usize,
@@ -41,12 +42,12 @@ const RUNS: [Run; 2] =
     [Run { length: PLACE, n_left_out: 1, most: 2.9 }, Run { length: 2 * PLACE, n_left_out: 2, most: 2.1 }];
 
 impl Run {
-    /// Whether there are enough values: three quarters of a run.
+    /// Returns whether there are enough values: three quarters of a run.
     fn is_of(&self, values: &[f64]) -> bool {
         4 * values.len() >= 3 * self.length
     }
 
-    /// The squares of what is not left out, ascending.
+    /// Returns the squares of the values that are not left out, ascending.
     fn squares(&self, values: &[f64]) -> Vec<f64> {
         let mut squares: Vec<f64> = values.iter().map(|z| z * z).collect();
         squares.sort_unstable_by(f64::total_cmp);
@@ -54,18 +55,18 @@ impl Run {
         squares
     }
 
-    /// Their mean over its bound.
+    /// Returns the mean square of the values that are not left out, over its bound.
     fn excess(&self, values: &[f64]) -> f64 {
         let squares = self.squares(values);
         squares.iter().sum::<f64>() / squares.len() as f64 / self.most
     }
 }
 
-/// Groups of values that kernels are compared on.
+/// Groups of values on which kernels are compared.
 pub(super) struct Evidence<'a> {
     pub(super) values: &'a Values<'a>,
     groups: Vec<Group>,
-    /// Those that are explained, group after group.
+    /// Points whose values are explained, group after group.
     points: Vec<usize>,
 }
 
@@ -84,13 +85,13 @@ impl<'a> Evidence<'a> {
         Self { values, groups, points }
     }
 
-    /// The score of a kernel of variance 1 with so much noise for it; the variance of the process is the one
-    /// given, or else the likeliest. `None` where a matrix is not positive definite in float64.
+    /// Returns the score of a kernel of variance 1 with this ratio of noise. The variance of the process is
+    /// the given one, or else the likeliest. `None` if a matrix is not positive definite in float64.
     ///
-    /// With K the covariances, `z = L⁻¹y` without its part in the range of `L⁻¹F` and s² the variance:
-    /// `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams 2006, eq. 2.45;
-    /// Patterson and Thompson 1971), summed over the lists of values, each with a mean of its own. With more
-    /// groups than one, `L⁻¹` is that of Vecchia's approximation (order.rs).
+    /// With K the covariances, `z = L⁻¹y` without its part in the range of `L⁻¹F` and s² the variance,
+    /// `negative_log` is `½|z|²/s² + ½(n − p) ln s² + ½ ln det K + ½ ln det FᵀK⁻¹F` (Rasmussen and Williams
+    /// 2006, eq. 2.45; Patterson and Thompson 1971). It is summed over the lists of values, each with a mean
+    /// of its own. With more than one group, `L⁻¹` is that of Vecchia's approximation (order.rs).
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -115,8 +116,8 @@ impl<'a> Evidence<'a> {
         Ok(negative_log.is_finite().then_some(Score { negative_log, variance, of_places }))
     }
 
-    /// What was decided, with the mean of the values, or of the first of several lists, and how the values
-    /// contradict it; `kernel` is the one that was decided, of variance 1.
+    /// Adds to the decided kernel and noise the mean of the values, and how the values contradict the
+    /// decision. Of several lists, the mean is that of the first. `kernel` is the decided one, of variance 1.
     ///
     /// # Errors
     /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
@@ -126,7 +127,7 @@ impl<'a> Evidence<'a> {
         decided: Learned,
         observer: &dyn Observer,
     ) -> Result<Learned, NumericsError> {
-        // The mean is none the worse for it.
+        // The least noise does not make the mean worse.
         let nugget = Nugget { ratio: decided.ratio, least: LEAST_RATIO_OF_MEAN };
         match (self.unexplained(kernel, nugget, observer)?, self.values.observed.mean) {
             (None, Mean::Zero) => Ok(decided),
@@ -139,12 +140,12 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// The greatest of all runs: mean square over the bound.
+    /// Returns the greatest excess of all runs: mean square over the bound.
     fn variance_of_places(&self, rest: &[f64]) -> f64 {
         self.runs(rest).map(|(run, _, values)| run.excess(values)).fold(0.0, f64::max)
     }
 
-    /// The runs of all groups and lists, each with the row where it begins and its values.
+    /// Yields the runs of all groups and lists, each with its first row and its values.
     fn runs<'r>(&'r self, rest: &'r [f64]) -> impl Iterator<Item = (&'static Run, usize, &'r [f64])> {
         let of_group = |begin: usize, own: &'r [f64]| {
             let of_length = move |run: &'static Run| {
@@ -164,7 +165,7 @@ impl<'a> Evidence<'a> {
         rest.chunks_exact(self.points.len()).flat_map(of_list)
     }
 
-    /// The run that is farthest off, if it is beyond its bound.
+    /// Returns the run that is farthest beyond its bound, if any is.
     fn place(&self, rest: &[f64], in_deviations: f64) -> Option<Place> {
         let runs = self.runs(rest).map(|run| (run.0.excess(run.2), run));
         let (excess, (run, begin, values)) = runs.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
@@ -194,7 +195,8 @@ impl<'a> Evidence<'a> {
         Ok(Trend::found(self.values.basis.clone(), coefficients, covariance))
     }
 
-    /// Each value measured by the deviation that the earlier ones leave it, under a process of this variance.
+    /// Returns how the values contradict a process of this variance. Each is measured by the deviation that
+    /// the earlier ones leave it.
     fn disagreement(&self, mut left: Unexplained, variance: f64) -> Option<Disagreement> {
         let (n, p) = (left.n_rows, self.n_functions());
         remove_mean(&mut left.columns, n, p)?;
@@ -242,8 +244,8 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Makes the first p of some columns orthonormal and the others orthogonal to them (modified Gram–Schmidt);
-/// says `ln det FᵀF` of the first.
+/// Makes the first p columns orthonormal and the others orthogonal to them (modified Gram–Schmidt). Returns
+/// `ln det FᵀF` of the first p, or `None` if one of them vanishes.
 pub(in crate::selection) fn remove_mean(columns: &mut [f64], n: usize, p: usize) -> Option<f64> {
     let mut log_determinant = 0.0;
     for a in 0..p {

@@ -1,15 +1,15 @@
-//! Kernel and noise from the values themselves, for whoever says nothing.
+//! Kernel and noise learned from the values themselves, for clients that name neither.
 //!
-//! The restricted likelihood of the values, the mean and the variance profiled out of it, is compared over a
-//! grid: smoothness, length scale, and the ratio of noise to variance. Nothing finer than the grid is told
-//! apart by a few hundred values, and since a factorization depends on these three alone, other values on the
-//! same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields a Matérn 5/2 is off
-//! by three to a hundred times what Gauss is, and has bands that are too long (docs/error-bars.md).
+//! A grid of smoothness, length scale, and ratio of noise to variance is searched. Its cells are compared by
+//! the restricted likelihood of the values, with mean and variance profiled out. A few hundred values cannot
+//! distinguish anything finer than the grid. A factorization depends on these three alone, so other values on
+//! the same cloud mostly find theirs in the cache. Smoothness matters most: for smooth fields, Matérn 5/2 has
+//! errors three to a hundred times those of Gauss, and its bands are too long (docs/error-bars.md).
 //!
-//! The grid is searched on a sample first, then from there on all values: together while they are few, else
-//! in groups that explain each other (order.rs). A sample alone misses what is local: from 256 of 2,000
-//! values a plane with a bump looks like a plane with noise. Even the likelihood of all values outvotes a
-//! small place, so what was found has to agree with every place (agreement.rs).
+//! The grid is searched on a sample first, then from there on all values. Few values are taken together, more
+//! in groups that explain each other (order.rs). A sample alone misses local features: from 256 of 2,000
+//! values, a plane with a bump looks like a plane with noise. Even in the likelihood of all values, a small
+//! place is outvoted. The result therefore has to agree with every place (agreement.rs).
 
 mod agreement;
 mod grid;
@@ -37,31 +37,33 @@ use values::Values;
 pub(super) use likelihood::remove_mean;
 pub use price::learning_price;
 
-/// What is known of the noise of values beforehand.
+/// Prior knowledge of the noise of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Noise<'a> {
-    /// Nothing.
+    /// Nothing is known.
     Unknown,
-    /// Its variance, the same everywhere; unit V².
+    /// Variance of the noise, the same at every point, unit V².
     Uniform(f64),
-    /// Its variance at each point, `[n]`, unit V².
+    /// Variance of the noise at each point, `[n]`, unit V².
     PerPoint(&'a [f64]),
 }
 
-/// Values at the points of a cloud, and what is known of them.
+/// Values at the points of a cloud, with what is known of noise and mean.
 #[derive(Clone, Copy)]
 pub struct Observed<'a> {
     pub cloud: &'a Cloud,
     pub sampling: &'a Sampling,
-    /// `[n]`, unit V; or `[k, n]`, k lists that have kernel and noise in common.
+    /// Values `[n]`, unit V. Or `[k, n]`: k lists with a common kernel and noise.
     pub values: &'a [f64],
     pub noise: Noise<'a>,
     pub mean: Mean,
 }
 
 impl Observed<'_> {
+    /// Checks that the values are one or more complete lists.
+    ///
     /// # Errors
-    /// [`NumericsError::LengthMismatch`] for no list, or one that is not whole.
+    /// [`NumericsError::LengthMismatch`] if there is no list, or an incomplete one.
     fn check(&self) -> Result<(), NumericsError> {
         let n = self.cloud.n_points();
         match self.values.len() >= n && self.values.len().is_multiple_of(n) {
@@ -71,25 +73,25 @@ impl Observed<'_> {
     }
 }
 
-/// What the values decide.
+/// Kernel, noise and mean that were learned from values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     pub family: Family,
     /// ℓ, unit L.
     pub length_scale: f64,
-    /// Variance of the noise over that of the process, 0 if the noise is known to be 0; where it differs
-    /// between points, of its mean.
+    /// Variance of the noise over that of the process. 0 if the noise is known to be 0. For noise that
+    /// differs between points, its mean counts.
     pub ratio: f64,
-    /// The variance of the process, unit V²; exactly what it has to be for the ratio where the noise is known.
+    /// Variance of the process, unit V². If the noise is known, exactly the variance that gives the ratio.
     pub variance: f64,
-    /// The mean as all groups have it: for solvers that never see all values at once.
+    /// Mean found by all groups, for solvers that never see all values at once.
     pub trend: Option<Trend>,
-    /// How the groups contradict kernel and noise, for the same solvers.
+    /// Disagreement of the groups with kernel and noise, for the same solvers.
     pub disagreement: Option<Disagreement>,
 }
 
 impl Learned {
-    /// Whether values are so small that the variance is greater than they say.
+    /// Returns whether the values are so small that their variance was raised to the least one.
     pub fn has_least_variance(&self) -> bool {
         is_least_variance(self.variance)
     }
@@ -100,17 +102,17 @@ impl Learned {
     }
 }
 
-/// Fewer values decide nothing.
+/// Least number of values that decide anything.
 const LEAST_VALUES: usize = 8;
 
 /// Learns kernel and noise from values.
 ///
-/// Values that do not differ decide nothing, nor do few: Matérn 5/2 of the default length scale with the
-/// least noise.
+/// Constant values decide nothing, nor do fewer than eight. The result is then Matérn 5/2 of the default
+/// length scale with the least noise.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`],
-/// [`NumericsError::WeightsOverflow`] of values whose square leaves float64.
+/// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
+/// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64.
 pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned, NumericsError> {
     observed.check()?;
     let values = Values::of(observed);
@@ -125,7 +127,7 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     all.concluded(&kernel, learned, observer)
 }
 
-/// On all values, or on a sample and from there on all values in groups.
+/// Searches the grid on all values, or on a sample and from there on all values in groups.
 fn search(
     all: &Evidence<'_>,
     order: &Order,
@@ -152,7 +154,7 @@ fn search(
     best.map_or(Ok(None), |best| agreement.decided(best, observer))
 }
 
-/// The mean of values under a kernel and a noise that are given.
+/// Finds the mean of values under a given kernel and noise.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].

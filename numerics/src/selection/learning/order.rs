@@ -1,12 +1,13 @@
-//! In which order points explain each other.
+//! Order in which points explain each other.
 //!
-//! A likelihood of n values takes n³ flops. It is the product of that of each value given those before it,
-//! and of those before it the near ones say nearly all (Vecchia 1988): here values are taken in groups of
-//! near ones, each given the values nearest to it of those that come before (Stein, Chi, Welty 2004). The
-//! first group is a sample of near and far points. Of the others one half is given points of the sample, and
-//! the other half is given points of all. With levels that grow from the sample by twos likelihoods came
-//! nearer to that of all values, and bands covered less: smooth kernels won more often where a field has a
-//! kink.
+//! A likelihood of n values takes n³ flops. It is the product of the likelihoods of each value given those
+//! before it. Of those before it, the near ones say nearly all (Vecchia 1988). Here values are taken in
+//! groups of near ones, each given the nearest of the values that come before (Stein, Chi and Welty 2004).
+//!
+//! The first group is a sample of near and far points. One half of the others is given points of the sample,
+//! and the other half is given points of all. Levels that double from the sample on came nearer to the
+//! likelihood of all values, but their bands covered less. Smooth kernels then won more often where a field
+//! has a kink.
 
 use super::Observed;
 use crate::error::NumericsError;
@@ -16,56 +17,59 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbours;
 use crate::points::thinning::thinned_points;
 
-/// Values that are taken together at most.
+/// Largest number of values that are taken together.
 pub(super) const MAX_TOGETHER: usize = 384;
 
-/// Points of the sample at most, where more values are not taken together.
+/// Largest number of points of the sample, where there are too many values to take together.
 pub(super) const MAX_SAMPLE: usize = 128;
 
-/// Points of the sample that lie together: what is noise shows between near points, what is not between far
-/// ones.
+/// Number of points of the sample that lie together. Noise shows between near points, everything else between
+/// far ones.
 const TOGETHER: usize = 16;
 
-/// Values of a group at most, and those that it is given.
+/// Largest number of values of a group. It is given [`GIVEN`] values of others.
 pub(super) const RESPONSES: usize = 32;
 pub(super) const GIVEN: usize = 32;
 
-/// Values of a group that follow each other lie together, so many of them at least half of the time.
+/// Largest size of the cells of near values by which a group is ordered. Larger groups are halved, so their
+/// cells have at least half as many values.
 pub(super) const PLACE: usize = 16;
 
-/// Groups of the last half that are given many more: what a smooth kernel makes of near values alone says
-/// little about what it makes of all of them. From 32 of 2,000 exact values of a front, Gauss of ten spacings
-/// seemed right, whose deviations are a fourteenth of its errors.
+/// Number of groups of the last half that are given many more values. How a smooth kernel fits near values
+/// alone says little about how it fits all of them.
+///
+/// From 32 of 2,000 exact values of a front, Gauss of ten spacings seemed right, although its deviations are
+/// a fourteenth of its errors.
 pub(super) const DEEP_GROUPS: usize = 16;
 pub(super) const GIVEN_DEEP: usize = 256;
 
-/// Groups of a half that are searched by at most: what more of them say of hyperparameters is nothing new.
+/// Largest number of groups of a half that a search uses. More of them say nothing new about hyperparameters.
 pub(super) const MAX_GROUPS: usize = 96;
 
 /// Points whose values are explained, given those of others.
 pub(super) struct Conditional {
-    /// The given ones first.
+    /// Indices of the points, the given ones first.
     pub(super) points: Vec<usize>,
     pub(super) n_given: usize,
 }
 
 impl Conditional {
-    /// Some points, given none.
+    /// Creates a conditional of some points that are given none.
     pub(super) fn whole(points: Vec<usize>) -> Self {
         Self { points, n_given: 0 }
     }
 }
 
-/// All points of a cloud in groups.
+/// The points of a cloud in groups.
 pub(super) struct Order {
-    /// Those that hyperparameters are searched by.
+    /// Groups by which hyperparameters are searched.
     pub(super) searched: Vec<Conditional>,
-    /// Some of the last ones again, given more.
+    /// Some of the last groups again, given more points.
     pub(super) deep: Vec<Conditional>,
 }
 
 impl Order {
-    /// With a sample as the first group, unless all points are one.
+    /// Orders the points. The first group is a sample, unless all points form one group.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -101,7 +105,7 @@ impl Order {
     }
 }
 
-/// Groups of near points spread over the cloud.
+/// Returns the sample: groups of near points, spread over the cloud.
 fn sample(observed: &Observed<'_>) -> Vec<usize> {
     let cloud = observed.cloud;
     let centres = thinned_points(cloud, MAX_SAMPLE / TOGETHER);
@@ -114,8 +118,8 @@ fn sample(observed: &Observed<'_>) -> Vec<usize> {
     points
 }
 
-/// The points that are not of the sample, in two halves that are both spread over the cloud: one of each two
-/// near points.
+/// Splits the points outside of the sample into two halves, each spread over the cloud. Of every two near
+/// points, each half has one.
 fn halves(observed: &Observed<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
     let n = observed.cloud.n_points();
     let mut is_left = vec![true; n];
@@ -130,12 +134,12 @@ fn halves(observed: &Observed<'_>, sample: &[usize]) -> [Vec<u32>; 2] {
     halves
 }
 
-/// Some points, near ones one after the other.
+/// Orders some points so that near ones follow each other.
 fn by_places(cloud: &Cloud, points: &[u32]) -> Vec<usize> {
     Cells::of(cloud, points.to_vec(), PLACE).iter().flatten().map(|&point| point as usize).collect()
 }
 
-/// The point of a cell with the farthest neighbours; the first of several.
+/// Returns the point of a cell whose neighbours are farthest away, the first of equals.
 fn lonelier(observed: &Observed<'_>, cell: &[u32]) -> Option<u32> {
     let spacing = |point: u32| observed.sampling.spacing(point as usize);
     cell.iter().copied().max_by(|&a, &b| spacing(a).total_cmp(&spacing(b)).then(b.cmp(&a)))
@@ -162,13 +166,14 @@ mod tests {
             for group in &order.searched {
                 let (given, responses) = group.points.split_at(group.n_given);
                 assert!(given.len() <= GIVEN && (given.is_empty() || responses.len() <= RESPONSES));
-                // Of groups that are left out the responses may be given later all the same.
+                // If groups are left out, their responses may be given later all the same.
                 assert!(n > 3000 || given.iter().all(|&point| is_explained[point]));
                 for &point in responses {
                     assert!(!std::mem::replace(&mut is_explained[point], true), "{point} of {n}");
                 }
             }
-            // Up to so many all are searched by, beyond every half is one of at most as many groups.
+            // Small clouds are searched by all groups. In larger ones, each half has at most as many as are
+            // allowed.
             assert!(n > 3000 || is_explained.iter().all(|&is| is));
             assert!(order.searched.len() <= 1 + 2 * MAX_GROUPS);
             assert_eq!(order.deep.is_empty(), n <= MAX_TOGETHER);

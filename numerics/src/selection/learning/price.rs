@@ -1,28 +1,30 @@
-//! What learning takes, known before it is begun.
+//! Cost of learning, estimated before it begins.
 
 use super::order::{DEEP_GROUPS, GIVEN, GIVEN_DEEP, MAX_GROUPS, MAX_SAMPLE, MAX_TOGETHER, RESPONSES};
 use super::values::MAX_LISTS;
 use crate::solver::choose::{Price, sampling_bytes};
 
-/// Cells of the grid that are looked at, mostly: from nothing, from what was found on a sample, and by deep
-/// groups.
+/// Number of cells of the grid that a search from nothing usually scores. [`CELLS_FROM_SAMPLE`] is for a
+/// search that begins at the result of a sample, [`CELLS_OF_DEEP`] for deep groups.
 const CELLS: f64 = 70.0;
 const CELLS_FROM_SAMPLE: f64 = 40.0;
 const CELLS_OF_DEEP: f64 = 4.0;
 
-/// Flops for the order of a point.
+/// Flops to order one point.
 const FLOPS_OF_ORDER: f64 = 500.0;
 
-/// Of [`super::learn`] for so many lists of values at n points of d dimensions, beside the sampling of the cloud.
+/// Returns the cost of [`super::learn`] for `n_lists` lists of values at n points of d dimensions, without
+/// the sampling of the cloud.
 ///
-/// Bytes are those of the order (the points that come earlier with their tree, and indices), of the groups
-/// with what the mean and the lists of values leave of them, and of the matrices of groups side by side.
+/// Bytes are those of the order, of the groups, and of the matrices that are factorized side by side. The
+/// order holds the earlier points with their tree, and indices. The groups hold what the mean and the lists
+/// of values leave of them.
 pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Price {
     let together = |n: usize| (n * n) as f64 * (n as f64 / 3.0 + 20.0);
     let square = |n: usize| n.saturating_mul(n);
     let (given, deep) = (GIVEN + RESPONSES, GIVEN_DEEP + RESPONSES);
-    // Position twice, variance of the noise, functions of a linear mean and lists, these once more whitened and
-    // once more in one piece.
+    // Numbers of a member: its position twice and the variance of its noise. The functions of a linear mean
+    // and the lists count three times: as given, whitened, and once more in one piece.
     let of_member =
         dimension.saturating_mul(2).saturating_add(1 + 3 * (dimension + 1 + n_lists.min(MAX_LISTS)));
     if n_points <= MAX_TOGETHER {
@@ -33,7 +35,7 @@ pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Pric
     let n_groups = n_points.div_ceil(RESPONSES).min(2 * MAX_GROUPS);
     let n_members = MAX_SAMPLE + n_groups * given + DEEP_GROUPS * deep;
     let n_numbers = n_members.saturating_mul(of_member) + DEEP_GROUPS * square(deep);
-    // Earlier points are copied for their tree; five lists of indices.
+    // Earlier points are copied for their tree, and there are five lists of indices.
     let of_order = sampling_bytes(n_points, dimension)
         .saturating_add(n_points.saturating_mul((dimension + 5) * size_of::<f64>()));
     let of_groups = n_groups as f64 * together(given) + together(MAX_SAMPLE);

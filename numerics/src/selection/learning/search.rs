@@ -1,23 +1,23 @@
-//! The likeliest cell of the grid.
+//! Search for the likeliest cell of the grid.
 
 use super::grid::{Cell, Grid, N_CELLS, N_FAMILIES, Step, along_ridge};
 use super::likelihood::{Evidence, Score};
 use crate::error::NumericsError;
 use crate::observer::Observer;
 
-/// Steps of a search from nothing, in ratios; those of length scales are half as many.
+/// Steps of a search from nothing, in ratios. Steps in length scales are half as long.
 const STRIDES: [isize; 3] = [4, 2, 1];
 
-/// Steps of a search from what was found on some of the values.
+/// Steps of a search that begins at the result on some of the values.
 const FINE: [isize; 1] = [1];
 
-/// What a step has to gain.
+/// Least gain of a step.
 const GAIN: f64 = 1e-6;
 
-/// How much less likely a kernel may be than the best one, in logarithms, to be as good a guess.
+/// Largest loss in log likelihood at which a kernel is as good a guess as the best one.
 const AS_LIKELY: f64 = 1.0;
 
-/// Scores of cells, as far as they were asked for.
+/// Scores of cells, computed on demand.
 pub(super) struct Search<'a> {
     evidence: &'a Evidence<'a>,
     grid: &'a Grid,
@@ -29,7 +29,7 @@ impl<'a> Search<'a> {
         Self { evidence, grid, scores: vec![None; N_CELLS] }
     }
 
-    /// The best cell of each family. `None` if no kernel explains the values in float64.
+    /// Finds the best cell of each family. `None` if no kernel explains the values in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -51,7 +51,7 @@ impl<'a> Search<'a> {
         Ok(is_explained.then_some(best))
     }
 
-    /// The best cell of each family near one that was found on some of the values.
+    /// Finds the best cell of each family near one that was found on some of the values.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -68,9 +68,10 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// Of all kernels of a family that are [`AS_LIKELY`] as the best one, that with the shortest length
-    /// scale: bands from the best alone are those of a kernel that happens to fit, and where values leave the
-    /// length scale open it is mostly too long. The noise is the likeliest for it.
+    /// Finds the shortest length scale of all kernels of a family that are [`AS_LIKELY`] as the best one.
+    ///
+    /// Bands from the best kernel alone are those of a kernel that happens to fit. Where values leave the
+    /// length scale open, the best one is mostly too long. The noise is the likeliest for the length scale.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -86,7 +87,7 @@ impl<'a> Search<'a> {
         Ok(found)
     }
 
-    /// The next shorter length scale with the likeliest noise for it, if there is one.
+    /// Finds the next shorter length scale with the likeliest noise for it, if there is one.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -108,7 +109,7 @@ impl<'a> Search<'a> {
         Ok(self.against_noise(cell, score) > 0.0)
     }
 
-    /// The first of the best.
+    /// Returns the cell of the least height, the first of equals.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -127,7 +128,7 @@ impl<'a> Search<'a> {
         Ok(best.map(|(cell, _)| cell))
     }
 
-    /// Goes on in every direction that gains, with these strides, one after the other.
+    /// Moves in every direction that gains, with one stride after the other.
     fn descend(
         &mut self,
         mut at: Cell,
@@ -151,7 +152,7 @@ impl<'a> Search<'a> {
         Ok(at)
     }
 
-    /// As far as it gains along a direction or against it, by steps that double while they gain.
+    /// Moves along a direction or against it as long as that gains. Steps double while they gain.
     fn line(&mut self, begin: Cell, direction: Step, observer: &dyn Observer) -> Result<Cell, NumericsError> {
         for sign in [1, -1] {
             let (mut at, mut factor) = (begin, sign);
@@ -169,8 +170,8 @@ impl<'a> Search<'a> {
         Ok(begin)
     }
 
-    /// `−ln` of how likely a cell is, by the values and beforehand; infinite where it does not explain them
-    /// in float64.
+    /// Returns `−ln` of how likely a cell is by the values and by the prior on noise. Infinite if the cell
+    /// does not explain the values in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -183,7 +184,7 @@ impl<'a> Search<'a> {
         self.grid.against_noise(cell, score.variance, self.evidence.values.mean_square)
     }
 
-    /// What the values say of a cell; `None` if it does not explain them in float64.
+    /// Returns the score of a cell. `None` if it does not explain the values in float64.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].

@@ -2,7 +2,7 @@ use super::*;
 use crate::observer::Unobserved;
 use crate::testing::{Random, fibonacci_sphere};
 
-/// A smooth field on a sphere, with noise of a deviation.
+/// A smooth field on a sphere, with noise of this standard deviation.
 fn field(n: usize, noise: f64) -> (Cloud, Vec<f64>) {
     let cloud = fibonacci_sphere(n);
     let mut random = Random(n as u64 + 1);
@@ -27,7 +27,7 @@ fn exact_values_are_taken_as_exact_and_noise_is_found() {
             let (cloud, values) = field(n, noise);
             let found = learned(&cloud, &values, Noise::Unknown);
             let deviation = (found.ratio * found.variance).sqrt();
-            // A hundred values tell their noise to a tenth; the grid is as wide as a third.
+            // A hundred values determine their noise to a tenth. A step of the grid changes it by a third.
             assert!((0.6..1.6).contains(&(deviation / noise)), "{n} {noise}: {deviation}");
         }
     }
@@ -75,13 +75,13 @@ fn a_hot_spot_shortens_the_length_scale_and_outliers_do_not() {
     let (cloud, plain) = field(2000, 0.01);
     let length = |values: &[f64]| learned(&cloud, values, Noise::Unknown).length_scale;
     let expected = length(&plain);
-    // A two-hundredth of the sphere.
+    // The spot covers a two-hundredth of the sphere.
     let spot = |x: &[f64]| (-(1.0 - x[0]) / 0.01).exp();
     let with_spot: Vec<f64> = plain.iter().zip(cloud.points()).map(|(value, x)| value + spot(x)).collect();
     let found = length(&with_spot);
     assert!(found < 0.4 * expected, "{found} of {expected}");
-    // One value in 500, by 10 and by 100 deviations of the noise. The family may be another, with half the
-    // length.
+    // One value in 500 is off by 10 or 100 deviations of the noise. The family may change to one with half
+    // the length.
     for off in [0.1, 1.0] {
         let error = |i: usize| if i % 500 == 250 { off } else { 0.0 };
         let with_outliers: Vec<f64> = plain.iter().enumerate().map(|(i, value)| value + error(i)).collect();
@@ -120,7 +120,7 @@ fn few_values_and_equal_ones_decide_nothing() {
 
 #[test]
 fn points_that_coincide_have_a_mean_though_some_have_no_noise() {
-    // Twice the same points, every third exactly measured; alone, and in groups.
+    // Every point occurs twice, and every third one is exact. One cloud forms one group, the other several.
     for n in [60, 500] {
         let (half, values) = field(n, 0.0);
         let cloud = Cloud::new(half.coordinates().repeat(2), 3).unwrap();

@@ -1,22 +1,24 @@
-//! The values that kernels are compared on.
+//! Values on which kernels are compared.
 
 use super::{Noise, Observed};
 use crate::solver::trend::Basis;
 
-/// Lists of values that are looked at, at most: with one noise and one kernel for all, more say nothing new.
+/// Largest number of lists of values that are looked at. With one noise and one kernel for all, more lists
+/// say nothing new.
 pub(super) const MAX_LISTS: usize = 16;
 
-/// Lists of values without what all values of a list share, in units of the greatest that is left.
+/// Lists of values without their averages, in units of the greatest value that is left.
 pub(super) struct Values<'a> {
     pub(super) observed: Observed<'a>,
     lists: Vec<&'a [f64]>,
-    /// What the values of each list share, `[k]`, unit V.
+    /// Average of each list, `[k]`, unit V. 0 if the process has no mean.
     shared: Vec<f64>,
-    /// Unit V.
+    /// Greatest value without the average, unit V.
     pub(super) unit: f64,
-    /// In units of the greatest: a process and noise of less variance together are contradicted by them.
+    /// Mean square of the values in units of the greatest. Values contradict a process and noise that
+    /// together have less variance.
     pub(super) mean_square: f64,
-    /// Mean of the variances of the noise, where they differ; unit V².
+    /// Mean of the noise variances, unit V². `None` unless they are given per point.
     mean_noise: Option<f64>,
     pub(super) basis: Basis,
 }
@@ -47,18 +49,19 @@ impl<'a> Values<'a> {
         self.lists.len()
     }
 
-    /// The value of a list at a point, in units of the greatest.
+    /// Returns the value of a list at a point, in units of the greatest.
     pub(super) fn at(&self, list: usize, point: usize) -> f64 {
         let rest = self.lists[list][point] - self.shared[list];
         if self.unit > 0.0 { rest / self.unit } else { rest }
     }
 
-    /// What all values of the first list share, unit V.
+    /// Returns the average of the first list, unit V.
     pub(super) fn first_shared(&self) -> f64 {
         self.shared[0]
     }
 
-    /// Variances of the noise at some points in units of their mean, where they differ.
+    /// Returns the noise variances at some points in units of their mean. `None` unless they are given per
+    /// point.
     pub(super) fn relative_noise(&self, points: &[usize]) -> Option<Vec<f64>> {
         let (Noise::PerPoint(variances), Some(mean)) = (self.observed.noise, self.mean_noise) else {
             return None;
@@ -67,12 +70,12 @@ impl<'a> Values<'a> {
         Some(points.iter().map(relative).collect())
     }
 
-    /// Whether all of the values are 0.
+    /// Returns whether all values are 0.
     pub(super) fn is_zero(&self) -> bool {
         self.unit == 0.0 && self.shared.iter().all(|&shared| shared == 0.0)
     }
 
-    /// Whether the values leave nothing to explain.
+    /// Returns whether the values leave nothing to explain.
     pub(super) fn is_constant(&self) -> bool {
         let is_equal = || self.lists.iter().all(|list| list.iter().all(|&value| value == list[0]));
         self.unit == 0.0 || (self.basis.n_functions() > 0 && is_equal())

@@ -1,4 +1,4 @@
-//! Closed forms against points that are really left out.
+//! Closed forms compared with fits that really leave a point out.
 
 use std::sync::Arc;
 
@@ -27,7 +27,8 @@ fn solved(cloud: &Cloud, values: &[f64], mean: Mean, noise: Regularization) -> (
     (solver, solution)
 }
 
-/// Mean and latent variance at a point from all others: the value and variance of kriging, by its weights.
+/// Returns the mean and latent variance at point i from all other points: the value and variance of kriging,
+/// by its weights.
 fn from_others(cloud: &Cloud, values: &[f64], mean: Mean, noise: &Regularization, i: usize) -> (f64, f64) {
     let others: Vec<usize> = (0..N).filter(|&k| k != i).collect();
     let rest = cloud.select(&others);
@@ -41,7 +42,7 @@ fn from_others(cloud: &Cloud, values: &[f64], mean: Mean, noise: &Regularization
         let value = solver.expansion(&solution.weights).values_at(&at, &Unobserved).unwrap()[0];
         value + solution.trend.as_ref().map_or(0.0, |trend| trend.at(x))
     };
-    // Variance of the error of w·Y: k₀ − 2w·k + wᵀ(K + N)w, with weights w from unit values.
+    // Error variance of the prediction w·Y: k₀ − 2w·k + wᵀ(K + N)w. Unit values give the weights w.
     let unit = |k: usize| (0..N - 1).map(|l| f64::from(u8::from(l == k))).collect::<Vec<f64>>();
     let weights: Vec<f64> = (0..N - 1)
         .map(|k| predicted(&Solution::with_mean(&solver, &unit(k), mean, &Unobserved).unwrap()))

@@ -1,8 +1,11 @@
-//! From one start to an optimum: sequential quadratic programming in the box of logarithms (Kraft 1988; the crate slsqp).
+//! Ascent from one start to an optimum, by sequential quadratic programming in the box of logarithms (Kraft
+//! 1988; the crate slsqp).
 //!
-//! It learns curvatures as it goes, beginning with the same for all numbers. Length scales of axes that do not matter have slopes that fall with
-//! their square, and curvatures a millionth of those of the noise, so that it takes them for arrived. Hence two steps: descents that go as far as
-//! that, and from the best of them one more in which every number is measured by its own curvature.
+//! The optimizer learns curvatures as it goes and begins with the same one for all numbers. Length scales of
+//! axes that do not matter have slopes that fall with their square. Their curvatures are a millionth of those
+//! of the noise, so the optimizer takes them for converged. Hence the search has two steps. First come
+//! descents that stop there. The best of them is followed by one more, in which every number is measured by
+//! its own curvature.
 
 use std::cell::RefCell;
 
@@ -15,44 +18,48 @@ use crate::selection::evaluation::Evaluator;
 use crate::selection::evaluation::space::Space;
 use crate::selection::parameters::Hyperparameters;
 
-/// A first descent ends where a step gains less than this in a log likelihood, the last one where it gains less than that.
+/// Least gain of a step, in log likelihood, below which a first descent ends. [`LAST_GAIN`] ends the last
+/// one.
 const LEAST_GAIN: f64 = 1e-6;
 const LAST_GAIN: f64 = 1e-8;
 
-/// Slopes of a log likelihood in logarithms up to here count as none: what is left to gain is of the order of their square.
+/// Largest slope of a log likelihood by a logarithm that counts as none. What is left to gain is of the order
+/// of its square.
 const FLAT: f64 = 1e-2;
 
-/// Slopes up to here are not followed.
+/// Largest slope that is not followed.
 const LEAST_SLOPE: f64 = 1e-6;
 
-/// Last descents, each with new curvatures, as long as one gains something.
+/// Largest number of last descents, each with new curvatures. They stop when one gains nothing.
 const ROUNDS: usize = 3;
 
-/// The difference of logarithms that curvatures are taken from.
+/// Difference of logarithms over which curvatures are measured.
 const PROBE: f64 = 0.05;
 
-/// The least curvature: a step is as long as a slope over it, and a box is not longer than a few hundred.
+/// Least curvature. A step is a slope divided by a curvature, and no side of a box is longer than a few
+/// hundred.
 const LEAST_CURVATURE: f64 = 1e-7;
 
-/// A number this near to its bound is at it.
+/// Relative distance to a bound within which a number is at the bound.
 const AT_BOUND: f64 = 1e-9;
 
-/// Where a descent ended.
+/// The end of a descent.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) logarithms: Vec<f64>,
     pub(super) hyperparameters: Hyperparameters,
     pub(super) score: f64,
-    /// In the logarithms.
+    /// Derivatives of the score by the logarithms.
     pub(super) gradient: Vec<f64>,
     pub(super) converged: bool,
 }
 
-/// Ascends the criterion from these logarithms, with so many evaluations at most; says how many there were. `None` if the matrix is not positive
-/// definite at the start.
+/// Ascends the criterion from these logarithms. Returns the end of the ascent and the number of evaluations,
+/// which `max_evaluations` limits. The end is `None` if the matrix is not positive definite at the start, or
+/// if no solver would serve the start.
 ///
 /// # Errors
-/// [`NumericsError::Cancelled`]; those of [`Hyperparameters::kernel_on`].
+/// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
 pub(super) fn descend(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
@@ -67,7 +74,7 @@ pub(super) fn descend(
     let bounds = space.bounds();
     let slopes = walk.slopes(start)?;
     let steepest = free_slopes(start, &slopes, &bounds).map(|slope| slope * slope).sum::<f64>().sqrt();
-    // The first step is as long as the slope that the optimizer sees: a factor of e.
+    // The first step is as long as the slope that the optimizer sees. With this scale it is 1, a factor of e.
     walk.scale = 1.0 / steepest.max(LEAST_SLOPE);
     let left = max_evaluations.saturating_sub(walk.evaluations);
     let walk = run(walk, start, &bounds, left, LEAST_GAIN)?;
@@ -75,10 +82,10 @@ pub(super) fn descend(
     Ok((walk.end(start)?.map(|best| found(best, &bounds)), evaluations))
 }
 
-/// Ascends what is left from where a descent ended, in units of curvatures. The evaluator is left at what is found.
+/// Ascends further from the end of a descent, in units of curvatures. Leaves the evaluator at the result.
 ///
 /// # Errors
-/// Those of [`descend`].
+/// Returns the errors of [`descend`].
 pub(super) fn finish(
     evaluator: &mut Evaluator<'_>,
     space: &Space,
@@ -89,7 +96,7 @@ pub(super) fn finish(
     let (bounds, start) = (space.bounds(), from.logarithms.clone());
     let mut walk = Walk::new(evaluator, space, observer);
     let mut merit = walk.merit(&start)?.unwrap_or(f64::NEG_INFINITY);
-    // The one at the start was counted before.
+    // The evaluation at the start was counted before.
     walk.evaluations = 0;
     for _ in 0..ROUNDS {
         let at = walk.best_logarithms(&start);
@@ -112,8 +119,9 @@ pub(super) fn finish(
     Ok((walk.end(&start)?.map_or(from, |best| found(best, &bounds)), evaluations))
 }
 
-/// The step of each logarithm to which a slope of 1 belongs at an optimum: `1/√|h|`, h from differences of slopes; not less than the slope itself,
-/// for what tends to infinity.
+/// Returns a unit for each logarithm, `1/√|h|`, in which the curvature at an optimum is 1. The curvature h
+/// comes from differences of slopes. Its magnitude is at least that of the slope, for numbers that tend to
+/// infinity.
 fn units(
     walk: &mut Walk<'_, '_>,
     at: &[f64],
@@ -123,7 +131,7 @@ fn units(
     let mut units = Vec::with_capacity(at.len());
     for (k, &(min, max)) in bounds.iter().enumerate() {
         let mut probe = at.to_vec();
-        // To the side where there is room.
+        // The probe goes to the side with more room.
         probe[k] =
             if at[k] < 0.5 * (min + max) { (at[k] + PROBE).min(max) } else { (at[k] - PROBE).max(min) };
         let step = probe[k] - at[k];
@@ -134,7 +142,7 @@ fn units(
     Ok(units)
 }
 
-/// One run of the optimizer, which leaves the best point in the walk.
+/// Runs the optimizer once. The best point stays in the walk.
 fn run<'a, 'b>(
     walk: Walk<'a, 'b>,
     from: &[f64],
@@ -153,7 +161,7 @@ fn run<'a, 'b>(
     let objective =
         |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| walk.borrow_mut().objective(x, gradient);
     let constraints: [&dyn Func<()>; 0] = [];
-    // How it ends is seen from the slopes where it does.
+    // The status is ignored. Slopes at the end show whether the optimizer converged.
     let _ = minimize(objective, &from, &bounds, &constraints, (), max_evaluations, Some(tolerances));
     let mut walk = walk.into_inner();
     match walk.error.take() {
@@ -168,13 +176,13 @@ fn found(best: Best, bounds: &[(f64, f64)]) -> Found {
     Found { logarithms, hyperparameters, score, gradient, converged }
 }
 
-/// Where a number is at a bound and would go on beyond it, there is no slope to follow: 0.
+/// Slopes that can be followed. They are 0 where a number is at a bound and would move beyond it.
 fn free_slopes<'a>(
     x: &'a [f64],
     slopes: &'a [f64],
     bounds: &'a [(f64, f64)],
 ) -> impl Iterator<Item = f64> + 'a {
-    // At both, where the bounds are equal.
+    // If the bounds are equal, the number is at both.
     x.iter().zip(slopes).zip(bounds).map(|((&x, &slope), &(min, max))| match slope {
         _ if slope > 0.0 && max - x <= near(x) => 0.0,
         _ if slope < 0.0 && x - min <= near(x) => 0.0,
@@ -182,14 +190,14 @@ fn free_slopes<'a>(
     })
 }
 
-/// A bound.
+/// The bound of its range that a number has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     Min,
     Max,
 }
 
-/// The bound that a number is at.
+/// Returns the bound that a number is at.
 pub(super) fn side(x: f64, (min, max): (f64, f64)) -> Option<Side> {
     match x {
         _ if x - min <= near(x) => Some(Side::Min),
@@ -198,7 +206,7 @@ pub(super) fn side(x: f64, (min, max): (f64, f64)) -> Option<Side> {
     }
 }
 
-/// What a number at a bound may be off it.
+/// Distance to a bound within which a number is at it.
 fn near(x: f64) -> f64 {
     AT_BOUND * (1.0 + x.abs())
 }

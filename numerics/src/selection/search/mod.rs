@@ -1,4 +1,4 @@
-//! The best of several families and starts.
+//! Search for the best hyperparameters over several families and starts.
 
 mod descent;
 mod served;
@@ -19,13 +19,14 @@ use crate::solver::trend::{Mean, Trend};
 pub use descent::Side;
 use descent::{Found, descend, finish, side};
 
-/// Evaluations of one descent, at most.
+/// Usual limit of evaluations of one descent.
 pub const MAX_EVALUATIONS: usize = 200;
 
-/// Points up to which descents run side by side, one on each thread: a factorization of so few does not keep two threads busy.
+/// Largest number of points for which descents run side by side, one on each thread. So small a factorization
+/// does not keep two threads busy.
 pub(super) const SIDE_BY_SIDE: usize = 1024;
 
-/// What is searched.
+/// A search: the data, the criterion, and the range of hyperparameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'a> {
     pub cloud: &'a Cloud,
@@ -33,47 +34,54 @@ pub struct Selection<'a> {
     pub values: &'a [f64],
     pub mean: Mean,
     pub criterion: Criterion,
-    /// Where the search begins, and what is held where it does not vary.
+    /// Start of the search. Hyperparameters that do not vary keep these values.
     pub start: &'a Hyperparameters,
-    /// What is free. Nothing: the start is evaluated.
+    /// Free parameters. If there are none, only the start is evaluated.
     pub vary: &'a [Variation],
-    /// Each is tried; none: that of the start. Laplace with the ε that it has here where that does not vary.
+    /// Families to try. If there are none, that of the start is. Laplace has the ε given here unless ε
+    /// varies.
     pub families: &'a [Family],
     /// Further starts, spread over the logarithms of the bounds.
     pub restarts: usize,
-    /// Of the further starts.
+    /// Seed of the further starts.
     pub seed: u64,
-    /// Of each descent; [`MAX_EVALUATIONS`].
+    /// Largest number of evaluations of each descent, usually [`MAX_EVALUATIONS`].
     pub max_evaluations: usize,
 }
 
-/// What is best.
+/// The best hyperparameters that a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selected {
     pub hyperparameters: Hyperparameters,
-    /// Greater is better.
+    /// Score of the criterion. Greater is better.
     pub score: f64,
-    /// Derivatives of the score in the logarithms of what is free, one for each free number: [`Parameter::LengthScales`] has one for each axis.
+    /// Derivatives of the score by the logarithms of the free numbers. [`Parameter::LengthScales`] has one
+    /// for each axis.
     pub gradient: Vec<f64>,
-    /// What each of them belongs to, with the bound that it is at, if it is at one.
+    /// Parameter of each free number, and the bound that it is at, if any.
     pub free: Vec<(Parameter, Option<Side>)>,
-    /// Evaluations of the criterion in all.
+    /// Evaluations of the criterion by all descents together.
     pub evaluations: usize,
-    /// Whether no slope is left that could be followed: below 0.01 for a factor of e, of a log likelihood.
+    /// True if all slopes that can be followed are at most 0.01 per factor of e, on the scale of a log
+    /// likelihood.
     pub converged: bool,
-    /// The mean that generalised least squares find, in coordinates of the cloud.
+    /// Mean from generalised least squares, in coordinates of the cloud.
     pub trend: Option<Trend>,
-    /// The families as they were asked for, each with its best score; `None` if its matrix was not positive definite from any start.
+    /// Families as requested, each with its best score. `None` if its matrix was not positive definite at any
+    /// start.
     pub families: Vec<(Family, Option<f64>)>,
 }
 
-/// Searches the best hyperparameters: from the start and further ones with every family, each by a descent of its own.
+/// Searches for the best hyperparameters: from the start and further starts, with every family, each in a
+/// descent of its own.
 ///
-/// The start is moved into the bounds first. What is found is the same for any number of threads but for rounding.
+/// The start is moved into the bounds first. The number of threads changes the result by rounding only.
 ///
 /// # Errors
-/// [`NumericsError::InvalidVariation`] with the entry; those of [`Hyperparameters::kernel_on`]; [`NumericsError::LengthMismatch`] of values or noise;
-/// [`NumericsError::MeanNotDetermined`], for leave-one-out also where it is not without one of the points; [`NumericsError::NotPositiveDefinite`] if the matrix is that at no start; [`NumericsError::Cancelled`].
+/// [`NumericsError::InvalidVariation`] with the entry. [`NumericsError::LengthMismatch`] of values or noise.
+/// [`NumericsError::MeanNotDetermined`], for leave-one-out also if the mean is not determined without one of
+/// the points. [`NumericsError::NotPositiveDefinite`] if the matrix is not positive definite at any start.
+/// [`NumericsError::Cancelled`], and the errors of [`Hyperparameters::kernel_on`].
 pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Selected, NumericsError> {
     let Selection { cloud, vary, start, .. } = *selection;
     let subject = Subject::of(cloud, selection.values, selection.mean)?;
@@ -87,7 +95,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     for &family in families {
         let base = Hyperparameters { family, ..start.clone() };
         let space = Space::of(&base, vary, cloud.dimension())?;
-        // What cannot be at the start is refused by name, not searched.
+        // Hyperparameters that are invalid at the start are refused with a reason, not searched.
         space.at(&space.start()).kernel_on(cloud)?;
         spaces.push(space);
     }
@@ -97,7 +105,7 @@ pub fn select(selection: &Selection<'_>, observer: &dyn Observer) -> Result<Sele
     best_of(&subject, selection, (families, &spaces), ended, observer)
 }
 
-/// Varying ε without a family that has one is a mistake.
+/// Refuses a varying ε unless one of the families has it.
 fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<(), NumericsError> {
     let has_epsilon = families.iter().any(|family| matches!(family, Family::Laplace { .. }));
     match vary.iter().position(|variation| variation.parameter == Parameter::Epsilon) {
@@ -109,7 +117,8 @@ fn check_epsilon(families: &[Family], vary: &[Variation]) -> Result<(), Numerics
     }
 }
 
-/// The start of a space and further ones: a sequence of low discrepancy (Roberts 2018) from an offset that the seed decides.
+/// Returns the start of a space and further starts: a low-discrepancy sequence (Roberts 2018) from an offset
+/// that depends on the seed.
 fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Vec<f64>)> {
     let bounds = space.bounds();
     let dimension = bounds.len();
@@ -129,7 +138,7 @@ fn starts<'a>(space: &'a Space, selection: &Selection<'_>) -> Vec<(&'a Space, Ve
     all.map(|start| (space, start)).collect()
 }
 
-/// The next number in [0, 1) (SplitMix64: Steele, Lea and Flood 2014).
+/// Returns the next number in `[0, 1)` (SplitMix64: Steele, Lea and Flood 2014).
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
@@ -138,7 +147,7 @@ fn uniform(state: &mut u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// All descents, in their order.
+/// Runs all descents. Results are in the order of the jobs.
 fn run_all(
     subject: &Subject<'_>,
     selection: &Selection<'_>,
@@ -158,7 +167,7 @@ fn run_all(
     }
 }
 
-/// The best of what the descents of every family found, in their order, brought to its end.
+/// Picks the best result of all descents and finishes it. `ended` lists the descents family by family.
 fn best_of(
     subject: &Subject<'_>,
     selection: &Selection<'_>,

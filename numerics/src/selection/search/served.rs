@@ -1,22 +1,23 @@
-//! Whether a solver serves what a search finds.
+//! Check that a solver serves what a search finds.
 
 use crate::selection::evaluation::{Evaluator, State};
 use crate::selection::parameters::Hyperparameters;
 use crate::solver::MAX_RELATIVE_RESIDUAL;
 
-/// A solver refuses variances and determinants below ε. Near there the factors of two orders of summation have
-/// estimates that differ by a factor of a few.
+/// Least reciprocal condition that passes. A solver refuses variances and determinants below ε. Near that
+/// limit, factors from two orders of summation have estimates that differ by a factor of a few.
 const LEAST_RECIPROCAL_CONDITION: f64 = 16.0 * f64::EPSILON;
 
-/// Backward errors of solves by Cholesky are a few roundings.
+/// Backward error of a solve by Cholesky: a few roundings.
 const BACKWARD_ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// Noise of so many times `√n ‖K + N‖₁` passes both tests whatever the values: `‖W‖₁ ≤ √n/α`, `‖Λ‖ ≤ ‖Y‖/α`.
+/// Multiple of `√n ‖K + N‖₁` at which noise passes both tests whatever the values, since `‖W‖₁ ≤ √n/α` and
+/// `‖Λ‖ ≤ ‖Y‖/α`.
 const SURE: f64 = 1e-10;
 
 impl Evaluator<'_> {
-    /// Whether a solver with the hyperparameters of the last score has a residual that is small enough, and
-    /// gives variances and determinants: what is selected is served when it is sent back.
+    /// Returns whether a solver with the hyperparameters of the last score has a small enough residual, and
+    /// gives variances and determinants. A client can then send selected hyperparameters back and is served.
     pub(super) fn is_served(&self, at: &Hyperparameters, state: &State) -> bool {
         let (n, norm1) = (self.n_points(), self.matrices.norm1());
         let root = (n as f64).sqrt();

@@ -1,4 +1,4 @@
-//! Searches whose answers are known.
+//! Searches with known answers.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -106,7 +106,7 @@ fn bounds_hold_and_are_named_where_they_matter() {
 
 #[test]
 fn restarts_find_the_better_of_two_modes() {
-    // All is noise, or all is structure of short range (Rasmussen and Williams 2006, fig. 5.5).
+    // Two modes: all is noise, or all is structure of short range (Rasmussen and Williams 2006, fig. 5.5).
     let points: Vec<f64> = (0..30).map(f64::from).map(|i| 0.2 * i).collect();
     let values: Vec<f64> = points.iter().map(|x| (7.0 * x).sin()).collect();
     let cloud = Cloud::new(points, 1).unwrap();
@@ -172,7 +172,7 @@ fn searches_that_make_no_sense_are_refused() {
     }
 }
 
-/// Cancelled after so many looks.
+/// An observer that cancels after a given number of checks.
 struct Impatient(AtomicUsize);
 
 impl Observer for Impatient {

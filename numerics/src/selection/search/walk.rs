@@ -1,4 +1,4 @@
-//! What an optimizer sees of a criterion.
+//! The objective that an optimizer sees.
 
 use crate::error::NumericsError;
 use crate::observer::Observer;
@@ -6,28 +6,28 @@ use crate::selection::evaluation::space::Space;
 use crate::selection::evaluation::{Evaluator, State};
 use crate::selection::parameters::Hyperparameters;
 
-/// Minus the merit, scaled, of logarithms in units of their own.
+/// The objective for slsqp: −scale · merit over log-hyperparameters divided by `units`.
 pub(super) struct Walk<'a, 'b> {
     evaluator: &'a mut Evaluator<'b>,
     space: &'a Space,
     observer: &'a dyn Observer,
     pub(super) scale: f64,
-    /// Of each logarithm.
+    /// Unit of each logarithm.
     pub(super) units: Vec<f64>,
     at: Option<Point>,
-    /// The best logarithms with their merit.
+    /// The best logarithms so far with their merit.
     pub(super) best: Option<(Vec<f64>, f64)>,
     pub(super) evaluations: usize,
-    /// What ended the work.
+    /// The error that ended the search.
     pub(super) error: Option<NumericsError>,
 }
 
-/// The last point that was looked at.
+/// The last point that was evaluated.
 struct Point {
     logarithms: Vec<f64>,
     hyperparameters: Hyperparameters,
     state: Option<State>,
-    /// Of the score.
+    /// Derivatives of the score.
     gradient: Option<Vec<f64>>,
 }
 
@@ -51,8 +51,9 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
     }
 
-    /// Minus the merit and its slopes; infinite where no solver serves the hyperparameters. After an error everything is flat, so that the
-    /// optimizer ends without any work.
+    /// Returns minus the merit, scaled, and writes its slopes. The result is infinite if no solver serves the
+    /// hyperparameters. After an error the objective is flat, so that the optimizer ends without further
+    /// work.
     pub(super) fn objective(&mut self, numbers: &[f64], gradient: Option<&mut [f64]>) -> f64 {
         let logarithms: Vec<f64> = numbers.iter().zip(&self.units).map(|(x, unit)| x * unit).collect();
         match self.evaluate(&logarithms, gradient) {
@@ -72,7 +73,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             value = merit.map_or(f64::INFINITY, |merit| -self.scale * merit);
             if gradient.is_some() && merit.is_some() {
                 slopes = self.slopes(x)?;
-                // The optimizer would go to places that are none.
+                // Slopes that are not finite would lead the optimizer to points that are not finite.
                 slopes.iter_mut().filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
             }
         }
@@ -83,7 +84,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         Ok(value)
     }
 
-    /// The merit at a point; `None` where no solver serves it.
+    /// Returns the merit at a point, or `None` if no solver serves it.
     pub(super) fn merit(&mut self, x: &[f64]) -> Result<Option<f64>, NumericsError> {
         if self.at.as_ref().is_none_or(|at| at.logarithms != x) {
             self.observer.checkpoint()?;
@@ -102,7 +103,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         Ok(Some(merit))
     }
 
-    /// The slopes of the merit at a point.
+    /// Returns the slopes of the merit at a point.
     pub(super) fn slopes(&mut self, x: &[f64]) -> Result<Vec<f64>, NumericsError> {
         self.merit(x)?;
         let (criterion, n) = (self.evaluator.criterion(), self.evaluator.n_points());
@@ -123,7 +124,8 @@ impl<'a, 'b> Walk<'a, 'b> {
         self.best.as_ref().map_or_else(|| start.to_vec(), |best| best.0.clone())
     }
 
-    /// The best point with its score and the slopes of score and merit; the evaluator is left there. `None` if there is none.
+    /// Returns the best point with its score and the slopes of score and merit, or `None` if there is none.
+    /// Leaves the evaluator there.
     pub(super) fn end(mut self, start: &[f64]) -> Result<Option<Best>, NumericsError> {
         let logarithms = self.best_logarithms(start);
         let slopes = self.slopes(&logarithms)?;
@@ -135,13 +137,13 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 }
 
-/// Where a walk ended.
+/// The best point of a walk.
 pub(super) struct Best {
     pub(super) logarithms: Vec<f64>,
     pub(super) hyperparameters: Hyperparameters,
     pub(super) score: f64,
-    /// Of the score.
+    /// Derivatives of the score.
     pub(super) gradient: Vec<f64>,
-    /// Of the merit.
+    /// Derivatives of the merit.
     pub(super) slopes: Vec<f64>,
 }

@@ -20,30 +20,31 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;
 
-/// Diagonal blocks of this size go to faer's own Cholesky; above it the recursion spends its time in matrix products.
+/// Largest diagonal block that goes to faer's own Cholesky. Above this size the recursion spends its time in
+/// matrix products.
 ///
-/// `cargo bench --bench factor`, n = 4,000: with 256 the recursion reaches 85 % of the matrix-product rate, with 512 84 %; faer's
-/// blocked factorization of the whole reaches 75–78 %.
+/// Measured by `cargo bench --bench factor` at n = 4,000: the recursion reaches 85 % of the matrix-product
+/// rate with 256, and 84 % with 512. faer's blocked factorization of the whole reaches 75–78 %.
 const LEAF_SIZE: usize = 256;
 
-/// Flops of a product of matrices between two looks at the observer: half a second of two cores.
+/// Flops of a matrix product between two checks for cancellation: half a second on two cores.
 const FLOPS_PER_CHECKPOINT: f64 = 3e10;
 
-/// Rows or columns of such a product at least: with fewer it is slower.
+/// Least number of rows or columns of such a product. With fewer it is slower.
 const LEAST_PIECE: usize = 128;
 
-/// `K + αI` first, and its factor L after [`Cholesky::factorize`].
+/// The matrix `K + αI`, and after [`Cholesky::factorize`] its factor L.
 pub(super) struct Cholesky {
     packed: Packed,
 }
 
 impl Cholesky {
-    /// Numbers that n points take; `None` beyond what can be counted.
+    /// Returns how many numbers n points take. `None` if the count overflows.
     pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
         Packed::n_numbers(n)
     }
 
-    /// Assembles `K + αI`, still to be factorized.
+    /// Assembles `K + αI` without factorizing it.
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`], [`NumericsError::Cancelled`].
@@ -57,7 +58,7 @@ impl Cholesky {
         Ok(Self { packed: Packed::gram(spare, cloud, kernel, regularization, observer)? })
     }
 
-    /// Memory for the factor of n points, still to be filled with it.
+    /// Allocates memory for the factor of n points, to be filled with it.
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
@@ -65,7 +66,7 @@ impl Cholesky {
         Ok(Self { packed: Packed::blank(spare, n)? })
     }
 
-    /// All numbers as they lie in memory.
+    /// Returns all numbers in the order of memory.
     pub(super) fn numbers(&self) -> &[f64] {
         self.packed.numbers()
     }
@@ -82,12 +83,13 @@ impl Cholesky {
         self.packed.n_bytes()
     }
 
-    /// `‖A‖₁`, before A is factorized.
+    /// Returns `‖A‖₁` of A before it is factorized.
     pub(super) fn norm1(&self) -> f64 {
         self.packed.norm1()
     }
 
-    /// `A = LLᵀ` in place. The inner error is the index of the first point whose pivot is not above `floor`.
+    /// Factorizes `A = LLᵀ` in place. The inner error is the index of the first point whose pivot is not
+    /// above `floor`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -99,7 +101,7 @@ impl Cholesky {
         match factorize_packed(&mut self.packed, floor, observer) {
             Ok(()) => Ok(Ok(self)),
             Err(Stop::NotPositive(point)) => {
-                // What comes next needs more memory than this has.
+                // The fallback needs more memory than this buffer has.
                 self.packed.discard();
                 Ok(Err(point))
             }
@@ -130,7 +132,7 @@ impl Cholesky {
         self.whiten_with(rhs, par);
     }
 
-    /// The same with this parallelism.
+    /// Computes `rhs ← L⁻¹ rhs` with a given parallelism.
     pub(super) fn whiten_with(&self, rhs: MatMut<'_, f64>, par: Par) {
         let (l11, l21, l22) = self.parts();
         let (mut first, mut second) = rhs.split_at_row_mut(l11.nrows());
@@ -144,7 +146,7 @@ impl Cholesky {
         self.packed.diagonal().map(|pivot| 2.0 * pivot.ln()).sum()
     }
 
-    /// `L = [L₁₁ 0; L₂₁ L₂₂]`; what lies above the diagonals is not zero.
+    /// Returns L₁₁, L₂₁ and L₂₂ of `L = [L₁₁ 0; L₂₁ L₂₂]`. Entries above the diagonals are not zero.
     fn parts(&self) -> (MatRef<'_, f64>, MatRef<'_, f64>, MatRef<'_, f64>) {
         let first = self.packed.first();
         let (l11, l21) = first.split_at_row(first.ncols());
@@ -156,7 +158,7 @@ impl Cholesky {
     }
 }
 
-/// The column of a matrix that has one.
+/// Returns the column of a matrix that has only one.
 fn only_column(rhs: MatMut<'_, f64>) -> Option<&mut [f64]> {
     if rhs.ncols() != 1 {
         return None;
@@ -169,7 +171,8 @@ enum Stop {
     Cancelled(NumericsError),
 }
 
-/// Factorizes the first triangle, solves for the square below it, updates the second triangle, and factorizes that.
+/// Factorizes the first triangle, solves for the square below it, updates the second triangle, and factorizes
+/// that.
 fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Result<(), Stop> {
     let mut leaf = Leaf::new(a.n_points());
     let mut parts = a.parts_mut();
@@ -182,8 +185,8 @@ fn factorize_packed(a: &mut Packed, floor: f64, observer: &dyn Observer) -> Resu
     recurse(parts.second(), n_first, floor, &mut leaf, observer)
 }
 
-/// Overwrites the lower triangle of A by that of L, `A = LLᵀ`, whatever lies above the diagonal. The inner error is the first
-/// index whose pivot `L_ii²` is not above `floor`.
+/// Overwrites the lower triangle of A with that of L, `A = LLᵀ`. Entries above the diagonal do not matter.
+/// The inner error is the first index whose pivot `L_ii²` is not above `floor`.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -200,10 +203,11 @@ pub(crate) fn factorize_in_place(
     }
 }
 
-/// Factorizes the leading half, solves for the block below it, updates the trailing half, and goes on there.
+/// Factorizes the leading half, solves for the block below it, updates the trailing half, and continues
+/// there.
 ///
-/// Recursive Cholesky (Gustavson 1997): every level works on matrices as large as they can be, so almost all flops are in
-/// matrix products. `first` is the index of the first point of this block.
+/// This is recursive Cholesky (Gustavson 1997). Every level works on matrices that are as large as possible,
+/// so almost all flops are in matrix products. `first` is the index of the first point of this block.
 fn recurse(
     mut a: MatMut<'_, f64>,
     first: usize,
@@ -236,7 +240,8 @@ fn solve_below(l: MatRef<'_, f64>, mut below: MatMut<'_, f64>, observer: &dyn Ob
     Ok(())
 }
 
-/// The first index and the length of parts of n, each of [`FLOPS_PER_CHECKPOINT`] at most or as short as matrix products are fast.
+/// Splits n rows or columns into parts of at most [`FLOPS_PER_CHECKPOINT`], but not below [`LEAST_PIECE`].
+/// Yields the first index and the length of each.
 pub(super) fn pieces(n: usize, flops_each: f64) -> impl Iterator<Item = (usize, usize)> {
     let most = ((FLOPS_PER_CHECKPOINT / flops_each) as usize).max(LEAST_PIECE);
     let length = n.div_ceil(n.div_ceil(most).max(1)).max(1);
@@ -271,8 +276,8 @@ fn update(
     Ok(())
 }
 
-/// Factorizes small diagonal blocks in a buffer of their own: column-major whichever way the block lies, and what shares the
-/// block's columns above its diagonal stays as it is.
+/// A buffer in which small diagonal blocks are factorized. It is column-major, whichever way the block lies.
+/// Entries above the diagonal of the block, which may belong to other data, stay as they are.
 struct Leaf {
     block: Mat<f64>,
     scratch: MemBuffer,
@@ -286,7 +291,7 @@ impl Leaf {
         Self { block: Mat::zeros(size, size), scratch: MemBuffer::new(requirement) }
     }
 
-    /// The inner error is the first index whose pivot is not above `floor`.
+    /// Factorizes a block. The error is the first index whose pivot is not above `floor`.
     fn factorize(&mut self, mut a: MatMut<'_, f64>, floor: f64) -> Result<(), usize> {
         let n = a.nrows();
         let mut block = self.block.as_mut().submatrix_mut(0, 0, n, n);

@@ -1,4 +1,4 @@
-//! A Cholesky factorization as numbers: taken out of one process and put into another.
+//! A Cholesky factorization as plain numbers, which one process takes out and another one restores.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use crate::error::NumericsError;
 use crate::machine::pages::SpareBuffer;
 use crate::solver::system::System;
 
-/// What a factorization is beside its system.
+/// Parts of a factorization besides its system.
 #[derive(Clone, Copy)]
 pub struct Factor<'a> {
-    /// L as it lies in memory, see packed.rs.
+    /// L in its memory layout (packed.rs).
     pub numbers: &'a [f64],
     /// `(K + αI)⁻¹·1`, `[n]`.
     pub weights_of_one: &'a [f64],
@@ -20,14 +20,14 @@ pub struct Factor<'a> {
     pub reciprocal_condition: f64,
 }
 
-/// A factor that is being put together, in its order.
+/// A builder that receives the numbers of a factor in their order.
 pub struct FactorBuilder {
     factor: Cholesky,
     n_filled: usize,
 }
 
 impl FactorBuilder {
-    /// Memory for the factor of n points.
+    /// Allocates memory for the factor of n points.
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
@@ -35,19 +35,19 @@ impl FactorBuilder {
         Ok(Self { factor: Cholesky::blank(spare, n_points)?, n_filled: 0 })
     }
 
-    /// Numbers that are missing.
+    /// Returns how many numbers are missing.
     pub fn n_missing(&self) -> usize {
         self.factor.numbers().len() - self.n_filled
     }
 
-    /// Takes the next numbers. What is beyond the last one is not taken.
+    /// Takes the next numbers. Numbers beyond the last one are ignored.
     pub fn push(&mut self, numbers: impl Iterator<Item = f64>) {
         let rest = &mut self.factor.numbers_mut()[self.n_filled..];
         self.n_filled += rest.iter_mut().zip(numbers).map(|(to, from)| *to = from).count();
     }
 
-    /// The solver of a system, as it was; nothing unless all numbers are there and as many as the system has. That they are those of the
-    /// system is for the caller to know.
+    /// Restores the factorization of a system. `None` unless all numbers are there and their count fits the
+    /// system. The caller must ensure that the numbers are those of the system.
     pub(in crate::solver) fn finish(
         self,
         system: System,
@@ -63,7 +63,7 @@ impl FactorBuilder {
 }
 
 impl Dense {
-    /// The factor, where there is one.
+    /// Returns the factor. `None` for the fallback.
     pub(in crate::solver) fn factor(&self) -> Option<Factor<'_>> {
         match &self.factorization {
             Factorization::Cholesky(factor) => Some(Factor {

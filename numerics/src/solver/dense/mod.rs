@@ -1,4 +1,5 @@
-//! The factorization of the whole matrix: Cholesky, and where that fails least squares on the pivots of a rank-revealing one.
+//! Factorization of the whole matrix: Cholesky, and where that fails, least squares on the pivots of a
+//! rank-revealing factorization.
 
 mod cholesky;
 mod factor;
@@ -25,35 +26,40 @@ use cholesky::{Cholesky, pieces};
 pub use factor::{Factor, FactorBuilder};
 use pivoted_cholesky::PivotedCholesky;
 
-/// How `K + αI` was factorized.
+/// Method by which `K + αI` was factorized.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// `K + αI = LLᵀ`, in place.
     Cholesky,
-    /// Rank-revealing pivoted Cholesky and least squares on the pivots, where Cholesky fails in float64.
+    /// Rank-revealing pivoted Cholesky and least squares on the pivots, for matrices on which Cholesky fails
+    /// in float64.
     PivotedCholesky,
 }
 
-/// Where a factorization has its memory from.
+/// Source of the memory of a factorization.
 pub struct Workspace<'a> {
-    /// The memory of an earlier factorization, if one was given back; this one's is when it is dropped.
+    /// Memory of an earlier factorization, if one was given back. The new factorization gives its own back
+    /// when it is dropped.
     pub spare: &'a Arc<SpareBuffer>,
-    /// Asked before the factorization takes more than half of the matrix, with the bytes that it then takes in all.
+    /// Permission to take more than half of the matrix. The argument is the number of bytes that the
+    /// factorization then takes in all.
     pub may_take: &'a mut dyn FnMut(usize) -> bool,
 }
 
-/// A pivot of Cholesky up to this multiple of k₀ is rounding: it came out positive by luck, and the weights behind it are
-/// noise that the residual hardly shows. Below `minimum_alpha`, which is at least 16 ε k₀ and enters a pivot twice where two
-/// points coincide.
+/// Multiple of k₀ up to which a Cholesky pivot counts as rounding. Such a pivot is positive by luck, and the
+/// weights behind it are noise that the residual hardly shows.
+///
+/// The limit is below `minimum_alpha`, which is at least 16 ε k₀ and enters a pivot twice where two points
+/// coincide.
 const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
-/// A factorization of `K(X, X) + αI` with the system that it was made from, so that it cannot be used with others.
+/// A factorization of `K(X, X) + αI`, kept with its system so that it cannot be used with another one.
 pub struct Dense {
     system: System,
     factorization: Factorization,
     norm1: f64,
     reciprocal_condition: f64,
-    /// The weights of the constant 1, `[n]`.
+    /// Weights of the constant 1, `[n]`.
     weights_of_one: Vec<f64>,
 }
 
@@ -63,23 +69,24 @@ enum Factorization {
 }
 
 impl Dense {
-    /// Numbers of the matrix at its peak, checked: half of it.
+    /// Returns how many numbers Cholesky needs at its peak: half of the matrix. `None` if that overflows.
     pub(super) fn n_numbers_needed(n_points: usize) -> Option<usize> {
         Cholesky::n_numbers_needed(n_points)
     }
 
-    /// Numbers at most, checked: all of the matrix for the fallback, where the rank is more than n/4, when Cholesky has failed
-    /// and given its own back.
+    /// Returns how many numbers are needed at most. The fallback needs all of the matrix if its rank is above
+    /// n/4. By then Cholesky has failed and given its own back. `None` if the count overflows.
     pub(super) fn n_numbers_needed_at_most(n_points: usize) -> Option<usize> {
         Some(PivotedCholesky::n_numbers_needed(n_points)?.max(Self::n_numbers_needed(n_points)?))
     }
 
     /// Assembles and factorizes `K(X, X) + αI` exactly as given: no jitter is ever added.
     ///
-    /// Cholesky in place; where a pivot is rounding, pivoted Cholesky to 64 ε k₀ and least squares on the pivots.
+    /// Cholesky works in place. If a pivot is rounding, the fallback is pivoted Cholesky to 64 ε k₀ and least
+    /// squares on the pivots.
     ///
     /// # Errors
-    /// [`NumericsError::OutOfMemory`], also if it needs more than it may take; [`NumericsError::Cancelled`].
+    /// [`NumericsError::OutOfMemory`], also if it needs more than it may take. [`NumericsError::Cancelled`].
     pub(super) fn factorize(
         workspace: Workspace<'_>,
         system: System,
@@ -123,7 +130,7 @@ impl Dense {
         }
     }
 
-    /// Numerical rank: n for Cholesky, the number of pivots for the fallback.
+    /// Returns the numerical rank: n for Cholesky, the number of pivots for the fallback.
     pub(super) fn rank(&self) -> usize {
         match &self.factorization {
             Factorization::Cholesky(_) => self.system.n_points(),
@@ -131,12 +138,13 @@ impl Dense {
         }
     }
 
-    /// `1/(‖K + αI‖₁ ‖W‖₁)` where W maps values to weights, estimated from the factor (Higham 2002, alg. 15.1).
+    /// Returns `1/(‖K + αI‖₁ ‖W‖₁)`, where W maps values to weights. It is estimated from the factor (Higham
+    /// 2002, alg. 15.1).
     pub(super) fn reciprocal_condition(&self) -> f64 {
         self.reciprocal_condition
     }
 
-    /// `W·1`, `[n]`: where the estimate of the condition begins.
+    /// Returns `W·1`, `[n]`, with which the estimate of the condition begins.
     pub(super) fn weights_of_one(&self) -> &[f64] {
         &self.weights_of_one
     }
@@ -146,7 +154,7 @@ impl Dense {
         self.norm1
     }
 
-    /// The points with weights, and which of X they are where they are not all.
+    /// Returns the points with weights, and their indices in X if these are not all points.
     pub(super) fn centres(&self) -> (&Cloud, Option<&[usize]>) {
         match &self.factorization {
             Factorization::Cholesky(_) => (self.system.cloud(), None),
@@ -165,18 +173,18 @@ impl Dense {
         factor + vec_bytes(&self.weights_of_one) + self.system.n_bytes()
     }
 
-    /// Overwrites the columns of `[n, k]` values by weights, `Λ = W Y` with `W = (K + αI)⁻¹` (its least-squares
-    /// substitute for the fallback).
+    /// Overwrites the columns of `[n, k]` values with weights, `Λ = W Y`. W is `(K + αI)⁻¹`, or its
+    /// least-squares substitute for the fallback.
     pub(super) fn solve_in_place(&self, values: MatMut<'_, f64>) {
         self.factorization.solve_in_place(values);
     }
 
-    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them.
+    /// Overwrites the columns of `[n, k]` with `Wᵀ` times them.
     pub(super) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
         self.factorization.solve_transposed_in_place(functionals);
     }
 
-    /// Overwrites the columns of `[n, k]` by `L⁻¹` times them.
+    /// Overwrites the columns of `[n, k]` with `L⁻¹` times them.
     ///
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor; [`NumericsError::Cancelled`].
@@ -193,14 +201,15 @@ impl Dense {
         Ok(())
     }
 
-    /// The diagonal of `(K + αI)⁻¹`, `Σ_k (L⁻¹)_ki²`: n³ flops and another n² numbers.
+    /// Computes the diagonal of `(K + αI)⁻¹`, `Σ_k (L⁻¹)_ki²`, in n³ flops and another n² numbers.
     ///
     /// # Errors
     /// [`NumericsError::NotPositiveDefinite`] if there is no Cholesky factor.
     pub(super) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
         let n = self.system.n_points();
         let mut inverse = Mat::<f64>::identity(n, n);
-        // On one thread: who asks for it is one of many tasks, and a thread that waits would take up another that asks as well.
+        // On one thread: the caller is one of many tasks, and a thread that waits would begin another task of
+        // that kind.
         self.cholesky()?.whiten_with(inverse.as_mut(), Par::Seq);
         Ok((0..n).map(|i| inverse.col(i).squared_norm_l2()).collect())
     }
@@ -213,8 +222,9 @@ impl Dense {
         Ok(self.cholesky()?.log_determinant())
     }
 
-    /// The Cholesky factor, unless the matrix is singular to rounding: such a factor exists by luck, still solves smooth
-    /// right-hand sides, but variances and determinants from it are off by tens of percent.
+    /// Returns the Cholesky factor, unless the matrix is singular to rounding. A factor of such a matrix
+    /// exists by luck. It still solves smooth right-hand sides, but its variances and determinants are off by
+    /// tens of percent.
     fn cholesky(&self) -> Result<&Cholesky, NumericsError> {
         match &self.factorization {
             Factorization::Cholesky(_) if self.reciprocal_condition < f64::EPSILON => {
@@ -228,8 +238,9 @@ impl Dense {
         }
     }
 
-    /// The refusal with its remedy: an α for which Cholesky is sure to succeed in float64, `4 n ε ‖K‖₁`, and, where the
-    /// residual was too large, one for which `ε ‖K‖₁ ‖Λ‖ ≤ ε ‖K‖₁ ‖Y‖/α` is small enough for any values.
+    /// Returns the refusal with its remedy, an α for which Cholesky is sure to succeed in float64:
+    /// `4 n ε ‖K‖₁`. If the residual was too large, α is also large enough that `ε ‖K‖₁ ‖Λ‖ ≤ ε ‖K‖₁ ‖Y‖/α`
+    /// is small for any values.
     pub(super) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
         let multiple = match reason {
             NotDefinite::Residual { .. } => (self.system.n_points() as f64).max(1.0 / MAX_RELATIVE_RESIDUAL),

@@ -1,14 +1,16 @@
-//! One triangle of a symmetric matrix in half the memory of the whole: rectangular full packed storage.
+//! Rectangular full packed storage: one triangle of a symmetric matrix in half the memory of the whole.
 //!
-//! The lower triangle of an `[n, n]` matrix splits into two triangles and a square. The second triangle, transposed, fits above the
-//! first one, and what comes out is a rectangle of h = ⌈n/2⌉ columns (Gustavson, Waśniewski, Dongarra and Langou 2010, "Rectangular
-//! full packed format for Cholesky's algorithm"), here with a cache line between the two:
+//! The lower triangle of an `[n, n]` matrix splits into two triangles and a square. The second triangle,
+//! transposed, fits above the first one. Together they form a rectangle of h = ⌈n/2⌉ columns (Gustavson,
+//! Waśniewski, Dongarra and Langou 2010, "Rectangular full packed format for Cholesky's algorithm"). Here a
+//! cache line separates the two triangles:
 //!
 //! ```text
 //! column c:  A[h..=h+c, h+c], rest of n₂ = n − h rows │ … │ A[c..n, c] from position c + GAP on
 //! ```
 //!
-//! Unlike a packed triangle it has columns at one distance, so matrix products work on its parts at full speed.
+//! Unlike in a packed triangle, all columns are at the same distance, so matrix products on the parts run at
+//! full speed.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -25,14 +27,14 @@ use crate::sums::gram::fill_kernel_column;
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
-/// Numbers by which the first triangle lies lower than it would in a full matrix: a cache line, so that columns of both
-/// triangles begin at one.
+/// Numbers by which the first triangle is lower than in a full matrix. They fill a cache line, so that
+/// columns of both triangles begin on a cache line.
 const GAP: usize = 8;
 
-/// Columns per task of the assembly: all of them are equally long.
+/// Columns per task of the assembly. All columns are equally long.
 const COLUMNS_PER_TASK: usize = 8;
 
-/// Parts of the matrix whose column sums are made side by side, n numbers each.
+/// Parts of the matrix whose column sums are computed side by side, n numbers each.
 const NORM_TASKS: usize = 32;
 
 /// A symmetric matrix A, or the lower triangle L of its factor, in rectangular full packed storage.
@@ -41,7 +43,7 @@ pub(super) struct Packed {
     n: usize,
 }
 
-/// Columns of one of the parts: entry `[i, j]` is `numbers[j·stride + i]`.
+/// Columns of one of the parts. Entry `[i, j]` is `numbers[j·stride + i]`.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<'a> {
     numbers: &'a [f64],
@@ -53,35 +55,36 @@ impl<'a> Columns<'a> {
         Self { numbers, stride }
     }
 
-    /// Some rows of a column.
+    /// Returns some rows of a column.
     #[inline(always)]
     pub(super) fn column(self, j: usize, rows: Range<usize>) -> &'a [f64] {
         &self.numbers[j * self.stride..][rows]
     }
 }
 
-/// A run of entries in one column: A[point, point] at its end or beginning, and the others of a contiguous range of points.
+/// A run of entries in one column: those of one point with a contiguous range of points. The diagonal entry
+/// `A[point, point]` is the last or the first of them.
 struct Run {
     point: usize,
     points: Range<usize>,
-    /// Where in the packed column.
+    /// Position of the run in the packed column.
     at: usize,
 }
 
 impl Packed {
-    /// Columns of the rectangle, and points of the first triangle.
+    /// Returns the number of columns of the rectangle, which is the number of points of the first triangle.
     pub(super) fn n_columns(n: usize) -> usize {
         n.div_ceil(2)
     }
 
-    /// Distance between columns: full cache lines, and not a multiple of 4 KiB, where all columns would compete for the
-    /// same cache sets.
+    /// Returns the distance between columns: full cache lines, and not a multiple of 4 KiB. At such a
+    /// multiple, all columns would compete for the same cache sets.
     fn stride_for(n: usize) -> usize {
         let stride = (n + GAP).next_multiple_of(8);
         if stride.is_multiple_of(512) { stride + 8 } else { stride }
     }
 
-    /// Numbers of the rectangle of n points; `None` beyond what can be counted.
+    /// Returns how many numbers the rectangle of n points has. `None` if the count overflows.
     pub(super) fn n_numbers(n: usize) -> Option<usize> {
         Self::stride_for(n).checked_mul(Self::n_columns(n))
     }
@@ -106,7 +109,7 @@ impl Packed {
                 for (k, column) in columns.chunks_exact_mut(stride).enumerate() {
                     let mut end = 0;
                     for run in runs(n, task * COLUMNS_PER_TASK + k) {
-                        // What an earlier user left between the runs goes nowhere.
+                        // Clears what an earlier user of the memory left between the runs.
                         column[end..run.at].fill(0.0);
                         end = run.at + run.points.len();
                         let entries = &mut column[run.at..run.at + run.points.len()];
@@ -127,7 +130,7 @@ impl Packed {
         Ok(this)
     }
 
-    /// Memory for n points, with whatever is in it.
+    /// Allocates memory for n points, with arbitrary contents.
     ///
     /// # Errors
     /// [`NumericsError::OutOfMemory`].
@@ -136,7 +139,7 @@ impl Packed {
         Ok(Self { buffer: spare.take(n_numbers)?, n })
     }
 
-    /// The rectangle, column by column, with what lies between its parts.
+    /// Returns the rectangle, column by column, including the gaps between its parts.
     pub(super) fn numbers(&self) -> &[f64] {
         &self.buffer
     }
@@ -162,30 +165,31 @@ impl Packed {
         self.buffer.discard();
     }
 
-    /// The first triangle with the square below it, `[n, h]`: what lies above the diagonal is not part of it.
+    /// Returns the first triangle with the square below it, `[n, h]`. Entries above the diagonal do not
+    /// belong to it.
     pub(super) fn first(&self) -> MatRef<'_, f64> {
         let (numbers, stride) = (&self.buffer[GAP..], self.stride());
         MatRef::from_column_major_slice_with_stride(numbers, self.n, Self::n_columns(self.n), stride)
     }
 
-    /// The second triangle, `[n₂, n₂]`, transposed: upper.
+    /// Returns the second triangle, `[n₂, n₂]`, transposed to an upper one.
     pub(super) fn second_transposed(&self) -> MatRef<'_, f64> {
         let n_second = self.n - Self::n_columns(self.n);
         MatRef::from_column_major_slice_with_stride(&self.buffer, n_second, n_second, self.stride())
     }
 
-    /// The columns of [`Packed::first`].
+    /// Returns the columns of [`Packed::first`].
     pub(super) fn columns_of_first(&self) -> Columns<'_> {
         Columns::new(&self.buffer[GAP..], self.stride())
     }
 
-    /// The columns of [`Packed::second_transposed`].
+    /// Returns the columns of [`Packed::second_transposed`].
     pub(super) fn columns_of_second(&self) -> Columns<'_> {
         Columns::new(&self.buffer, self.stride())
     }
 
-    /// `(first triangle, square below it, second triangle)`, one view at a time: the triangles share their columns, and whoever
-    /// writes to one keeps to its side of the diagonal.
+    /// Returns writable views of the first triangle, the square below it, and the second triangle, one at a
+    /// time. The triangles share their columns, so a writer must keep to its side of the diagonal.
     pub(super) fn parts_mut(&mut self) -> Parts<'_> {
         let (n, stride) = (self.n, self.stride());
         let n_columns = Self::n_columns(n);
@@ -195,14 +199,15 @@ impl Packed {
         Parts { triangles, square }
     }
 
-    /// The diagonal in the order of the points.
+    /// Yields the diagonal in the order of the points.
     pub(super) fn diagonal(&self) -> impl Iterator<Item = f64> {
         let (first, second) = (self.first(), self.second_transposed());
         let of_second = (0..second.nrows()).map(move |j| second[(j, j)]);
         (0..first.ncols()).map(move |j| first[(j, j)]).chain(of_second)
     }
 
-    /// `‖A‖₁` of the symmetric matrix, summed in the same order whatever the number of threads.
+    /// Returns `‖A‖₁` of the symmetric matrix. The order of summation does not depend on the number of
+    /// threads.
     pub(super) fn norm1(&self) -> f64 {
         let (n, stride) = (self.n, self.stride());
         let n_columns = Self::n_columns(n).div_ceil(NORM_TASKS);
@@ -228,12 +233,13 @@ fn add_absolute_values(sums: &mut [f64], runs: impl Iterator<Item = Run>, column
             *sum += entry.abs();
             total += entry.abs();
         }
-        // The diagonal entry is in both.
+        // The loop has added the diagonal entry already.
         sums[run.point] += total - entries[run.point - run.points.start].abs();
     }
 }
 
-/// What a column of the rectangle holds: of the second triangle, and of the first with the square.
+/// Yields the runs of a column of the rectangle: that of the second triangle, if any, then that of the first
+/// one with the square.
 fn runs(n: usize, c: usize) -> impl Iterator<Item = Run> {
     let h = Packed::n_columns(n);
     let second = (h + c < n).then(|| Run { point: h + c, points: h..h + c + 1, at: 0 });
@@ -241,32 +247,32 @@ fn runs(n: usize, c: usize) -> impl Iterator<Item = Run> {
     second.into_iter().chain([first])
 }
 
-/// Views of the parts of a [`Packed`] matrix to write to.
+/// Writable views of the parts of a [`Packed`] matrix.
 pub(super) struct Parts<'a> {
     triangles: MatMut<'a, f64>,
     pub square: MatMut<'a, f64>,
 }
 
 impl Parts<'_> {
-    /// The first triangle, lower; above its diagonal are numbers of the second.
+    /// Returns the first triangle, lower. Above its diagonal are numbers of the second one.
     pub(super) fn first(&mut self) -> MatMut<'_, f64> {
         let h = self.triangles.ncols();
         self.triangles.as_mut().submatrix_mut(GAP, 0, h, h)
     }
 
-    /// The second triangle, lower; above its diagonal are numbers of the first.
+    /// Returns the second triangle, lower. Above its diagonal are numbers of the first one.
     pub(super) fn second(&mut self) -> MatMut<'_, f64> {
         let n_second = self.square.nrows();
         self.triangles.as_mut().submatrix_mut(0, 0, n_second, n_second).transpose_mut()
     }
 
-    /// The first triangle with the square below it, and the second one with the square.
+    /// Returns the first triangle, lower, to read, and the square to write.
     pub(super) fn first_and_square(&mut self) -> (MatRef<'_, f64>, MatMut<'_, f64>) {
         let h = self.triangles.ncols();
         (self.triangles.as_ref().submatrix(GAP, 0, h, h), self.square.as_mut())
     }
 
-    /// The second triangle, lower, to write to, and the square.
+    /// Returns the second triangle, lower, to write, and the square to read.
     pub(super) fn second_and_square(&mut self) -> (MatMut<'_, f64>, MatRef<'_, f64>) {
         let n_second = self.square.nrows();
         let second = self.triangles.as_mut().submatrix_mut(0, 0, n_second, n_second).transpose_mut();

@@ -1,10 +1,11 @@
-//! The fallback where `K + D` is not positive definite in float64: least squares on the pivots of a rank-revealing Cholesky
-//! factorization.
+//! Fallback where `K + D` is not positive definite in float64: least squares on the pivots of a
+//! rank-revealing Cholesky factorization.
 //!
-//! WHY NOT QR of L: it needs Q or its reflections beside L₁₁, twice the memory of the Cholesky factor where the rank is nearly
-//! n. In the values g that u takes at the pivots the same problem is well conditioned: its matrix is the identity above
-//! `M = L₂₁L₁₁⁻¹`, whose entries pivoting bounds, so normal equations lose nothing. M is solved for row by row, which leaves
-//! `ML₁₁ = L₂₁` to rounding: an error in L, the same that QR makes.
+//! WHY NOT QR of L: it needs Q or its reflections besides L₁₁. That is twice the memory of the Cholesky
+//! factor where the rank is nearly n. In the values g that u takes at the pivots, the same problem is well
+//! conditioned. Its matrix is the identity above `M = L₂₁L₁₁⁻¹`. Pivoting bounds the entries of M, so normal
+//! equations lose nothing. M is solved for row by row, which leaves `ML₁₁ = L₂₁` to rounding. This is an
+//! error in L, the same that QR makes.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -20,34 +21,36 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::regularization::Regularization;
 
-/// Rows or columns between two looks at the observer.
+/// Rows or columns between two checks for cancellation.
 const ROWS_PER_CHECKPOINT: usize = 512;
 
-/// `P(K + D)Pᵀ ≈ LLᵀ` with r columns, and the map from values to weights on the r pivots Z.
+/// Pivoted factorization `P(K + D)Pᵀ ≈ LLᵀ` with r columns, and the map from values to weights on the r
+/// pivots Z.
 ///
-/// `u = Σ_j b_j k(·, z_j)` with `min |(K + D)(X, Z) b − Y|²`. In the values g = L₁₁L₁₁ᵀb this is
-/// `min |g − Y_Z|² + |Mg − Y₂|²`, Y₂ the values at the other points, and so
-/// `g = Y_Z + C(Y₂ − MY_Z)`, `C = (I + MᵀM)⁻¹Mᵀ = Mᵀ(I + MMᵀ)⁻¹`, whichever is smaller: a correction of what the pivots
-/// alone say.
+/// The solution is `u = Σ_j b_j k(·, z_j)` with `min |(K + D)(X, Z) b − Y|²`. In the values g = L₁₁L₁₁ᵀb this
+/// is `min |g − Y_Z|² + |Mg − Y₂|²`, with Y₂ the values at the other points. Hence `g = Y_Z + C(Y₂ − MY_Z)`,
+/// a correction of what the pivots alone say. `C = (I + MᵀM)⁻¹Mᵀ = Mᵀ(I + MMᵀ)⁻¹`, and the smaller of the two
+/// matrices is used.
 pub(super) struct PivotedCholesky {
-    /// The point of each row, pivots first.
+    /// Point of each row, pivots first.
     order: Vec<usize>,
     rank: usize,
-    /// L₁₁ above M, `[n, r]`, column by column; then the Cholesky factor of `I + MᵀM` or `I + MMᵀ`.
+    /// L₁₁ above M, `[n, r]`, column by column. After it the Cholesky factor of `I + MᵀM` or `I + MMᵀ`.
     buffer: Vec<f64>,
 }
 
 impl PivotedCholesky {
-    /// Numbers for any rank, checked; O(n) per thread come beside them.
+    /// Returns how many numbers any rank needs. `None` if the count overflows. Each thread needs O(n) more.
     pub(super) fn n_numbers_needed(n: usize) -> Option<usize> {
         n.checked_mul(n)
     }
 
-    /// Factorizes within half of [`Self::n_numbers_needed`], or within all of it if `may_take_all` says so when it is asked.
+    /// Factorizes within half of [`Self::n_numbers_needed`], or within all of it. `may_take_all` is asked
+    /// before more than half is taken.
     ///
     /// # Errors
-    /// [`NumericsError::WeightsOverflow`] beyond the range of float64, [`NumericsError::OutOfMemory`] if it may not take all
-    /// and needs it, [`NumericsError::Cancelled`].
+    /// [`NumericsError::WeightsOverflow`] beyond the range of float64. [`NumericsError::OutOfMemory`] if it
+    /// needs all and may not take it. [`NumericsError::Cancelled`].
     pub(super) fn factorize(
         cloud: &Cloud,
         kernel: &Kernel,
@@ -61,8 +64,8 @@ impl PivotedCholesky {
             let pivots = Pivoting::new(cloud, kernel, regularization, &mut buffer).run(max_rank, observer)?;
             Ok((buffer, pivots))
         };
-        // Smooth kernels have small ranks, and a buffer for them is small enough to be cut to size by copying. A rough kernel
-        // begins again, after 5 n³/96 of its n³/3 flops.
+        // Smooth kernels have small ranks, and their buffer is small enough to be cut to size by copying. A
+        // rough kernel begins again, after 5 n³/96 of its n³/3 flops.
         let (mut buffer, mut pivots) = attempt(n / 4)?;
         if pivots.is_complete {
             buffer.truncate(n_numbers(n, pivots.rank));
@@ -109,7 +112,7 @@ impl PivotedCholesky {
         factorize_in_place(inner, 0.0, observer)?.map_err(|_| NumericsError::WeightsOverflow)
     }
 
-    /// The points on which weights stand, `[r]`.
+    /// Returns the points that have weights, `[r]`.
     pub(super) fn pivots(&self) -> &[usize] {
         &self.order[..self.rank]
     }
@@ -118,7 +121,8 @@ impl PivotedCholesky {
         vec_bytes(&self.buffer) + vec_bytes(&self.order)
     }
 
-    /// `Λ_Z = (L₁₁L₁₁ᵀ)⁻¹ (Y_Z + C(Y₂ − MY_Z))`, zero elsewhere, column by column, in place.
+    /// Overwrites values with weights, column by column: `Λ_Z = (L₁₁L₁₁ᵀ)⁻¹ (Y_Z + C(Y₂ − MY_Z))`, zero
+    /// elsewhere.
     pub(super) fn solve_in_place(&self, mut values: MatMut<'_, f64>) {
         let (mut at_pivots, mut elsewhere) = self.split_rows(values.as_ref());
         let par = self.parallelism(values.ncols());
@@ -130,7 +134,8 @@ impl PivotedCholesky {
         self.join_rows(&at_pivots, &elsewhere, values.as_mut());
     }
 
-    /// The transpose of [`Self::solve_in_place`]: with p = (L₁₁L₁₁ᵀ)⁻¹ f_Z and t = Cᵀp it is p − Mᵀt at the pivots, t elsewhere.
+    /// Applies the transpose of [`Self::solve_in_place`]. With `p = (L₁₁L₁₁ᵀ)⁻¹ f_Z` and `t = Cᵀp`, the
+    /// result is `p − Mᵀt` at the pivots and t elsewhere.
     pub(super) fn solve_transposed_in_place(&self, mut functionals: MatMut<'_, f64>) {
         let (mut at_pivots, _) = self.split_rows(functionals.as_ref());
         let par = self.parallelism(functionals.ncols());
@@ -140,7 +145,7 @@ impl PivotedCholesky {
         self.join_rows(&at_pivots, &elsewhere, functionals.as_mut());
     }
 
-    /// `C x = (I + MᵀM)⁻¹Mᵀ x` or `Mᵀ(I + MMᵀ)⁻¹ x`.
+    /// Returns `C x`, either as `(I + MᵀM)⁻¹Mᵀ x` or as `Mᵀ(I + MMᵀ)⁻¹ x`.
     fn apply_c(&self, mut x: Mat<f64>) -> Mat<f64> {
         let (par, mut product) = (self.parallelism(x.ncols()), Mat::zeros(self.rank, x.ncols()));
         let is_outer = inner_size(self.order.len(), self.rank) != self.rank;
@@ -154,7 +159,7 @@ impl PivotedCholesky {
         product
     }
 
-    /// `Cᵀ x`.
+    /// Returns `Cᵀ x`.
     fn apply_c_transposed(&self, x: &Mat<f64>) -> Mat<f64> {
         let (n, par) = (self.order.len(), self.parallelism(x.ncols()));
         let mut product = Mat::zeros(n - self.rank, x.ncols());
@@ -197,7 +202,7 @@ impl PivotedCholesky {
         parallelism((2 * self.order.len() * self.rank * n_columns) as f64)
     }
 
-    /// The rows of the pivots and the other rows, in the order of the factor.
+    /// Returns the rows of the pivots and the other rows, in the order of the factor.
     fn split_rows(&self, x: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
         let (pivots, others) = self.order.split_at(self.rank);
         let rows = |order: &[usize]| Mat::from_fn(order.len(), x.ncols(), |i, j| x[(order[i], j)]);
@@ -215,12 +220,12 @@ impl PivotedCholesky {
     }
 }
 
-/// Order of the smaller of `I + MᵀM` and `I + MMᵀ`.
+/// Returns the order of the smaller of `I + MᵀM` and `I + MMᵀ`.
 fn inner_size(n: usize, rank: usize) -> usize {
     rank.min(n - rank)
 }
 
-/// Numbers of a factorization of this rank: at most n².
+/// Returns how many numbers a factorization of this rank has: at most n².
 fn n_numbers(n: usize, rank: usize) -> usize {
     n * rank + inner_size(n, rank) * inner_size(n, rank)
 }

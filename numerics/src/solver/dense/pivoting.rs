@@ -1,4 +1,4 @@
-//! Pivoted Cholesky factorization, in blocks of pivots; columns of K are evaluated as they are needed.
+//! Pivoted Cholesky factorization in blocks of pivots. Columns of K are evaluated as they are needed.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -14,44 +14,50 @@ use crate::sums::gram::fill_cross_gram;
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
-/// Pivots below this multiple of k₀ are rounding (numerics.md, Fit 2).
+/// Multiple of k₀ below which a pivot counts as rounding (numerics.md, Fit 2).
 const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;
 
-/// Candidates looked at together: wide enough for matrix products at full speed (rough kernels accept nearly all of them).
+/// Largest number of candidates of a block, wide enough for matrix products at full speed. Rough kernels
+/// accept nearly all candidates.
 const CANDIDATES: usize = 128;
 
-/// A pivot is accepted while it is at least this fraction of the largest remaining diagonal entry when its block began.
+/// Share of the largest remaining diagonal entry, as its block begins, that a pivot must reach to be
+/// accepted.
 ///
-/// It bounds the entries of `L₂₁L₁₁⁻¹` as strict pivoting does, up to a factor √10 for each pivot instead of 1.
+/// This bounds the entries of `L₂₁L₁₁⁻¹` as strict pivoting does, but by a factor √10 for each pivot instead
+/// of 1.
 const WORTH: f64 = 0.1;
 
-/// `P(K + D)Pᵀ ≈ LLᵀ` with r columns in the making, D the regularization.
+/// A factorization `P(K + D)Pᵀ ≈ LLᵀ` with r columns in the making, D the regularization.
 ///
-/// A pivot is a point with a large diagonal entry of `K + D − LLᵀ`, as in LAPACK's `dpstrf` (Hammarling, Higham and Lucas
-/// 2007), but whole blocks of candidates are taken, the weak ones put back (as Epperly, Tropp and Webber 2024 do for random
-/// pivots), and columns of K are evaluated only for pivots (Harbrecht, Peters and Schneider 2012): n r kernel values,
-/// `n r² − ⅔r³` flops in matrix products, no memory beside the n r numbers of L but O(n) per thread.
+/// A pivot is a point with a large diagonal entry of `K + D − LLᵀ`, as in LAPACK's `dpstrf` (Hammarling,
+/// Higham and Lucas 2007). Whole blocks of candidates are taken and weak ones are put back, as Epperly, Tropp
+/// and Webber (2024) do for random pivots. Columns of K are evaluated only for pivots (Harbrecht, Peters and
+/// Schneider 2012).
+///
+/// The cost is n r kernel values and `n r² − ⅔r³` flops in matrix products. Besides the n r numbers of L,
+/// each thread needs O(n) memory.
 pub(super) struct Pivoting<'a> {
     cloud: &'a Cloud,
     kernel: &'a Kernel,
     regularization: &'a Regularization,
     nodes: Nodes,
-    /// The point of each row: pivots first, in the order of their choice.
+    /// Point of each row: pivots first, in the order of their choice.
     order: Vec<usize>,
     /// Diagonal of `K + D − LLᵀ`, row by row.
     remaining: Vec<f64>,
-    /// L column by column, n numbers each; what stands above its diagonal is zero.
+    /// L column by column, n numbers each. Entries above its diagonal are zero.
     columns: &'a mut [f64],
     rank: usize,
 }
 
-/// The outcome: the columns of L are in the buffer.
+/// The outcome of pivoting. The columns of L are in the buffer.
 pub(super) struct Pivots {
-    /// The point of each row, pivots first.
+    /// Point of each row, pivots first.
     pub(super) order: Vec<usize>,
     /// Number of pivots.
     pub(super) rank: usize,
-    /// Whether what remains is rounding; if not, the pivots did not fit.
+    /// True if what remains is rounding, false if the pivots did not fit.
     pub(super) is_complete: bool,
 }
 
@@ -68,7 +74,8 @@ impl<'a> Pivoting<'a> {
         Self { cloud, kernel, regularization, nodes: Nodes::of(cloud), order, remaining, columns, rank: 0 }
     }
 
-    /// Adds pivots until the largest remaining diagonal entry is rounding, or more than `max_rank` would be needed.
+    /// Adds pivots until the largest remaining diagonal entry is rounding, or until more than `max_rank`
+    /// would be needed.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -84,7 +91,8 @@ impl<'a> Pivoting<'a> {
             let n_candidates = self.gather_candidates(floor);
             let mut block = self.schur_complement(n_candidates, observer)?;
             for k in 0..n_candidates {
-                // The same number with the rounding of one sum instead of many: no candidate comes back for ever.
+                // This number has the rounding of one sum instead of many, so that no candidate comes back
+                // forever.
                 self.remaining[self.rank + k] = block.diagonal(k);
             }
             let swaps = block.factorize(floor);
@@ -99,7 +107,8 @@ impl<'a> Pivoting<'a> {
         Ok(Pivots { order: self.order, rank: self.rank, is_complete })
     }
 
-    /// Moves the rows with the largest remaining entries above `floor` behind the pivots; returns how many.
+    /// Moves the rows with the largest remaining entries above `floor` behind the pivots. Returns their
+    /// number.
     fn gather_candidates(&mut self, floor: f64) -> usize {
         let remaining = &self.remaining;
         let mut rows: Vec<usize> =
@@ -117,7 +126,7 @@ impl<'a> Pivoting<'a> {
         rows.len()
     }
 
-    /// Swaps pairs of rows, counted from the first row that is no pivot.
+    /// Swaps pairs of rows, counted from the first row that is not a pivot.
     fn swap_rows(&mut self, swaps: &[(usize, usize)]) {
         let first = self.rank;
         for &(a, b) in swaps {
@@ -132,7 +141,7 @@ impl<'a> Pivoting<'a> {
         });
     }
 
-    /// `K + D − LLᵀ` at the first rows that are no pivots.
+    /// Returns `K + D − LLᵀ` at the first rows that are not pivots.
     fn schur_complement(&self, n_rows: usize, observer: &dyn Observer) -> Result<Block, NumericsError> {
         let (n, first) = (self.order.len(), self.rank);
         let candidates = self.points(first, n_rows)?;
@@ -148,8 +157,8 @@ impl<'a> Pivoting<'a> {
         Ok(Block { entries, n: n_rows })
     }
 
-    /// Appends the columns of accepted pivots, the first rows of a factorized block: `L₂ = (K₂ − L₂′L₁′ᵀ) L₁⁻ᵀ`, with a
-    /// prime what stands in earlier columns.
+    /// Appends the columns of the accepted pivots, which are the first rows of a factorized block:
+    /// `L₂ = (K₂ − L₂′L₁′ᵀ) L₁⁻ᵀ`. A prime marks entries of earlier columns.
     fn append(
         &mut self,
         block: &Block,
@@ -176,8 +185,8 @@ impl<'a> Pivoting<'a> {
         Ok(())
     }
 
-    /// Writes behind L the columns of K at accepted pivots, in the order of the rows: in the rows of these pivots the factor
-    /// of their block, above it zero.
+    /// Writes the columns of K at accepted pivots behind L, in the order of the rows. The rows of these
+    /// pivots get the factor of their block, and the rows above them get zero.
     fn write_kernel_columns(
         &mut self,
         block: &Block,
@@ -199,7 +208,7 @@ impl<'a> Pivoting<'a> {
         Ok(())
     }
 
-    /// The points of some rows.
+    /// Returns the points of some rows.
     fn points(&self, first: usize, n_rows: usize) -> Result<Cloud, NumericsError> {
         let rows = self.order[first..][..n_rows].iter();
         let coordinates = rows.flat_map(|&point| self.cloud.point(point)).copied().collect();
@@ -218,7 +227,8 @@ impl Block {
         self.entries[k * (self.n + 1)]
     }
 
-    /// Pivoted Cholesky in place while pivots are above `floor`; returns the swaps of rows, one for each column of the factor.
+    /// Factorizes in place, with pivoting, while pivots are above `floor`. Returns the swaps of rows, one for
+    /// each column of the factor.
     fn factorize(&mut self, floor: f64) -> Vec<(usize, usize)> {
         let mut swaps = Vec::new();
         for k in 0..self.n {
@@ -235,14 +245,14 @@ impl Block {
         swaps
     }
 
-    /// Swaps two rows and the same columns.
+    /// Swaps two rows and the columns with the same indices.
     fn swap(&mut self, a: usize, b: usize) {
         let n = self.n;
         (0..n).for_each(|c| self.entries.swap(c * n + a, c * n + b));
         (0..n).for_each(|r| self.entries.swap(a * n + r, b * n + r));
     }
 
-    /// Turns column k into one of the factor and updates the columns after it.
+    /// Turns column k into a column of the factor and updates the columns after it.
     fn eliminate(&mut self, k: usize) {
         let n = self.n;
         let (before, after) = self.entries.split_at_mut((k + 1) * n);

@@ -1,8 +1,9 @@
 //! Forward and backward substitution for one right-hand side, at the speed of memory.
 //!
-//! A triangle of n²/2 numbers is read once per substitution and used for two flops each: bandwidth is the bound, and triangular
-//! solves made for many right-hand sides reach a fraction of it. Here every thread streams its part of a panel of columns,
-//! eight columns at a time, so that the right-hand side is loaded once per eight.
+//! A substitution reads a triangle of n²/2 numbers once and uses each number for two flops, so memory
+//! bandwidth is the limit. Triangular solves made for many right-hand sides reach a fraction of it. Here
+//! every thread streams its part of a panel, eight columns at a time. The right-hand side is then loaded once
+//! for every eight columns.
 
 use std::ops::Range;
 
@@ -11,13 +12,15 @@ use rayon::prelude::*;
 
 use super::packed::{Columns, Packed};
 
-/// Columns of a panel: its diagonal block fits the L2 cache and is solved by one thread while the others wait.
+/// Columns of a panel. Its diagonal block fits the L2 cache and is solved by one thread while the others
+/// wait.
 const PANEL: usize = 128;
 
 /// Columns that one sweep takes together: as many streams as the prefetchers of current cores follow.
 const GROUP: usize = 8;
 
-/// Numbers that a task streams at least: some 20 µs, against 2 µs to hand it to another thread.
+/// Least number of numbers that a task streams: about 20 µs of work, against 2 µs to hand it to another
+/// thread.
 const NUMBERS_PER_TASK: usize = 1 << 16;
 
 /// `x ← L⁻¹x`.
@@ -74,7 +77,7 @@ fn panels(n: usize) -> impl DoubleEndedIterator<Item = Range<usize>> {
     (0..n.div_ceil(PANEL)).map(move |k| k * PANEL..((k + 1) * PANEL).min(n))
 }
 
-/// `rows ← rows − A[top.., first..]·x`: a solved panel leaves other rows.
+/// Subtracts a solved panel from other rows: `rows ← rows − A[top.., first..]·x`.
 fn subtract_panel(arch: Arch, columns: Columns<'_>, first: usize, x: &[f64], top: usize, rows: &mut [f64]) {
     let n_rows = NUMBERS_PER_TASK / PANEL;
     rows.par_chunks_mut(n_rows).enumerate().for_each(|(task, rows)| {
@@ -82,7 +85,7 @@ fn subtract_panel(arch: Arch, columns: Columns<'_>, first: usize, x: &[f64], top
     });
 }
 
-/// `open[j] ← open[j] − A[top.., first + j]·x`: what is solved elsewhere leaves the entries of a panel.
+/// Subtracts solved entries from those of a panel: `open[j] ← open[j] − A[top.., first + j]·x`.
 fn subtract_products(
     arch: Arch,
     columns: Columns<'_>,
@@ -97,8 +100,9 @@ fn subtract_products(
     });
 }
 
-/// How a diagonal block is solved: a solved entry leaves the others (`Scatter`), or they leave it before it is solved
-/// (`Gather`); the others are `Below` it in its column, in a lower triangle, or `Above` it, in an upper one.
+/// Order in which a diagonal block is solved. `Scatter` subtracts a solved entry from the others. `Gather`
+/// subtracts the others from an entry before it is solved. In its column, the others are `Below` it in a
+/// lower triangle, or `Above` it in an upper one.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
     ScatterBelow,
@@ -154,7 +158,7 @@ impl WithSimd for Diagonal<'_> {
     }
 }
 
-/// One thread's part of [`subtract_panel`].
+/// A thread's part of [`subtract_panel`].
 struct SubtractPanel<'a> {
     columns: Columns<'a>,
     first: usize,
@@ -182,7 +186,7 @@ impl WithSimd for SubtractPanel<'_> {
     }
 }
 
-/// One thread's part of [`subtract_products`].
+/// A thread's part of [`subtract_products`].
 struct SubtractProducts<'a> {
     columns: Columns<'a>,
     first: usize,
@@ -211,7 +215,7 @@ impl WithSimd for SubtractProducts<'_> {
     }
 }
 
-/// `rows ← rows − Σ_k columns[k]·factors[k]`.
+/// Subtracts a combination of columns: `rows ← rows − Σ_k columns[k]·factors[k]`.
 #[inline(always)]
 fn subtract<S: Simd, const K: usize>(simd: S, rows: &mut [f64], columns: [&[f64]; K], factors: [f64; K]) {
     let (rows, tail) = S::as_mut_simd_f64s(rows);
@@ -232,7 +236,7 @@ fn subtract<S: Simd, const K: usize>(simd: S, rows: &mut [f64], columns: [&[f64]
     }
 }
 
-/// `columns[k]·x` for every k.
+/// Returns `columns[k]·x` for every k.
 #[inline(always)]
 fn products<S: Simd, const K: usize>(simd: S, columns: [&[f64]; K], x: &[f64]) -> [f64; K] {
     let (x, tail) = S::as_simd_f64s(x);

@@ -1,4 +1,5 @@
-//! Value, gradient and Hessian at the points of the expansion themselves, every pair of blocks evaluated once for both.
+//! Value, gradient and Hessian of an expansion at its own centres. Every pair of blocks is evaluated once and
+//! serves both.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -12,13 +13,13 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::symmetric::{Share, block_points, sum_pairs};
 
-/// Beyond it the sums of a point take more memory and time than the kernel.
+/// Greatest dimension of this pass. Beyond it, the sums of a point take more memory and time than the kernel.
 pub(super) const MAX_DIMENSION: usize = 3;
 
-/// Below it there are too few pairs of blocks for all threads.
+/// Least number of points of this pass. Below it there are too few pairs of blocks for all threads.
 pub(super) const MIN_POINTS: usize = 8 * BLOCK;
 
-/// Jets of order 2 at all points, `[n, layout.width()]`.
+/// Computes value, gradient and Hessian at all points, `[n, layout.width()]`.
 ///
 /// # Errors
 /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -47,7 +48,7 @@ pub(super) fn jets(
     }
 }
 
-/// The pairs of the points of a block with those of another, or with one another.
+/// The pairs between the points of block `a` and those of block `b`, or among those of `a` if `b` is `None`.
 struct BlockPair<'a> {
     expansion: Expansion<'a>,
     cloud: &'a Cloud,
@@ -63,11 +64,12 @@ impl WithSimd for BlockPair<'_> {
         let Self { expansion, cloud, a: (row, own), b: other } = self;
         let d = cloud.dimension();
         let (mut sums, mut numbers) = ([Sums::new(simd, d), Sums::new(simd, d)], vec![0.0; own.len()]);
-        // By itself first: sums of n terms one after the other would lose a digit.
+        // Each pair of blocks is summed by itself first: adding n terms one after the other would lose a
+        // digit.
         let mut mirrored = vec![Block::ZERO; own.len()];
         let (block, points) = (other.as_ref().map_or(row, |(block, _)| *block), block_points(cloud, row));
         for first in points.clone().step_by(2) {
-            // Without a second point its part of what is mirrored has no weight.
+            // If there is no second point, its part in the mirrored sums has weight 0.
             let mut weights = [0.0; 2];
             for (k, point) in (first..points.end.min(first + 2)).enumerate() {
                 weights[k] = expansion.weights[row].0[point % BLOCK];

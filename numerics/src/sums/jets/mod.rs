@@ -1,4 +1,6 @@
-//! Value, gradient and Hessian of a kernel expansion at many queries, in one fused pass over the points per query.
+//! Value, gradient and Hessian of a kernel expansion at many queries.
+//!
+//! One fused pass over the points per query computes all of them.
 
 mod centres;
 mod pass;
@@ -16,17 +18,17 @@ use crate::points::cloud::Cloud;
 use crate::points::duplicates::Positions;
 use pass::{Expansion, Pass};
 
-/// Queries per task; a task of one query at n = 2,000 is about 5 µs of work.
+/// Queries per task. A task of one query at n = 2,000 is about 5 µs of work.
 const QUERIES_PER_TASK: usize = 8;
 
-/// `u(x) = Σ_j λ_j k(x, x_j)` with its derivatives up to an order, at m queries.
+/// Values of `u(x) = Σ_j λ_j k(x, x_j)` with derivatives up to an order, at m queries.
 #[derive(Clone)]
 pub struct Jets {
     packed: Vec<f64>,
     layout: Layout,
 }
 
-/// Which derivatives a pass computes.
+/// The derivatives that a pass computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JetOrder {
     Value,
@@ -37,7 +39,7 @@ pub enum JetOrder {
 }
 
 impl JetOrder {
-    /// Of the highest derivatives.
+    /// Returns the order of the highest derivatives, 0 to 2.
     pub fn degree(self) -> usize {
         match self {
             Self::Value => 0,
@@ -47,7 +49,8 @@ impl JetOrder {
     }
 }
 
-/// One query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two magnitudes.
+/// The layout of one query's numbers: value, gradient `[d]`, upper triangle of the Hessian row by row, two
+/// magnitudes. Lower orders end earlier.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
     order: JetOrder,
@@ -71,6 +74,7 @@ impl Layout {
         self.hessian() + self.dimension * (self.dimension + 1) / 2
     }
 
+    /// Numbers per query.
     pub(crate) fn width(self) -> usize {
         match self.order {
             JetOrder::Value => 1,
@@ -80,16 +84,19 @@ impl Layout {
         }
     }
 
-    /// Sums over the points that a jet with a Hessian is made of: those of its entries, and `Σλφ′`.
+    /// Number of sums over the points behind a jet with a Hessian: one for each of its entries, and `Σλφ′`.
     fn n_sums(self) -> usize {
         self.magnitudes() + 1
     }
 
-    /// Turns the sums `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′` into as much of a jet as there is room for: factors
-    /// `variance·{1, 2/ℓ², 4/ℓ⁴}`, and the term `2φ′·I/ℓ²` of the Hessian. Where the kernel stretches coordinates, D are differences of
-    /// those, and derivatives along an axis come with its factor.
+    /// Turns the sums `Σλφ`, `Σλφ′D_a`, `Σλφ″D_aD_b` and `Σλφ′` into as many entries of a jet as there is
+    /// room for.
     ///
-    /// Multiplying by 1/ℓ one after the other keeps ℓ⁴ out of float64's way.
+    /// The factors are `variance·{1, 2/ℓ², 4/ℓ⁴}`. The diagonal of the Hessian also gets
+    /// `2·variance·Σλφ′/ℓ²`. If the kernel stretches coordinates, D are stretched differences, and a
+    /// derivative along an axis takes the factor of this axis.
+    ///
+    /// Multiplications by 1/ℓ one after the other avoid ℓ⁴, which may leave float64.
     pub(crate) fn finish(self, kernel: &Kernel, sums: &[f64], jet: &mut [f64]) {
         let (variance, inverse) = (kernel.variance(), 1.0 / kernel.length_scale());
         let trace = 2.0 * variance * sums[self.magnitudes()] * inverse * inverse;
@@ -118,11 +125,11 @@ impl Layout {
 impl Jets {
     /// Evaluates the expansion with `weights` (one per point of `cloud`) at the queries.
     ///
-    /// Each query is summed in the order of the points, whatever the number of threads. The caller has checked that the
-    /// kernel has the derivatives asked for ([`check_smooth_at`]).
+    /// Each query is summed in the order of the points, whatever the number of threads. The caller has
+    /// checked that the kernel has the derivatives asked for ([`check_smooth_at`]).
     ///
     /// # Errors
-    /// [`NumericsError::Overflow`] where a result leaves float64, [`NumericsError::Cancelled`].
+    /// [`NumericsError::Overflow`] if a result leaves float64, [`NumericsError::Cancelled`].
     pub fn evaluate(
         cloud: &Cloud,
         kernel: &Kernel,
@@ -134,10 +141,10 @@ impl Jets {
         Self::over(&Nodes::of(cloud), kernel, weights, queries, order, observer)
     }
 
-    /// The same over points that are laid out already.
+    /// Evaluates an expansion over points that are laid out already.
     ///
     /// # Errors
-    /// Those of [`Jets::evaluate`].
+    /// Returns the errors of [`Jets::evaluate`].
     pub fn over(
         nodes: &Nodes,
         kernel: &Kernel,
@@ -163,11 +170,13 @@ impl Jets {
         Ok(Self { packed, layout })
     }
 
-    /// [`Jets::evaluate`] at the points of the cloud themselves to the second order, by half of the pairs where that pays: the
-    /// order of the sums is another then, and depends on the number of points alone.
+    /// Evaluates value, gradient and Hessian at the points of the cloud themselves.
+    ///
+    /// Each pair is evaluated only once where that pays. The order of the sums then differs from
+    /// [`Jets::evaluate`], and depends only on the number of points.
     ///
     /// # Errors
-    /// Those of [`Jets::evaluate`].
+    /// Returns the errors of [`Jets::evaluate`].
     pub fn at_points(
         cloud: &Cloud,
         kernel: &Kernel,
@@ -193,12 +202,12 @@ impl Jets {
         Ok(Self { packed, layout })
     }
 
-    /// Of numbers that were summed elsewhere, `[m, width]`.
+    /// Wraps numbers that were computed elsewhere, `[m, width]`.
     pub(crate) fn of(layout: Layout, packed: Vec<f64>) -> Self {
         Self { packed, layout }
     }
 
-    /// With a linear function added, given by its value at a query and its gradient `[d]`.
+    /// Adds a linear function, given by its value at a query and its gradient `[d]`.
     pub fn plus_linear(mut self, queries: &Cloud, gradient: &[f64], value: impl Fn(&[f64]) -> f64) -> Self {
         let layout = self.layout;
         for (jet, x) in self.packed.chunks_exact_mut(layout.width()).zip(queries.points()) {
@@ -266,7 +275,8 @@ impl Jets {
         (0..self.n_queries()).flat_map(|query| self.hessian(query)).collect()
     }
 
-    /// `Σ|λ_j||k_j|` and `Σ|λ_j||∇k_j|` at a query; order [`JetOrder::HessianWithMagnitudes`] only.
+    /// Returns `Σ|λ_j||k_j|` and `Σ|λ_j||∇k_j|` at a query. Only order [`JetOrder::HessianWithMagnitudes`]
+    /// has them.
     pub(crate) fn magnitudes(&self, query: usize) -> (f64, f64) {
         let jet = self.jet(query);
         let at = self.layout.magnitudes();

@@ -1,4 +1,4 @@
-//! The sums over all points for some consecutive queries, block by block.
+//! Sums over all points for some consecutive queries, block by block.
 
 use pulp::{Simd, WithSimd};
 
@@ -9,7 +9,7 @@ use crate::machine::registers::{Block, Pack};
 use crate::points::cloud::Cloud;
 use crate::sums::nodes::Nodes;
 
-/// `Σ_j λ_j k(·, x_j)`.
+/// The function `Σ_j λ_j k(·, x_j)`, with points and weights laid out in blocks.
 #[derive(Clone, Copy)]
 pub(super) struct Expansion<'a> {
     pub(super) nodes: &'a Nodes,
@@ -17,7 +17,7 @@ pub(super) struct Expansion<'a> {
     pub(super) weights: &'a [Block],
 }
 
-/// The jets of the queries from `first` on.
+/// A pass that computes the jets of the queries from `first` on.
 pub(super) struct Pass<'a> {
     pub(super) expansion: Expansion<'a>,
     pub(super) queries: &'a Cloud,
@@ -68,7 +68,7 @@ impl Pass<'_> {
     }
 }
 
-/// What a pass has summed up for a query, and the block at hand.
+/// The sums of a pass for one query, and the block at hand.
 pub(super) struct Sums<S: Simd> {
     /// `Σλφ`.
     value: Sum<S>,
@@ -105,7 +105,7 @@ impl<S: Simd> Sums<S> {
         self.hessian.fill(zero);
     }
 
-    /// Adds what the points of a block give x.
+    /// Adds the contributions of the points of a block to the sums at x.
     #[inline(always)]
     pub(super) fn add<const ORDER: usize>(
         &mut self,
@@ -121,7 +121,7 @@ impl<S: Simd> Sums<S> {
         }
     }
 
-    /// Writes the sums up to an order, in that of [`Layout::finish`].
+    /// Writes the sums up to an order, in the sequence that [`Layout::finish`] takes.
     #[inline(always)]
     pub(super) fn write<const ORDER: usize>(&self, numbers: &mut [f64]) {
         let d = self.gradient.len();
@@ -142,7 +142,7 @@ impl<S: Simd> Sums<S> {
     }
 }
 
-/// Computes a block's differences and profiles, and adds up what needs no difference.
+/// Computes a block's differences and profiles, and adds up the sums that need no difference.
 struct Weighted<'a, S: Simd, const ORDER: usize> {
     simd: S,
     expansion: Expansion<'a>,

@@ -4,7 +4,8 @@ use crate::machine::instruction_set::InstructionSet;
 use crate::observer::Unobserved;
 use crate::testing::{all_families, fibonacci_sphere};
 
-/// 100 points, so that the last block is padded, in a dimension other than 3, with weights of both signs.
+/// Returns 100 points, their weights of both signs, and 11 queries, in dimension d. With 100 points the last
+/// block is padded.
 fn expansion(d: usize) -> (Cloud, Vec<f64>, Cloud) {
     let wave = |i: usize| (1.3 * i as f64).sin() + 0.1 * (0.7 * i as f64).cos();
     let cloud = Cloud::new((0..100 * d).map(wave).collect(), d).unwrap();
@@ -24,8 +25,8 @@ fn shifted(queries: &Cloud, axis: usize, h: f64) -> Cloud {
 
 #[test]
 fn derivatives_agree_with_central_differences_for_every_kernel() {
-    // Step 1e-5 at unit scales: truncation h²/6 · third derivative (up to 1e3 here) and rounding 1e-16/h · Σ|λ|
-    // both stay under 1e-7 of the larger numbers.
+    // With step 1e-5 at unit scales, both errors stay under 1e-7 of the larger numbers. They are the
+    // truncation h²/6 · third derivative (up to 1e3 here) and the rounding 1e-16/h · Σ|λ|.
     let h = 1e-5;
     for d in [1, 2, 3, 5] {
         let (cloud, weights, queries) = expansion(d);
@@ -71,7 +72,8 @@ fn lower_orders_repeat_the_numbers_of_higher_ones() {
 
 #[test]
 fn every_instruction_set_sums_to_the_same_jets() {
-    // Sums of 100 terms of up to 10 each, rounded in different orders: 1000 · 100 ε is 2e-11 at worst.
+    // Sums of 100 terms of up to 10 each, rounded in different orders, differ by 1000 · 100 ε = 2e-11 at
+    // worst.
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-11;
     for d in [1, 2, 3, 4, 5, 7, 8] {
         let (cloud, weights, queries) = expansion(d);
@@ -90,7 +92,7 @@ fn every_instruction_set_sums_to_the_same_jets() {
 
 #[test]
 fn half_of_the_pairs_give_the_jets_at_the_points() {
-    // Less than a block, one, one and a point, an odd and an even number of blocks.
+    // The sizes are less than a block, one block, one block and a point, an odd and an even number of blocks.
     for (n, d) in [(1, 3), (128, 3), (129, 1), (300, 2), (500, 3)] {
         let wave = |i: usize| (1.3 * i as f64).sin() + 0.1 * (0.7 * i as f64).cos();
         let cloud = Cloud::new((0..n * d).map(wave).collect(), d).unwrap();
@@ -99,8 +101,9 @@ fn half_of_the_pairs_give_the_jets_at_the_points() {
             all_families().into_iter().filter(|family| !Kernel::new(*family, 0.8, 1.7).unwrap().has_kink())
         {
             let kernel = Kernel::new(family, 0.8, 1.7).unwrap();
-            // Profiles differ by a few roundings from set to set, within one only the order of n terms does; a term of the Hessian
-            // is at most 12 times the greatest of the value (4/ℓ⁴ · φ″q ≤ 12 φ(0)) where φ″ is bounded.
+            // Profiles differ by a few roundings between instruction sets. Within one set, only the order of
+            // n terms differs. Where φ″ is bounded, a term of the Hessian is at most 12 times the greatest of
+            // the value (4/ℓ⁴ · φ″q ≤ 12 φ(0)).
             let magnitudes = jets(&cloud, &kernel, &weights, &cloud, JetOrder::HessianWithMagnitudes);
             for set in InstructionSet::available() {
                 let nodes = Nodes::on(set, &cloud);
@@ -123,7 +126,7 @@ fn half_of_the_pairs_give_the_jets_at_the_points() {
 
 #[test]
 fn magnitudes_follow_the_unit_of_length() {
-    // Powers of two, by which nothing is rounded.
+    // Scaling by powers of two rounds nothing.
     let (cloud, weights, _) = expansion(3);
     let scaled = |factor: f64| {
         let points = Cloud::new(cloud.coordinates().iter().map(|x| factor * x).collect(), 3).unwrap();
@@ -150,7 +153,7 @@ fn magnitudes_bound_values_and_slopes() {
             assert!(norm <= slope * (1.0 + 1e-14));
         }
     }
-    // A single point of weight 1: the magnitudes are the absolute values themselves.
+    // For a single point of weight 1, the magnitudes are the absolute values themselves.
     let one = Cloud::new(vec![0.0, 0.0, 0.0], 3).unwrap();
     let kernel = Kernel::new(crate::kernel::Family::Gauss, 0.8, 3.0).unwrap();
     let jets = jets_of_one(&one, &kernel);

@@ -1,7 +1,8 @@
 //! Sums of gradients and Hessians over a block, a tile of coordinates at a time.
 //!
-//! A tile of 3 coordinates by 3 keeps its sums in registers for the length of a block, in the 16 registers of AVX2 too.
-//! d ≤ 3 is one tile; a larger d is cut into groups of 3 coordinates and a rest, so that no flop is spent on padding.
+//! A tile of 3 by 3 coordinates keeps its sums in registers for the length of a block, even in the 16
+//! registers of AVX2. d ≤ 3 is one tile. A larger d is cut into groups of 3 coordinates and a rest, so that
+//! no flop is spent on padding.
 
 use pulp::Simd;
 
@@ -11,10 +12,10 @@ use crate::machine::registers::{Block, Pack};
 /// Coordinates per tile.
 const TILE: usize = 3;
 
-/// One register of sums.
+/// A sum in one register.
 pub(super) type Sum<S> = Pack<S, 1>;
 
-/// What the sums of a block need: profiles and the differences D.
+/// The profiles of one query with a block of points, and the differences D.
 pub(super) struct ProfileBlock {
     /// φ, φ′, φ″.
     pub(super) profiles: [Block; 3],
@@ -26,8 +27,8 @@ impl ProfileBlock {
         Self { profiles: [Block::ZERO; 3], differences: vec![Block::ZERO; dimension] }
     }
 
-    /// Adds `Σ λφ′ D_a` to `gradient[a]` and, at order 2, `Σ λφ″ D_a D_b` to the upper triangle `hessian`, packed row by
-    /// row.
+    /// Adds `Σ λφ′ D_a` to `gradient[a]`. At order 2, also adds `Σ λφ″ D_a D_b` to the upper triangle
+    /// `hessian`, packed row by row.
     #[inline(always)]
     pub(super) fn add_to<S: Simd, const ORDER: usize>(
         &self,
@@ -56,7 +57,7 @@ impl ProfileBlock {
         }
     }
 
-    /// The gradient's entries `a..a + N` and the Hessian's between them.
+    /// Adds to the entries `a..a + N` of the gradient, and to those of the Hessian between these coordinates.
     #[expect(
         clippy::needless_range_loop,
         reason = "a slice of the sums would keep them in memory, half as fast"
@@ -99,7 +100,7 @@ impl ProfileBlock {
         }
     }
 
-    /// The Hessian's rows `a..a + 3`, columns `b..b + N`.
+    /// Adds to rows `a..a + 3`, columns `b..b + N` of the Hessian.
     #[expect(
         clippy::needless_range_loop,
         reason = "a slice of the sums would keep them in memory, half as fast"
@@ -131,8 +132,10 @@ impl ProfileBlock {
     }
 }
 
-/// The other way round: adds to the sums of every point y of a block what two points x give it, `λφ`, `λφ′D`, `λφ″DD` with D = y − x,
-/// and `λφ′`: a block for each, N the dimension. The two share what is loaded and stored.
+/// Adds the contributions of two points x to the sums of every point y of a block, in dimension N.
+///
+/// With D = y − x they are `λφ`, `λφ′D`, `λφ″DD` and `λφ′`. `sums` has a block for each entry. The two points
+/// share loads and stores.
 #[expect(clippy::needless_range_loop, reason = "the methods of arrays are not compiled into the loop")]
 #[inline(always)]
 pub(super) fn mirror<S: Simd, const N: usize>(simd: S, given: [(&ProfileBlock, f64); 2], sums: &mut [Block]) {
@@ -178,7 +181,7 @@ fn add_products<S: Simd>(simd: S, at: usize, a: [Sum<S>; 2], b: [Sum<S>; 2], blo
 }
 
 impl ProfileBlock {
-    /// `Σ|λ|φ` and `Σ|λφ′|√q`.
+    /// Adds `Σ|λ|φ` and `Σ|λφ′|√q` to `magnitudes`.
     #[inline(always)]
     pub(super) fn add_magnitudes<S: Simd>(
         &self,

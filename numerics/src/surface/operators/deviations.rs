@@ -1,9 +1,13 @@
-//! How sure operators applied to values are.
+//! Standard deviations of operators applied to values.
 //!
-//! Two things are not known: the function, of which the posterior has the covariance of all derivatives, and the surface under it. With δν and δH
-//! the errors of the normal and of `H = tr Dν`, and P the projection onto the tangent plane, `Δ_M u` is off by
-//! `−(2PD²uν + HP∇u)·δν − ∂_νu δH`, and `∇_M u` by `−∂_νu δν − (∇u·δν)ν`. Where the geometry has deviations, they add to those of the
-//! function in squares.
+//! Two things are uncertain: the function, whose posterior has the covariance of all derivatives, and the
+//! surface under it. Let δν and δH be the errors of the normal and of `H = tr Dν`, and P the projection onto
+//! the tangent plane. Then the operators are off by
+//!
+//! - `−(2PD²uν + HP∇u)·δν − ∂_νu δH` for `Δ_M u`,
+//! - `−∂_νu δν − (∇u·δν)ν` for `∇_M u`.
+//!
+//! Deviations of the geometry, where it has them, add in squares to those of the function.
 
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
@@ -15,11 +19,13 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::sums::jets::{JetOrder, Jets};
 
-/// Standard deviations of `Δ_M u`, `[m]`, unit V/L²; 0 at null queries. Kernel and noise are `factor` times those of the solver.
+/// Computes standard deviations of `Δ_M u`, `[m]`, unit V/L², 0 at null queries.
+///
+/// Kernel and noise are `factor` times those of the solver.
 ///
 /// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no second derivatives; [`NumericsError::NotPositiveDefinite`] without a Cholesky
-/// factor; those of [`Interpolant::at`].
+/// [`NumericsError::DerivativesVary`] where the process has no second derivatives,
+/// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, and the errors of [`Interpolant::at`].
 pub fn laplace_beltrami_deviations(
     geometry: &Geometry,
     interpolant: &Interpolant,
@@ -36,7 +42,8 @@ pub fn laplace_beltrami_deviations(
     Ok(total)
 }
 
-/// Adds what is not known of the surface, as far as its deviations are, to the deviations of a function known by its jets, `[m]`.
+/// Adds the deviations of the surface, if known, to deviations `[m]` of `Δ_M u`. The function u is known by
+/// its jets.
 pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
     let Some(known) = geometry.deviations() else { return };
     for query in regular(geometry) {
@@ -54,11 +61,12 @@ pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, 
     }
 }
 
-/// Standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L; 0 at null queries. Kernel and noise are `factor` times those of the
-/// solver.
+/// Computes standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L, 0 at null queries.
+///
+/// Kernel and noise are `factor` times those of the solver.
 ///
 /// # Errors
-/// Those of [`laplace_beltrami_deviations`], for first derivatives.
+/// Returns the errors of [`laplace_beltrami_deviations`], for first derivatives.
 pub fn surface_gradient_deviations(
     geometry: &Geometry,
     interpolant: &Interpolant,
@@ -75,7 +83,8 @@ pub fn surface_gradient_deviations(
     Ok(total)
 }
 
-/// The same for the components of the surface gradient, `[m, d]`.
+/// Adds the deviations of the surface, if known, to deviations `[m, d]` of the components of `∇_M u`. The
+/// function u is known by its jets.
 pub(super) fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
     let Some(known) = geometry.deviations() else { return };
     let d = jets.dimension();
@@ -91,7 +100,7 @@ pub(super) fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &
     }
 }
 
-/// An operator on a function.
+/// An operator applied to a function. Kernel and noise are `factor` times those of the solver.
 pub(super) struct Applied<'a> {
     pub(super) geometry: &'a Geometry,
     pub(super) interpolant: &'a Interpolant,
@@ -100,7 +109,7 @@ pub(super) struct Applied<'a> {
 }
 
 impl Applied<'_> {
-    /// The function's part: `[m]` or `[m, d]`.
+    /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
     fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
         let order = operator.order();
@@ -122,7 +131,7 @@ impl Applied<'_> {
     }
 }
 
-/// The operator at a query, a functional for each of its components.
+/// Returns the operator at a query as functionals of the jet, one for each component.
 pub(super) fn functionals(geometry: &Geometry, operator: Operator, query: usize) -> Vec<JetFunctional> {
     let normal = geometry.normal(query);
     let d = normal.len();

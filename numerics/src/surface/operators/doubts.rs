@@ -1,8 +1,9 @@
-//! Answers of operators that the values do not bear out.
+//! Answers of operators that the values do not support.
 //!
-//! A kernel that is learned is the one that the values want, and its deviations say how far off answers are. A kernel that is given may be none that the
-//! values want: too wide for what they show, with less noise than they have, or about 0 where they have an offset. There, errors are those of the answers
-//! that are served if the values come from the process that would have been learned.
+//! A learned kernel is the one that the values want, and its deviations say how far off answers are. A given
+//! kernel may not fit the values. It may be too wide for what they show, have less noise than they have, or
+//! be about 0 where they have an offset. For a given kernel, errors are those of the served answers if the
+//! values come from the process that would have been learned.
 
 use rayon::prelude::*;
 
@@ -22,56 +23,64 @@ use crate::points::thinning::thinned_points;
 use crate::selection::Learned;
 use crate::sums::regularization::Regularization;
 
-/// Functionals whose errors are found: what they take is little beside a factorization of as many points as need them.
+/// Most functionals whose errors are computed. They cost little beside a factorization of as many points as
+/// need them.
 pub const JUDGED_FUNCTIONALS: usize = 256;
 
-/// Queries that are judged themselves whose errors another may have: the greatest of them.
+/// Nearest judged queries of a query that is not judged itself. It takes the greatest of their errors.
 const AROUND: usize = 4;
 
-/// Deviations beyond this share of the root mean square of what there is leave little of it: an error of half of that is two and a half of them.
+/// Largest deviation of a sure answer, over the root mean square of the true answers. An error of half of
+/// that root mean square is two and a half such deviations.
 const UNCERTAIN: f64 = 0.2;
 
-/// Where fewer than this share of the answers seem sure, the rest are those whose errors were taken for too small.
+/// Least share of answers that are sure. If fewer seem sure, their errors were taken for too small, and no
+/// answer is believed.
 const BELIEVED: f64 = 0.1;
 
-/// Halvings of an interval of 52 binary digits: to three digits.
+/// Halvings of an interval of 52 binary digits, which leave three decimal digits.
 const STEPS: usize = 16;
 
-/// Queries that what is expected beforehand counts like.
+/// Weight of the prior, in queries.
 const N_BEFOREHAND: usize = 4;
 
-/// What there is to judge: an operator on a function, of which kernel and noise are `factor` times those of the solver.
+/// Answers to be judged: an operator on a function. Kernel and noise are `factor` times those of the solver.
 #[derive(Clone, Copy)]
 pub struct Judged<'a> {
     pub geometry: &'a Geometry,
     pub interpolant: &'a Interpolant,
     pub factor: f64,
     pub queries: &'a Cloud,
-    /// What was found, `[m, k]`.
+    /// Answers of the operator, `[m, k]`.
     pub found: &'a [f64],
-    /// What is learned from the values, where the kernel is given.
+    /// Process learned from the values, where the kernel is given.
     pub learned: Option<&'a Learned>,
 }
 
 impl Judged<'_> {
-    /// The queries, ascending, at which little is left of `∇_M u`; see [`Judged::laplace_beltrami`].
+    /// Finds the queries, ascending, at which `∇_M u` is uncertain, as [`Judged::laplace_beltrami`] does.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
+    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub fn surface_gradient(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         self.judge(Operator::SurfaceGradient, observer)
     }
 
-    /// The queries, ascending, at which little is left of `Δ_M u`: by the errors at queries that are spread as all are, [`JUDGED_FUNCTIONALS`] of them at
-    /// most; each of the others has the greatest of those around. All of them for a kernel whose process has no second derivatives.
+    /// Finds the queries, ascending, at which `Δ_M u` is uncertain.
+    ///
+    /// Errors are computed for at most [`JUDGED_FUNCTIONALS`] functionals, at queries that are spread as all
+    /// queries are. Each of the other queries takes the greatest error of those around it. All queries are
+    /// uncertain for a kernel whose process has no second derivatives.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
+    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub fn laplace_beltrami(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         self.judge(Operator::LaplaceBeltrami, observer)
     }
 
-    /// The queries, ascending, at which deviations that are known leave little, `[m, k]`.
+    /// Finds the queries, ascending, that known deviations `[m, k]` make uncertain.
     ///
     /// # Errors
     /// [`NumericsError::InvalidKernelParameter`] for a process beyond float64.
@@ -120,8 +129,9 @@ impl Judged<'_> {
         judged.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect()
     }
 
-    /// The kernel of the process that the values come from, and by how much it is scaled. What is learned beside a kernel that stretches coordinates
-    /// is learned in those.
+    /// Returns the kernel of the process that the values come from, and its scale factor.
+    ///
+    /// Beside a kernel that stretches coordinates, the process is learned in the stretched coordinates.
     fn process(&self) -> Result<(Kernel, f64), NumericsError> {
         let own = self.interpolant.solver.kernel();
         let Some(learned) = self.learned else { return Ok((own.clone(), self.factor)) };
@@ -148,7 +158,7 @@ impl Judged<'_> {
             return errors_under(&process, interpolant, queries, functionals, observer);
         }
         match deviations((solver, solution, factor), queries, functionals, observer) {
-            // The fallback has no variances, but it has weights.
+            // The pivoted fallback has no variances, but it has weights.
             Err(NumericsError::NotPositiveDefinite { .. }) => {
                 let noise = match solver.regularization() {
                     Regularization::Uniform(alpha) => *alpha,
@@ -162,10 +172,10 @@ impl Judged<'_> {
     }
 }
 
-/// What an operator was found to be, on a process with a kernel that is scaled by a factor.
+/// Answers of an operator, for a process with a kernel that is scaled by a factor.
 pub(super) struct Findings<'a> {
     pub(super) geometry: &'a Geometry,
-    /// `[m, k]`.
+    /// Answers of the operator, `[m, k]`.
     pub(super) found: &'a [f64],
     pub(super) kernel: &'a Kernel,
     pub(super) factor: f64,
@@ -176,42 +186,45 @@ impl Findings<'_> {
         self.found.len() / self.geometry.n_queries()
     }
 
-    /// Queries that are looked at, at most.
+    /// Returns how many queries are judged at most.
     pub(super) fn n_judged(&self) -> usize {
         (JUDGED_FUNCTIONALS / self.n_components()).max(1)
     }
 
-    /// The queries, ascending, at which deviations `[m, k]` leave little; `functionals` are those of some of them.
+    /// Finds the queries, ascending, that deviations `[m, k]` make uncertain. `functionals` are those of some
+    /// queries.
     pub(super) fn doubtful(&self, deviations: &[f64], functionals: &[JetFunctional]) -> Vec<usize> {
         let k = self.n_components();
         let of = |query: usize| (query, norm(&deviations[query * k..][..k]));
         let most = self.most(regular(self.geometry).map(of), functionals);
-        // Also where there is no number.
+        // NaN counts as doubtful.
         let is_sure = |(_, deviation): &(usize, f64)| *deviation <= most;
         regular(self.geometry).map(of).filter(|of| !is_sure(of)).map(|(query, _)| query).collect()
     }
 
-    /// The deviation that leaves little of what there is, from deviations at some queries.
+    /// Computes the largest deviation of a sure answer, from deviations at some queries.
     ///
-    /// Squares of what was found are those of what there is and of the errors. Where errors differ as much as they do between points of
-    /// random density, their mean says nothing: it is the s for which `Σ f²/(s² + e²)` is their number (Paule and Mandel 1982). A few queries may all
-    /// lie where there is nothing: what the process has beforehand counts like [`N_BEFOREHAND`] more.
+    /// Squares f² of the answers are those of the true answers plus those of the errors e. Between points of
+    /// random density errors differ so much that their mean says nothing. So the mean square of the true
+    /// answers is the s² for which `Σ f²/(s² + e²)` is the number of queries (Paule and Mandel 1982). A few
+    /// queries may all lie where there is nothing to find: the prior counts like [`N_BEFOREHAND`] more.
     fn most(&self, deviations: impl Iterator<Item = (usize, f64)>, functionals: &[JetFunctional]) -> f64 {
         let k = self.n_components();
         let prior: f64 = functionals.iter().map(|functional| functional.prior_variance(self.kernel)).sum();
         let beforehand = (prior * k as f64 / functionals.len().max(1) as f64).sqrt() * self.factor.sqrt();
         let lengths = deviations.map(|(query, error)| (norm(&self.found[query * k..][..k]), error));
         let lengths: Vec<(f64, f64)> = lengths.chain([(beforehand, 0.0); N_BEFOREHAND]).collect();
-        // In units of the greatest, whose square may have no number. Without one nothing is sure.
+        // In units of the greatest length, because its square may overflow. Without a positive one nothing is
+        // sure.
         let unit = lengths.iter().map(|(found, _)| *found).fold(0.0, f64::max);
         let squared = |&(found, error): &(f64, f64)| ((found / unit).powi(2), (error / unit).powi(2));
         let squares: Vec<(f64, f64)> = lengths.iter().map(squared).collect();
-        // Errors that the process does not expect would count as what there is: it is no more than what the process has beforehand.
+        // Errors that the process does not expect would count as true answers, so the prior bounds them.
         UNCERTAIN * (unit * spread_beside_errors(&squares).sqrt()).min(beforehand)
     }
 }
 
-/// s² of f² and e².
+/// Solves `Σ f²/(s² + e²) = n` for s², from n pairs of f² and e². Returns 0 without a positive solution.
 fn spread_beside_errors(squares: &[(f64, f64)]) -> f64 {
     let n = squares.len() as f64;
     let excess = |s: f64| squares.iter().map(|(found, error)| found / (s + error)).sum::<f64>() - n;
@@ -220,7 +233,7 @@ fn spread_beside_errors(squares: &[(f64, f64)]) -> f64 {
     if least == 0.0 || excess(least) <= 0.0 {
         return 0.0;
     }
-    // It falls, and is negative at the mean of f². By halves of the logarithm.
+    // The excess falls with s², and is negative at the mean of f². The logarithm is bisected.
     for _ in 0..STEPS {
         let middle = (least * most).sqrt();
         if excess(middle) > 0.0 { least = middle } else { most = middle }

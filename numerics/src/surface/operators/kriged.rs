@@ -1,7 +1,8 @@
-//! Operators on values that are kriged around each query: of clouds of any size.
+//! Operators on values that are kriged around each query, for clouds of any size.
 //!
-//! Value and derivatives at a query are those of the function that its neighbourhood defines, with deviations from the same weights. Where
-//! the values are noisy, the neighbourhood is one of means of near points, which reaches further.
+//! Value and derivatives at a query are those of the function that its neighbourhood defines. Deviations come
+//! from the same weights. Where the values are noisy, the neighbourhood is one of means of near points, which
+//! reaches further.
 
 use super::super::geometry::Geometry;
 use super::deviations::{add_surface_to_gradient, add_surface_to_laplace_beltrami, functionals};
@@ -22,26 +23,27 @@ pub struct Kriged<'a> {
     /// `[n]`, unit V.
     pub values: &'a [f64],
     pub trend: Option<&'a Trend>,
-    /// By which kernel and noise are to be multiplied.
+    /// Factor by which kernel and noise are multiplied.
     pub factor: f64,
 }
 
-/// An operator on it.
+/// Answers of an operator on a kriged function.
 pub struct OfKriged {
-    /// `[m, k]`; 0 at null queries.
+    /// Answers, `[m, k]`, 0 at null queries.
     pub values: Vec<f64>,
-    /// Standard deviations, likewise.
+    /// Standard deviations, `[m, k]`, 0 at null queries.
     pub deviations: Vec<f64>,
-    /// The queries, ascending, at which little is left of what was found.
+    /// Queries, ascending, whose answers are uncertain.
     pub uncertain: Vec<usize>,
-    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    /// Number of queries where neighbours were left out because they follow from nearer ones to rounding.
     pub n_dependent: usize,
 }
 
-/// `∇_M u` at the queries of a geometry, `[m, d]`, unit V/L.
+/// Computes `∇_M u` at the queries of a geometry, `[m, d]`, unit V/L.
 ///
 /// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no first derivatives; those of [`Moving::at`].
+/// [`NumericsError::DerivativesVary`] where the process has no first derivatives, and the errors of
+/// [`Moving::at`].
 pub fn surface_gradient_of_kriged(
     geometry: &Geometry,
     function: Kriged<'_>,
@@ -51,10 +53,11 @@ pub fn surface_gradient_of_kriged(
     function.with(Operator::SurfaceGradient, geometry, queries, observer)
 }
 
-/// `Δ_M u` at the queries of a geometry, `[m]`, unit V/L².
+/// Computes `Δ_M u` at the queries of a geometry, `[m]`, unit V/L².
 ///
 /// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no second derivatives; those of [`Moving::at`].
+/// [`NumericsError::DerivativesVary`] where the process has no second derivatives, and the errors of
+/// [`Moving::at`].
 pub fn laplace_beltrami_of_kriged(
     geometry: &Geometry,
     function: Kriged<'_>,

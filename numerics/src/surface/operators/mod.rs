@@ -1,8 +1,8 @@
 //! Surface gradient and Laplace–Beltrami operator, applied to values and as matrices.
 //!
-//! The surface comes as a [`Geometry`], the values as an [`Interpolant`]: both may live on different clouds and kernels (the
-//! paper's last remark). As a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B the operator applied
-//! to each kernel translate, by a solve with m right-hand sides.
+//! The surface comes as a [`Geometry`], the values as an [`Interpolant`]. Their clouds and kernels may differ
+//! (the paper's last remark). In a matrix, rows are queries and columns are nodes: `M = B (K + αI)⁻¹` with B
+//! the operator applied to each kernel translate. It takes a solve with m right-hand sides.
 
 mod deviations;
 mod doubts;
@@ -34,10 +34,11 @@ pub use doubts::{JUDGED_FUNCTIONALS, Judged};
 pub use kriged::{Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged};
 pub use stencils::{RowKind, SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
 
-/// `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L; zero at null queries.
+/// Computes `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L. It is zero at null
+/// queries.
 ///
 /// # Errors
-/// Those of [`Interpolant::at`].
+/// Returns the errors of [`Interpolant::at`].
 pub fn surface_gradient(
     geometry: &Geometry,
     interpolant: &Interpolant,
@@ -47,7 +48,7 @@ pub fn surface_gradient(
     Ok(surface_gradient_of(geometry, &interpolant.at(queries, JetOrder::Gradient, observer)?))
 }
 
-/// The same of a function that is known by its jets.
+/// Computes the surface gradient of a function known by its jets, `[m, d]`, unit V/L.
 fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     let d = jets.dimension();
     let mut gradients = vec![0.0; jets.n_queries() * d];
@@ -61,12 +62,13 @@ fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     gradients
 }
 
-/// `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L²; zero at null queries.
+/// Computes `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L².
 ///
-/// Minus before the last term: errata.md, 1. On the unit circle Δ cos θ = −cos θ. Independent of the orientation of ν.
+/// It is zero at null queries. The last term has a minus (errata.md, 1). On the unit circle Δ cos θ = −cos θ.
+/// The result does not depend on the orientation of ν.
 ///
 /// # Errors
-/// Those of [`Interpolant::at`].
+/// Returns the errors of [`Interpolant::at`].
 pub fn laplace_beltrami(
     geometry: &Geometry,
     interpolant: &Interpolant,
@@ -76,7 +78,7 @@ pub fn laplace_beltrami(
     Ok(laplace_beltrami_of(geometry, &interpolant.at(queries, JetOrder::Hessian, observer)?))
 }
 
-/// The same of a function that is known by its jets.
+/// Computes the Laplace–Beltrami operator of a function known by its jets, `[m]`, unit V/L².
 fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     let mut values = vec![0.0; jets.n_queries()];
     for query in regular(geometry) {
@@ -88,7 +90,8 @@ fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     values
 }
 
-/// The matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L; rows of null queries are zero.
+/// Computes the matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L. Rows of null
+/// queries are zero.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
@@ -104,7 +107,8 @@ pub fn surface_gradient_matrices(
     with_mean(matrix, geometry, solver, mean, Operator::SurfaceGradient)
 }
 
-/// The Laplace–Beltrami matrix, `[m, n]`, unit 1/L²; rows of null queries are zero. Not symmetric in general.
+/// Computes the Laplace–Beltrami matrix, `[m, n]`, unit 1/L². Rows of null queries are zero. The matrix is
+/// not symmetric in general.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
@@ -127,7 +131,7 @@ enum Operator {
 }
 
 impl Operator {
-    /// Of the highest derivative.
+    /// Order of the highest derivative.
     fn order(self) -> usize {
         match self {
             Self::SurfaceGradient => 1,
@@ -144,7 +148,10 @@ impl Operator {
     }
 }
 
-/// Fills B, `[components, m, n]` row-major, and solves `Wᵀ` for its rows in place: that buffer is the answer.
+/// Computes the matrix `BW`, `[components, m, n]` row-major, with `W = (K + αI)⁻¹`.
+///
+/// B is filled first. The solve with `Wᵀ` for its rows is in place, so that B and the answer share one
+/// buffer.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
@@ -199,8 +206,10 @@ fn operator_matrix(
     }
 }
 
-/// The matrix `BW` for functions with a mean: with F the mean's functions at the nodes and `LF` the operator on them,
-/// `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`. On constants, and for a linear mean on coordinates, it is the operator itself.
+/// Turns the matrix `BW` into that for functions with a mean, `BW − (BWF − LF)(FᵀWF)⁻¹FᵀW`.
+///
+/// F are the mean's functions at the nodes, and LF is the operator on them. On constants, and for a linear
+/// mean on coordinates, the result is the operator itself.
 fn with_mean(
     mut matrix: Vec<f64>,
     geometry: &Geometry,
@@ -222,7 +231,8 @@ fn with_mean(
     Ok(matrix)
 }
 
-/// An operator on a linear function is its gradient times this, `[d]`: a row of P, or `−tr(Dν)ν`.
+/// Returns the vector `[d]` whose product with the gradient of a linear function is the operator on it: a row
+/// of P, or `−tr(Dν)ν`.
 fn on_coordinates(geometry: &Geometry, operator: Operator, component: usize, query: usize) -> Vec<f64> {
     let normal = geometry.normal(query);
     let entry = |c: usize| match operator {
@@ -232,15 +242,16 @@ fn on_coordinates(geometry: &Geometry, operator: Operator, component: usize, que
     (0..normal.len()).map(entry).collect()
 }
 
-/// Right-hand sides per solve: enough for the solve to run at the speed of matrix products, few enough to notice a
-/// cancellation within a fraction of a second.
+/// Right-hand sides per solve. So many run at the speed of matrix products, and a cancellation is noticed
+/// within a fraction of a second.
 const ROWS_PER_SOLVE: usize = 1024;
 
 fn regular(geometry: &Geometry) -> impl Iterator<Item = usize> {
     (0..geometry.n_queries()).filter(|&query| !geometry.is_null()[query])
 }
 
-/// `tr S² − νᵀS²ν`, S the factors by which a kernel stretches coordinates: d − 1 where it does not.
+/// Returns `tr S² − νᵀS²ν`, S the factors by which a kernel stretches coordinates. It is d − 1 without
+/// stretching.
 fn stretched_trace(kernel: &Kernel, normal: &[f64]) -> f64 {
     if !kernel.is_stretched() {
         return (normal.len() - 1) as f64;
@@ -249,10 +260,15 @@ fn stretched_trace(kernel: &Kernel, normal: &[f64]) -> f64 {
     normal.iter().enumerate().map(across).sum()
 }
 
-/// The operator applied to `k(·, x_j)` for all j, at one query x. With D = x − x_j and a = ν·D:
-/// `P∇k = 2vφ′/ℓ² (D − aν)` and `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+/// A row of B: the operator applied to `k(·, x_j)` for all j, at one query x.
 ///
-/// Where the kernel stretches coordinates by S = diag(s), D is `S²(x − x_j)`, and d − 1 is `tr S² − νᵀS²ν`.
+/// With D = x − x_j and a = ν·D:
+///
+/// - `P∇k = 2vφ′/ℓ² (D − aν)`,
+/// - `Δ_M k = v[4φ″/ℓ⁴ (|D|² − a²) + 2φ′/ℓ² (d − 1 − tr(Dν) a)]`.
+///
+/// Where the kernel stretches coordinates by S = diag(s), D is `S²(x − x_j)`, and `tr S² − νᵀS²ν` takes the
+/// place of d − 1.
 struct Row<'a> {
     nodes: &'a Nodes,
     kernel: &'a Kernel,
@@ -261,7 +277,7 @@ struct Row<'a> {
     component: usize,
     query: usize,
     x: &'a [f64],
-    /// `tr S² − νᵀS²ν`.
+    /// Factor `tr S² − νᵀS²ν`, d − 1 without stretching.
     tangential_trace: f64,
     row: &'a mut [f64],
 }
@@ -294,7 +310,7 @@ struct RowPairs<'a, S> {
 }
 
 impl<S: Simd> RowPairs<'_, S> {
-    /// q and a = ν·D of a pack; `each` sees the entries of D.
+    /// Returns q and a = ν·D of a pack. `each` receives the entries of D.
     #[inline(always)]
     fn along(&self, at: usize, mut each: impl FnMut(usize, Pack<S>)) -> (Pack<S>, Pack<S>) {
         let Row { nodes, kernel, geometry, query, x, .. } = *self.row;
@@ -314,7 +330,7 @@ struct SurfaceGradientPairs<'a, S>(RowPairs<'a, S>);
 impl<S: Simd> Pairs<S> for SurfaceGradientPairs<'_, S> {
     type Others = Pack<S>;
 
-    /// Hands on component c of D − aν.
+    /// Returns q, and component c of D − aν for `take`.
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Pack<S>) {
         let Self(pairs) = self;
@@ -341,7 +357,7 @@ struct LaplaceBeltramiPairs<'a, S>(RowPairs<'a, S>);
 impl<S: Simd> Pairs<S> for LaplaceBeltramiPairs<'_, S> {
     type Others = (Pack<S>, Pack<S>);
 
-    /// Hands on |D|²/ℓ² and a.
+    /// Returns q, and |D|²/ℓ² and a for `take`.
     #[inline(always)]
     fn pack(&mut self, at: usize) -> (Pack<S>, Self::Others) {
         let Row { kernel, .. } = *self.0.row;

@@ -1,20 +1,24 @@
-//! Whether nodes resolve the surface around a query.
+//! A test of whether nodes resolve the surface around a query.
 
 use super::super::degeneracy::Resolution;
 use super::Operator;
 use crate::machine::vector::{dot, norm};
 
-/// Relative error of the test function from which nodes do not resolve the surface.
+/// Relative error on the test function beyond which nodes do not resolve the surface.
 const UNRESOLVED: f64 = 0.1;
 
-/// Curvature of the test function at least, in units of the radius of the nodes: on flat surfaces too weights are to bear a function that
-/// bends.
+/// Least curvature of the test function, times the radius of the nodes. On flat surfaces, too, weights must
+/// handle a function that bends.
 const LEAST_CURVATURE: f64 = 0.3;
 
-/// Tries weights of scaled forms (one for the Laplacian, k for the gradient, `[forms, n]`) on a function whose derivatives are known: the
-/// height of a sphere over its tangent plane, with the largest curvature κ of the surface in units of the radius of the nodes,
-/// `g(t) = (1 − √(1 − κ²|t|²))/κ`, of which the Laplacian at 0 is kκ and the gradient 0. Coordinates along the surface, `[n, k]`,
-/// are exact whatever the curvature.
+/// Tests weights on a function whose derivatives at the query are known.
+///
+/// `forms` are weights over scaled coordinates, `[forms, n]`: one form for the Laplacian, k for the gradient.
+/// Coordinates along the surface, `[n, k]`, are exact whatever the curvature.
+///
+/// The function is the height of a sphere over its tangent plane, `g(t) = (1 − √(1 − κ²|t|²))/κ`. Its
+/// curvature κ is the largest one of the surface times the radius of the nodes. Its Laplacian at 0 is kκ and
+/// its gradient 0.
 pub(super) fn resolution(
     forms: &[f64],
     coordinates: &[f64],
@@ -30,6 +34,6 @@ pub(super) fn resolution(
         Operator::LaplaceBeltrami => (found[0] - k as f64 * curvature, k as f64 * curvature),
         Operator::SurfaceGradient => (norm(&found), 1.0),
     };
-    // Not a number where nodes lie beyond the sphere.
+    // NaN, and so unresolved, where nodes lie beyond the sphere.
     if error.abs() <= UNRESOLVED * scale { Resolution::Resolved } else { Resolution::Unresolved }
 }

@@ -66,7 +66,7 @@ fn matrices_times_values_are_the_operators_applied() {
         let applied = laplace_beltrami(&geometry, &interpolant, &queries, &Unobserved).unwrap();
         let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
         let product: Vec<f64> = matrix.chunks(90).map(|row| dot(row, &values)).collect();
-        // Weights reach Y/α^{1/2}·…: cancellation of the row sums costs up to six digits here.
+        // Weights reach Y/α^{1/2}, so that cancellation in the row sums costs up to six digits here.
         let scale = largest(applied.iter().copied()).max(1.0);
         let error = largest(applied.iter().zip(&product).map(|(a, b)| a - b));
         assert!(error < 1e-7 * scale, "{family:?}: {error:e}");
@@ -144,7 +144,7 @@ fn matrices_with_a_mean_are_the_operators_on_functions_with_one() {
         let u = Interpolant::fit_with_mean(solver.clone(), &values, mean, &Unobserved).unwrap();
         let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
         let applied = laplace_beltrami(&geometry, &u, &queries, &Unobserved).unwrap();
-        // Entries of hundreds add up to numbers of one.
+        // Entries of hundreds add up to numbers of order one.
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
         assert!(near(&times(&matrix, &values), &applied), "{mean:?}");
         assert!(near(&times(&matrix, &[1.0; 120]), &[0.0; 4]), "constants are 0");

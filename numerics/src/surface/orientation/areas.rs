@@ -9,27 +9,29 @@ use crate::machine::vector::{dot, tangent_basis};
 use crate::points::cloud::squared_distance;
 use crate::surface::winding::ball_volume;
 
-/// Reach of the sum over the distance to the last of the neighbours, so that the last ones count.
+/// Reach of the sum over the distance to the last of the neighbours. It exceeds 1 so that the last ones
+/// count.
 const REACH: f64 = 1.2;
 
-/// The weight of a point in its own sum: 1 is right on a lattice, 0 at random points. With ½ both are right
-/// to a tenth.
+/// Weight of a point in its own sum. On a lattice 1 is right, at random points 0. With ½ both are right to a
+/// tenth.
 const OWN: f64 = 0.5;
 
-/// The share of its neighbours that is on the sheet of a point at least: rough normals lose edges on their
+/// Least share of its neighbours that counts as on the sheet of a point. Rough normals lose edges on their
 /// own sheet, and between two sheets half of the neighbours are on the other one.
 const LEAST_SHARE: f64 = 0.5;
 
-/// How much two neighbours may be across the surface, over their distance, and be on one sheet of it. Normals
-/// that are off by 25° each make it 0.8 on a sheet, and areas a third too large where ½ is the bound; with 1 the
-/// areas of two sheets a spacing apart are too small.
+/// Largest offset of two neighbours across the surface, over their distance, for them to be on one sheet. On
+/// a sheet, normals that are off by 25° each make it 0.8. With a bound of ½ areas would then be a third too
+/// large. With a bound of 1 the areas of two sheets a spacing apart are too small.
 const ON_SHEET: f64 = 0.8;
 
-/// How far a cell may reach over the distance to the last of the neighbours.
+/// Reach of a cell over the distance to the last of the neighbours.
 const REACH_OF_CELL: f64 = 0.75;
 
-/// Areas in units of radius^{d−1}, `[n]`, from the neighbours of each point on its sheet; `normals` are
-/// `[n, d]`.
+/// Computes areas in units of radius^{d−1}, `[n]`, from the neighbours of each point on its sheet.
+///
+/// `normals` are `[n, d]`.
 pub(super) fn areas(sampled: &Sampled<'_>, normals: &[f64], edges: &[Edge], radius: f64) -> Vec<f64> {
     let area = |point: usize| {
         let place = Place { sampled, normals, point, own: edges_of(edges, point) };
@@ -51,8 +53,9 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// The area of the cell of the point among its neighbours on the sheet, which are as far from it in the
-    /// tangent plane as in space.
+    /// Computes the area of the cell of the point among its neighbours on the sheet.
+    ///
+    /// In the tangent plane the neighbours are as far from the point as in space.
     fn cell(&self, radius: f64) -> f64 {
         let (cloud, d) = (self.sampled.cloud, self.sampled.cloud.dimension());
         let around = self.sampled.around.around(self.point);
@@ -72,7 +75,7 @@ impl Place<'_> {
                 |row: &[f64]| -> f64 { row.iter().zip(x).zip(y).map(|((t, x), y)| t * (y - x)).sum() };
             let [u, v] = [along(&basis[..d]), along(&basis[d..])];
             let length = u.hypot(v);
-            // One straight above, of a point without a normal, has no direction in the plane.
+            // A neighbour straight above, of a point without a normal, has no direction in the plane.
             if length > 0.0 {
                 let stretch = found.squared_distance.sqrt() / length / reach;
                 cell.cut([u * stretch, v * stretch]);
@@ -81,7 +84,7 @@ impl Place<'_> {
         cell.area() * (reach / radius).powi(2)
     }
 
-    /// `V_{d−1} R^{d−1} 2/(d+1) / Σ (1 − |y − x|²/R²)`: the integral of the summand over its sum.
+    /// Computes `V_{d−1} R^{d−1} 2/(d+1) / Σ (1 − |y − x|²/R²)`: the integral of the summand over its sum.
     fn area(&self, radius: f64) -> f64 {
         let (cloud, k) = (self.sampled.cloud, self.sampled.cloud.dimension() - 1);
         let around = self.sampled.around.around(self.point).iter().take(n_neighbours(cloud) + 1);
@@ -100,7 +103,8 @@ impl Place<'_> {
         ball_volume(k) * 2.0 / (k + 2) as f64 * (squared_reach.sqrt() / radius).powi(k as i32) / sum
     }
 
-    /// Half the way to the next points of the curve on both sides; twice the half on one side at an end.
+    /// Computes half the way to the next points of the curve on both sides. At an end the half on one side
+    /// counts twice.
     fn length(&self) -> f64 {
         let x = self.sampled.cloud.point(self.point);
         let step = |edge: &Edge| -> [f64; 2] {
@@ -129,7 +133,7 @@ mod tests {
     use crate::points::sampling::Sampling;
     use crate::testing::{Random, fibonacci_sphere};
 
-    /// Areas on the unit sphere, and on one around it that is so far away.
+    /// Returns areas on the unit sphere, and on a sphere around it at this distance.
     fn areas_of_shells(distance: f64, roughness: f64) -> Vec<f64> {
         let (inner, mut random) = (fibonacci_sphere(1000), Random(3));
         let outer = inner.coordinates().iter().map(|c| c * (1.0 + distance));
@@ -148,7 +152,7 @@ mod tests {
 
     #[test]
     fn areas_are_those_of_the_sphere_with_another_one_near_and_rough_normals() {
-        // Points are 0.11 apart; roughness of 0.2 is 11° in each direction.
+        // Points are 0.11 apart. A roughness of 0.2 is 11° in each direction.
         for (distance, roughness, tolerance) in [(1.0, 0.0, 0.02), (0.15, 0.0, 0.02), (0.15, 0.2, 0.1)] {
             let sum: f64 = areas_of_shells(distance, roughness)[..1000].iter().sum();
             assert!((sum / (4.0 * PI) - 1.0).abs() < tolerance, "{distance} {roughness}: {sum}");

@@ -1,12 +1,12 @@
-//! The cell of a point in its tangent plane: what is nearer to it than to its neighbours (Voronoi).
+//! The Voronoi cell of a point in its tangent plane: the region that is nearer to it than to its neighbours.
 
 use smallvec::SmallVec;
 
-/// A point of the plane about the point whose cell it is.
+/// A position in the plane, relative to the point whose cell it is.
 pub(super) type Planar = [f64; 2];
 
-/// Corners of the polygon that a cell is cut from: at a rim, where neighbours do not close it, it is what
-/// remains of the cell.
+/// Corners of the polygon that a cell is cut from. At a rim, where neighbours do not close the cell, the
+/// polygon does.
 const N_CORNERS: usize = 8;
 
 /// A convex polygon about the origin.
@@ -15,7 +15,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// A regular polygon with its corners so far from the origin.
+    /// Returns a regular polygon with its corners at this distance from the origin.
     pub(super) fn within(radius: f64) -> Self {
         let corner = |i: usize| {
             let angle = std::f64::consts::TAU * i as f64 / N_CORNERS as f64;
@@ -24,7 +24,7 @@ impl Cell {
         Self { corners: (0..N_CORNERS).map(corner).collect() }
     }
 
-    /// Leaves what is nearer to the origin than to a neighbour.
+    /// Cuts off what is nearer to a neighbour than to the origin.
     pub(super) fn cut(&mut self, neighbour: Planar) {
         let [x, y] = neighbour;
         let beyond = |corner: &Planar| corner[0] * x + corner[1] * y - 0.5 * (x * x + y * y);

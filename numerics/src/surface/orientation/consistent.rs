@@ -1,4 +1,4 @@
-//! The steps from directions to signs.
+//! Consistent signs for the normals of a cloud.
 
 use super::edges::{Edge, contradiction, join_borders, sheet_edges};
 use super::field::Field;
@@ -11,14 +11,14 @@ use crate::error::NumericsError;
 /// Cosine of neighbouring normals above which they belong to one region.
 const SAME_REGION: f64 = 0.7;
 
-/// Mean weight of the pairs of neighbours below which a cloud does not resolve its surface: normals turn by
-/// as much as they please from point to point, what seems a flip is the surface, and nothing is repaired. The
-/// bunny with 1 % of noise has 0.3, a torus of 24 points 0.06.
+/// Least mean weight of pairs of neighbours in a cloud that resolves its surface. Below it normals turn at
+/// will from point to point, what seems a flip is the surface, and nothing is repaired. The bunny with 1 % of
+/// noise has 0.3, a torus of 24 points 0.06.
 const RESOLVED: f64 = 0.2;
 
-/// Share of the edges of a piece, by weight, that gradients may contradict for their volume to count: on
-/// separate surfaces that nearly touch it is 0.0002 to 0.005, on noisy ones whose gradients are wrong 0.04
-/// and more, and those enclose more than the truth.
+/// Share of the edges of a piece, by weight, that gradients may contradict for their volume to count. On
+/// separate surfaces that nearly touch it is 0.0002 to 0.005. On noisy surfaces whose gradients are wrong it
+/// is 0.04 and more, and those enclose more than the truth.
 const LOCAL_CONTRADICTION: f64 = 0.02;
 
 /// Share of the edges, by weight, that may contradict repaired signs.
@@ -28,17 +28,17 @@ const CONTRADICTION: f64 = 0.1;
 #[derive(Debug, PartialEq)]
 pub(super) struct Signs {
     pub signs: Vec<f64>,
-    /// Points whose gradient pointed the other way.
+    /// Number of points whose normal along the gradient pointed the other way.
     pub n_flipped: usize,
-    /// Whether a connected piece has a rim, so that it has no outside.
+    /// True if a connected piece has a rim, so that it has no outside.
     pub is_open: bool,
-    /// Whether neighbours have so much to do with one another that their signs can be compared.
+    /// True if normals of neighbours agree so well as lines that their signs can be compared.
     pub is_resolved: bool,
-    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    /// True where the evidence for the side of a point is contradictory, `[n]`.
     pub is_ambiguous: Vec<bool>,
 }
 
-/// Makes the signs of normals consistent; those that are given stay as they are.
+/// Makes the signs of normals consistent. Winding numbers turn nothing where normals are given.
 pub(super) fn consistent_signs(
     sampled: &Sampled<'_>,
     directions: &Directions,
@@ -50,7 +50,7 @@ pub(super) fn consistent_signs(
     join_borders(&mut forest, &edges);
     let mut is_at_rim = directions.is_at_rim.clone();
     for edge in gaps::join_across(sampled, &directions.normals, &mut forest)? {
-        // What looked like the end of a piece is none.
+        // The end of a piece at a gap is no end of the surface.
         is_at_rim[edge.a] = false;
         edges.push(edge);
     }
@@ -75,7 +75,7 @@ pub(super) fn consistent_signs(
     Ok(Signs { signs, n_flipped, is_open: has_rim.contains(&true), is_resolved, is_ambiguous })
 }
 
-/// Points whose signs agree with those of their neighbours, joined.
+/// Joins neighbouring points whose signs agree.
 fn regions(edges: &[Edge], directions: &Directions, n: usize) -> SignedForest {
     let mut forest = SignedForest::new(n);
     for edge in edges {
@@ -98,7 +98,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// The signs of points by those of each piece by itself, and whether each piece has a rim.
+    /// Chooses the signs of points, for each piece by itself. Also returns whether each piece has a rim.
     fn signs_by_piece(&self, edges: &[Edge]) -> (Vec<f64>, Vec<bool>) {
         let has_sign = &self.directions.has_sign;
         let raw = self.contradictions(edges);
@@ -121,14 +121,15 @@ impl Scene<'_> {
         (signs, has_rims)
     }
 
-    /// Boxes around the pieces that have a hundredth of the points or more: a hundred at most.
+    /// Returns boxes around the pieces that have a hundredth of the points or more: a hundred boxes at most.
     fn boxes_of_large(&self) -> Vec<(usize, Bounds)> {
         let (cloud, members) = (self.sampled.cloud, &self.pieces.members);
         let large = (0..members.len()).filter(|&piece| 100 * members[piece].len() >= cloud.n_points());
         large.map(|piece| (piece, Bounds::of(cloud, &members[piece]))).collect()
     }
 
-    /// [`contradiction`] of the gradients by themselves, in each piece; 0 where there are none.
+    /// Returns the [`contradiction`] of the gradients by themselves, in each piece. It is 0 where there are
+    /// none.
     fn contradictions(&self, edges: &[Edge]) -> Vec<f64> {
         let has_sign = &self.directions.has_sign;
         let mut opposite = vec![0.0; self.pieces.members.len()];

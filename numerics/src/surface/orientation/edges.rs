@@ -1,4 +1,4 @@
-//! Neighbouring points on one sheet of the surface, and what their normals say of one another.
+//! Edges between neighbouring points on one sheet of the surface, and how their normals agree.
 
 use rayon::prelude::*;
 
@@ -14,17 +14,17 @@ const LEAST_WEIGHT: f64 = 0.01;
 pub(super) struct Edge {
     pub a: usize,
     pub b: usize,
-    /// Of their normals.
+    /// Cosine of the angle between the two normals.
     pub cosine: f64,
-    /// 0 to 1: how surely the surface leads from one to the other.
+    /// Certainty, 0 to 1, that the surface leads from one point to the other.
     pub weight: f64,
 }
 
 impl Edge {
-    /// What leads from one point to another, up to the sign of the normals; a weight of 0 or less says that
-    /// they are on different sheets.
+    /// Returns the edge from one point to another, up to the sign of the normals.
     ///
-    /// On one sheet `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b` for consistent normals; two sheets at a distance t have
+    /// A weight of 0 or less says that the points are on different sheets. With D the step from a to b,
+    /// consistent normals on one sheet have `D·ν_a ≈ −κ|D|²/2 ≈ −D·ν_b`. Two sheets at a distance t have
     /// `D·ν_a ≈ D·ν_b ≈ t`.
     pub(super) fn between(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> Self {
         let cosine = cosine(cloud, normals, a, b);
@@ -32,13 +32,13 @@ impl Edge {
         Self { a, b, cosine, weight }
     }
 
-    /// The weight, negative where normals with these signs are opposite.
+    /// Returns the weight, negative where normals with these signs are opposite.
     pub(super) fn agreement(&self, signs: &[f64]) -> f64 {
         self.weight * (signs[self.a] * signs[self.b] * self.cosine).signum()
     }
 }
 
-/// `|D·ν_a ± D·ν_b| / |D|` of two points, with the sign that their normals have in common: 0 on a sphere.
+/// Returns `|D·ν_a ± D·ν_b| / |D|` of two points, with the sign of `ν_a·ν_b`. It is 0 on a sphere.
 pub(super) fn across(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
     let d = cloud.dimension();
     let (x, y) = (cloud.point(a), cloud.point(b));
@@ -53,8 +53,10 @@ fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
     dot(&normals[a * d..][..d], &normals[b * d..][..d])
 }
 
-/// Neighbouring points between which the surface bends like a sphere, up to the sign of the normals; by their
-/// first point.
+/// Returns the edges between neighbouring points where the surface bends like a sphere, ordered by first
+/// point.
+///
+/// The sign of the normals does not matter.
 pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
     let cloud = sampled.cloud;
     let edges_of = |a: usize| {
@@ -67,14 +69,14 @@ pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
     (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
 }
 
-/// The edges of a point, of edges that are by their first points.
+/// Returns the edges of a point. `edges` are ordered by first point.
 pub(super) fn edges_of(edges: &[Edge], point: usize) -> &[Edge] {
     let start = edges.partition_point(|edge| edge.a < point);
     let rest = &edges[start..];
     &rest[..rest.partition_point(|edge| edge.a == point)]
 }
 
-/// Means of values `[n]` over each point and its neighbours on the sheet, `[n]`.
+/// Returns means of values `[n]` over each point and its neighbours on the sheet, `[n]`.
 pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
     let mut means = values.to_vec();
     let mut counts = vec![1.0; values.len()];
@@ -86,21 +88,21 @@ pub(super) fn averaged(edges: &[Edge], values: &[f64]) -> Vec<f64> {
     means
 }
 
-/// The share of the edges, by weight, across which normals with these signs are opposite.
+/// Returns the share of the edges, by weight, across which normals with these signs are opposite.
 pub(super) fn contradiction(edges: &[Edge], signs: &[f64]) -> f64 {
     let total: f64 = edges.iter().map(|edge| edge.weight).sum();
     let opposite: f64 = edges.iter().map(|edge| edge.agreement(signs).min(0.0).abs()).sum();
     if total == 0.0 { 0.0 } else { opposite / total }
 }
 
-/// Two sets with the sign that most of their common edges give them, relative to one another.
+/// Two sets, with the vote of their common edges for the sign relative to one another.
 struct Border {
     a: usize,
     b: usize,
     vote: f64,
 }
 
-/// Joins sets of a forest by what most of their common edges say, surest first.
+/// Joins sets of a forest by the vote of their common edges, surest first.
 pub(super) fn join_borders(forest: &mut SignedForest, edges: &[Edge]) {
     for border in borders(forest, edges) {
         forest.join(border.a, border.b, border.vote.signum());
@@ -117,12 +119,12 @@ fn borders(forest: &mut SignedForest, edges: &[Edge]) -> Vec<Border> {
             votes.push(Border { a: a.root.min(b.root), b: a.root.max(b.root), vote });
         }
     }
-    // A stable sort: votes of a border are added in the order of the edges.
+    // The sort is stable, so that votes of a border are added in the order of the edges.
     votes.sort_by_key(|border| (border.a, border.b));
     let same = |p: &Border, q: &Border| (p.a, p.b) == (q.a, q.b);
     let total = |chunk: &[Border]| Border { vote: chunk.iter().map(|border| border.vote).sum(), ..chunk[0] };
     let mut borders: Vec<Border> = votes.chunk_by(same).map(total).collect();
-    // By index where votes tie.
+    // Ties are ordered by index.
     borders.sort_by(|p, q| q.vote.abs().total_cmp(&p.vote.abs()).then((p.a, p.b).cmp(&(q.a, q.b))));
     borders
 }

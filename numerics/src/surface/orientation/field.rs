@@ -1,4 +1,4 @@
-//! The oriented points of a cloud as a surface that winds around places.
+//! The oriented points of a cloud as a surface with winding numbers.
 
 use rayon::prelude::*;
 
@@ -10,11 +10,11 @@ use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::surface::winding::Dipoles;
 
-/// Points with their areas and normals, in units of the radius of the cloud: powers of distances stay inside
-/// float64.
+/// Points with their areas and normals, in units of the radius of the cloud. So powers of distances stay
+/// inside float64.
 pub(super) struct Field<'a> {
     pub cloud: Cloud,
-    /// `[n]`
+    /// Areas that the points stand for, `[n]`.
     pub areas: Vec<f64>,
     /// Unit vectors or zero, `[n, d]`.
     pub normals: &'a [f64],
@@ -22,7 +22,7 @@ pub(super) struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The field of some normals; `None` for a cloud of one position.
+    /// Returns the field of some normals, or `None` for a cloud of one position.
     pub(super) fn of(sampled: &Sampled<'a>, normals: &'a [f64], edges: &[Edge]) -> Option<Self> {
         let (radius, d) = (sampled.cloud.radius(), sampled.cloud.dimension());
         if radius == 0.0 {
@@ -43,14 +43,14 @@ impl<'a> Field<'a> {
         &self.normals[point * d..][..d]
     }
 
-    /// Area times normal for normals multiplied with these signs, `[n, d]`.
+    /// Returns area times normal for normals multiplied with these signs, `[n, d]`.
     pub(super) fn moments(&self, signs: &[f64]) -> Vec<f64> {
         let factors = signs.iter().zip(&self.areas).map(|(sign, area)| sign * area);
         let rows = factors.zip(self.normals.chunks_exact(self.cloud.dimension()));
         rows.flat_map(|(factor, normal)| normal.iter().map(move |c| factor * c)).collect()
     }
 
-    /// w − ½ at the points, `[n]`, for normals multiplied with these signs.
+    /// Computes w − ½ at the points, `[n]`, for normals multiplied with these signs.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -64,9 +64,10 @@ impl<'a> Field<'a> {
         all.into_par_iter().map(misfit).collect()
     }
 
-    /// How much the side of each point is to blame for these misfits of others, `[n]`: what the sum of their
-    /// squares loses, per area, if the normal is turned. With the misfits m_x that is
-    /// `−ν_y·Σ_x a_x m_x (x − y)/(|S^{d−1}| |x − y|^d)`.
+    /// Computes how much the side of each point is to blame for misfits at other points, `[n]`.
+    ///
+    /// Blame is what the sum of squared misfits loses, per area, if the normal is turned. With the misfits
+    /// m_x it is `−ν_y·Σ_x a_x m_x (x − y)/(|S^{d−1}| |x − y|^d)`.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].

@@ -7,11 +7,11 @@ pub(super) struct SignedForest {
     sizes: Vec<usize>,
 }
 
-/// Where a member of a forest is.
+/// The place of a member in a forest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Found {
     pub root: usize,
-    /// Relative to the root, +1 or −1.
+    /// Sign relative to the root, +1 or −1.
     pub sign: f64,
 }
 
@@ -20,8 +20,9 @@ impl SignedForest {
         Self { parents: (0..n).collect(), signs: vec![1.0; n], sizes: vec![1; n] }
     }
 
-    /// The root of a member and the sign relative to it. Depth is logarithmic, since smaller sets join larger
-    /// ones.
+    /// Finds the root of a member and the sign relative to it.
+    ///
+    /// Depth is logarithmic, because smaller sets join larger ones.
     pub(super) fn find(&mut self, member: usize) -> Found {
         let (mut root, mut sign) = (member, 1.0);
         while self.parents[root] != root {
@@ -32,18 +33,18 @@ impl SignedForest {
         Found { root, sign }
     }
 
-    /// [`SignedForest::find`] of every member.
+    /// Finds the root and sign of every member.
     pub(super) fn find_all(&mut self) -> Vec<Found> {
         (0..self.parents.len()).map(|member| self.find(member)).collect()
     }
 
-    /// Members of the set with this root.
+    /// Returns how many members the set with this root has.
     pub(super) fn size(&self, root: usize) -> usize {
         self.sizes[root]
     }
 
-    /// Joins the sets of two members that have this sign relative to one another; members of one set keep
-    /// theirs.
+    /// Joins the sets of two members that have this sign relative to one another. Members of one set keep
+    /// their signs.
     pub(super) fn join(&mut self, a: usize, b: usize, sign: f64) {
         let (mut a, mut b) = (self.find(a), self.find(b));
         if a.root == b.root {

@@ -1,7 +1,7 @@
 //! Pieces of a surface joined across the gaps between them, along the shortest edges of the cloud.
 //!
-//! A random curve has gaps over which the nearest neighbours of both ends do not reach: of 6,000 points two
-//! dozen.
+//! A random curve has gaps that the nearest neighbours of both ends do not reach across: two dozen of them
+//! among 6,000 points.
 
 use rayon::prelude::*;
 
@@ -11,13 +11,13 @@ use super::forest::{Found, SignedForest};
 use crate::error::NumericsError;
 use crate::points::neighbours::Neighbour;
 
-/// Positions around a point among which those of other pieces are looked for.
+/// Positions around a point among which points of other pieces are looked for.
 const REACH: usize = 32;
 
-/// Shortest edges between two pieces that vote, as far as they are not longer than twice the shortest one.
+/// Shortest edges between two pieces that vote at most. None is longer than twice the shortest one.
 const N_VOTES: usize = 6;
 
-/// Mean weight of the votes from which two pieces are one.
+/// Mean weight of the votes from which two pieces are joined.
 const SURE: f64 = 0.3;
 
 /// A short way from one piece to another.
@@ -30,8 +30,8 @@ struct Gap {
     squared_length: f64,
 }
 
-/// Joins pieces where a surface seems to go on across a gap, shortest first, and returns an edge across each
-/// gap, in both directions.
+/// Joins pieces where a surface seems to go on across a gap, shortest first. Returns an edge across each gap,
+/// in both directions.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -63,13 +63,13 @@ pub(super) fn join_across(
     Ok(bridges.iter().flat_map(both).filter(|edge| edge.weight > 0.0).collect())
 }
 
-/// The gap between two pieces that are one, and their sign relative to one another.
+/// The gap between two pieces that are joined, and their sign relative to one another.
 struct Bridge {
     gap: Gap,
     sign: f64,
 }
 
-/// What the shortest ways between two pieces, shortest first, say of them.
+/// Returns the bridge between two pieces if the shortest ways between them agree. `gaps` are shortest first.
 fn bridge(sampled: &Sampled<'_>, normals: &[f64], found: &[Found], gaps: &[Gap]) -> Option<Bridge> {
     let shortest = *gaps.first()?;
     let near = gaps.iter().take(N_VOTES).filter(|gap| gap.squared_length <= 4.0 * shortest.squared_length);
@@ -82,7 +82,7 @@ fn bridge(sampled: &Sampled<'_>, normals: &[f64], found: &[Found], gaps: &[Gap])
     (vote.abs() > SURE * count).then(|| Bridge { gap: shortest, sign: vote.signum() })
 }
 
-/// Ways from the points of every piece but the largest to the nearest points of other pieces.
+/// Finds ways from the points of every piece but the largest to the nearest points of other pieces.
 fn gaps(sampled: &Sampled<'_>, forest: &SignedForest, found: &[Found]) -> Result<Vec<Gap>, NumericsError> {
     let roots = (0..found.len()).filter(|&point| found[point].root == point);
     let Some(largest) = roots.max_by_key(|&root| (forest.size(root), usize::MAX - root)) else {

@@ -1,9 +1,9 @@
 //! Signs of parts of a surface by Gauss's formula: the winding number is ½ on a closed surface itself.
 //!
-//! `W s = ½`, W[x, j] what part j with its present signs contributes at x, over a sample of points x. Solved
-//! for real s by least squares with a ridge towards the present signs, s = 1, and rounded; then parts are
-//! turned one by one as long as that brings the sums nearer to ½. Edges between parts are springs that hold
-//! their signs together.
+//! The problem is `W s = ½` over a sample of points x, where W[x, j] is what part j with its present signs
+//! contributes at x. It is solved for real s by least squares with a ridge towards the present signs, s = 1,
+//! and rounded. Then parts are turned one by one as long as that brings the sums nearer to ½. Edges between
+//! parts are springs that hold their signs together.
 
 use rayon::prelude::*;
 
@@ -14,50 +14,51 @@ use crate::error::NumericsError;
 use crate::points::sampling::median;
 use crate::surface::winding::Dipoles;
 
-/// Parts whose signs are unknown at most; others keep theirs.
+/// Most parts whose signs are unknown. Other parts keep their signs.
 const MAX_UNKNOWN: usize = 150;
 
-/// Points in the sample, for all parts together, and for each of them at least.
+/// Points in the sample for all parts together, and least number of points for each part.
 const N_SAMPLES: usize = 800;
 const LEAST_SAMPLES: usize = 8;
 
 /// Weight of the present signs, per point of the sample.
 const RIDGE: f64 = 1e-3;
 
-/// Weight of an edge between two parts against a point of the sample.
+/// Weight of an edge between two parts, relative to a point of the sample.
 const SPRING: f64 = 0.05;
 
-/// What the sum of squares must lose for a single part to be turned: a twentieth of a point on the wrong
+/// Least decrease of the sum of squares for a single part to be turned: a twentieth of a point on the wrong
 /// side.
 const LEAST_GAIN: f64 = 0.05;
 
-/// Change of w from which a point of the sample is a witness, and the number of witnesses that are heard.
+/// Change of w from which a point of the sample is a witness, and the least number of witnesses.
 const WITNESS: f64 = 0.2;
 const LEAST_WITNESSES: usize = 3;
 
-/// The part of the squares of witnesses that may remain: signs that fit what is random in the winding numbers of a
-/// thin body leave more.
+/// Largest part of the squares of witnesses that may remain for new signs to be clearly better. Signs that
+/// fit what is random in the winding numbers of a thin body leave more.
 const CLEARLY: f64 = 0.3;
 
-/// The part of the squares of its witnesses from which the sign of a single part is unclear.
+/// Remaining part of the squares of its witnesses from which the sign of a single part is unclear.
 const UNCLEAR: f64 = 0.5;
 
-/// `W s = b` for the signs of some parts against their present ones, b = ½ less what all other points
-/// contribute.
+/// The problem `W s = b` for the signs of some parts relative to their present ones.
+///
+/// The right-hand side b is ½ less what all other points contribute.
 pub(super) struct Problem {
     unknown: Vec<usize>,
     /// W, `[rows, unknown]`.
     matrix: Vec<f64>,
     right: Vec<f64>,
-    /// The unknown part on which each row is.
+    /// Index of the unknown part that the point of each row is on.
     on: Vec<usize>,
-    /// Springs between the unknown parts, `[unknown, unknown]`; negative where edges contradict the present
+    /// Springs between the unknown parts, `[unknown, unknown]`, negative where edges contradict the present
     /// signs.
     springs: Vec<f64>,
 }
 
 impl Problem {
-    /// The problem of these parts, or of as many of them as can be asked, the first ones.
+    /// Sets up the problem of these parts, or of the first ones if there are too many.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -90,7 +91,7 @@ impl Problem {
         Ok(Self { unknown, matrix: rows.concat(), right, on, springs })
     }
 
-    /// With springs where edges lead from one part to another.
+    /// Adds springs where edges lead from one part to another.
     pub(super) fn with_springs(mut self, parts: &Parts, edges: &[Edge], signs: &[f64]) -> Self {
         let m = self.unknown.len();
         let mut place = vec![usize::MAX; parts.members.len()];
@@ -106,8 +107,10 @@ impl Problem {
         self
     }
 
-    /// The parts that point to the wrong side, if turning them clearly brings the winding numbers nearer to
-    /// ½: those on which the median of |w − ½| becomes at most so much.
+    /// Finds the parts that point to the wrong side, if turning them clearly brings the winding numbers
+    /// nearer to ½.
+    ///
+    /// Parts are returned only if the median of |w − ½| on them becomes `at_most` or less.
     pub(super) fn turned(&self, at_most: f64) -> Vec<usize> {
         let present = vec![1.0; self.unknown.len()];
         let mut found: Vec<f64> =
@@ -124,7 +127,7 @@ impl Problem {
         (0..best.len()).filter(is_turned).map(|at| self.unknown[at]).collect()
     }
 
-    /// Whether the sign of a part was asked for.
+    /// Returns whether the sign of a part was asked for.
     pub(super) fn asks_for(&self, part: usize) -> bool {
         self.unknown.contains(&part)
     }
@@ -133,23 +136,24 @@ impl Problem {
         self.matrix.chunks_exact(self.unknown.len().max(1))
     }
 
-    /// b − W s, row by row.
+    /// Returns b − W s, row by row.
     fn residual(&self, signs: &[f64]) -> Vec<f64> {
         let product = |row: &[f64]| row.iter().zip(signs).map(|(w, s)| w * s).sum::<f64>();
         self.rows().zip(&self.right).map(|(row, b)| b - product(row)).collect()
     }
 
-    /// The sum of squares of the residual, none of which counts for more than a wrong side.
+    /// Returns the sum of squares of the residual. No square counts for more than a wrong side.
     fn misfit(&self, signs: &[f64]) -> f64 {
         self.residual(signs).iter().map(|r| (r * r).min(1.0)).sum()
     }
 
-    /// Whether the rows that see a difference between two choices of signs are clearly for the first one.
+    /// Returns whether the rows that see a difference between two choices of signs are clearly for the first
+    /// one.
     fn is_clearly_better(&self, signs: &[f64], present: &[f64]) -> bool {
         remaining(&self.residual(signs), &self.residual(present)).is_some_and(|part| part <= CLEARLY)
     }
 
-    /// The parts whose signs are not clearly better than the opposite ones, once some are turned.
+    /// Finds the parts whose signs are not clearly better than the opposite ones, once some are turned.
     pub(super) fn unclear(&self, turned: &[usize]) -> Vec<usize> {
         let sign = |part: &usize| if turned.contains(part) { -1.0 } else { 1.0 };
         let signs: Vec<f64> = self.unknown.iter().map(sign).collect();
@@ -161,14 +165,14 @@ impl Problem {
         (0..signs.len()).filter(is_unclear).map(|at| self.unknown[at]).collect()
     }
 
-    /// The median magnitude of the residual on each part.
+    /// Returns the median magnitude of the residual on each part.
     fn median_misfits(&self, signs: &[f64]) -> Vec<f64> {
         let mut on_parts = vec![Vec::new(); self.unknown.len()];
         self.residual(signs).iter().zip(&self.on).for_each(|(r, &on)| on_parts[on].push(r.abs()));
         on_parts.into_iter().map(|misfits| median(misfits).unwrap_or(f64::INFINITY)).collect()
     }
 
-    /// Turns parts one by one while that lowers the sum of squares; eight rounds have always been enough.
+    /// Turns parts one by one while that lowers the sum of squares. Eight rounds have always been enough.
     fn descend(&self, signs: &mut [f64]) {
         let mut residual = self.residual(signs);
         for _ in 0..8 {
@@ -189,14 +193,14 @@ impl Problem {
         }
     }
 
-    /// What the springs of a part take if it is turned: `4 Σ_q c_pq s_p s_q`.
+    /// Returns the energy that the springs of a part take up if it is turned: `4 Σ_q c_pq s_p s_q`.
     fn tension(&self, part: usize, signs: &[f64]) -> f64 {
         let springs = &self.springs[part * signs.len()..][..signs.len()];
         4.0 * signs[part] * springs.iter().zip(signs).map(|(spring, s)| spring * s).sum::<f64>()
     }
 
-    /// Minimises `|W s − b|² + Σ_{p<q} |c_pq| (s_p ∓ s_q)² + ridge |s − 1|²` by Cholesky's factorization of
-    /// its normal equations.
+    /// Minimises `|W s − b|² + Σ_{p<q} |c_pq| (s_p ∓ s_q)² + ridge |s − 1|²` by Cholesky factorization of its
+    /// normal equations.
     fn least_squares(&self) -> Vec<f64> {
         let m = self.unknown.len();
         let ridge = RIDGE * self.right.len() as f64;
@@ -215,8 +219,9 @@ impl Problem {
     }
 }
 
-/// The part of the squares of residuals that remains of those before, on the witnesses of the difference; none of
-/// them counts for more than a wrong side.
+/// Returns the sum of squared residuals after a change over that before it, on the witnesses of the change.
+///
+/// No square counts for more than a wrong side. `None` if there are too few witnesses.
 fn remaining(after: &[f64], before: &[f64]) -> Option<f64> {
     let witnesses = after.iter().zip(before).filter(|(a, b)| (*a - *b).abs() > WITNESS);
     let (mut sum_after, mut sum_before, mut count) = (0.0, 0.0, 0);
@@ -234,7 +239,7 @@ struct Sample {
     on: usize,
 }
 
-/// Points of each unknown part, spread over its list.
+/// Samples points of each unknown part, spread over its list.
 fn samples(parts: &Parts, unknown: &[usize]) -> Vec<Sample> {
     let total: usize = unknown.iter().map(|&part| parts.members[part].len()).sum();
     let of_part = |(on, &part): (usize, &usize)| {

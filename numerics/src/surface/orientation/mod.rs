@@ -1,17 +1,20 @@
 //! Signs of normals over a whole cloud: checked against the neighbours, and repaired.
 //!
-//! The gradient of the signature function points out of a closed surface while ℓ is not small against its
-//! features; for a small ℓ its sign follows the mean curvature and flips where that changes sign (errata.md,
-//! 13). Across such a flip the normals of neighbours are opposite although the surface goes on. Therefore:
+//! Minus the gradient of the signature function points out of a closed surface while ℓ is not small against
+//! its features. For a small ℓ its sign follows the mean curvature and flips where that changes sign
+//! (errata.md, 13). Across such a flip the normals of neighbours are opposite although the surface goes on.
+//! Signs are repaired in four steps:
 //!
-//! 1. Points whose signs agree are joined to regions, regions by what their common border says (`edges`), and
-//!    pieces across the gaps between them along the shortest edges of the cloud (`gaps`). Propagation over a
-//!    neighbour graph is that of Hoppe et al. (1992); joining whole regions keeps a single bad edge from deciding.
-//! 2. Each piece gets the sign of most of its gradients or, if they disagree and the piece is closed, or it is
-//!    bulky, the sign that gives it a positive volume (`pieces`).
-//! 3. Pieces are turned where winding numbers, which are ½ on a closed surface, clearly contradict: a linear
-//!    problem that sees all of them together (`gauss`). So are parts of a piece that they contradict (`turns`).
-//! 4. Points whose winding numbers or neighbours still contradict have an ambiguous side.
+//! 1. Points whose signs agree are joined to regions. Regions are joined to pieces by what their common
+//!    border says (`edges`). Pieces are joined across the gaps between them along the shortest edges of the
+//!    cloud (`gaps`). Propagation over a neighbour graph is that of Hoppe et al. (1992). Joining whole
+//!    regions keeps a single bad edge from deciding.
+//! 2. Each piece gets the sign of most of its gradients. If these disagree and the piece is closed, or if it
+//!    is bulky, it gets the sign that gives it a positive volume (`pieces`).
+//! 3. Pieces are turned where winding numbers, which are ½ on a closed surface, clearly contradict them. This
+//!    is a linear problem that sees all pieces together (`gauss`). Parts of a piece are turned likewise
+//!    (`turns`).
+//! 4. Points whose winding numbers or neighbours still contradict their side are marked as ambiguous.
 
 mod areas;
 mod cell;
@@ -37,7 +40,7 @@ use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::sampling::Sampling;
 use consistent::consistent_signs;
 
-/// A cloud with what is known of how it is sampled, and who watches.
+/// A cloud with its sampling, its neighbourhoods and an observer.
 #[derive(Clone, Copy)]
 pub(crate) struct Sampled<'a> {
     pub cloud: &'a Cloud,
@@ -47,18 +50,20 @@ pub(crate) struct Sampled<'a> {
     pub observer: &'a dyn Observer,
 }
 
-/// What is known of normals before their signs are made consistent.
+/// Normals before their signs are made consistent.
 pub(crate) struct Directions {
     /// Unit vectors at the points, `[n, d]`: outward where that is known, of unknown sign elsewhere, or zero.
     pub normals: Vec<f64>,
-    /// Whether the sign means something, `[n]`.
+    /// True where the sign of the normal means something, `[n]`.
     pub has_sign: Vec<bool>,
-    /// Whether the point is at the rim of an open surface, `[n]`.
+    /// True at the rim of an open surface, `[n]`.
     pub is_at_rim: Vec<bool>,
 }
 
 impl Directions {
-    /// Positions alone give the better direction where the cloud is dense; the signature function has given the
+    /// Takes the directions of reliable quadrics and keeps the signs.
+    ///
+    /// Where the cloud is dense, positions alone give the better direction. The signature function gives the
     /// sign.
     fn straightened(mut self, quadrics: &LocalQuadrics) -> Self {
         let d = self.normals.len() / self.has_sign.len().max(1);
@@ -72,31 +77,30 @@ impl Directions {
     }
 }
 
-/// How the signs of normals were found.
+/// Summary of how the signs of normals were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SurfaceOrientation {
-    /// Points whose gradient pointed inward.
+    /// Number of points whose normal along the gradient pointed inward.
     pub n_flipped: usize,
-    /// Whether part of the surface has a rim, so that outward has no meaning there.
+    /// True if part of the surface has a rim, so that outward has no meaning there.
     pub is_open: bool,
-    /// Whether the signs are those of normals that came with the cloud.
+    /// True if the signs are those of normals that came with the cloud.
     pub is_given: bool,
 }
 
 /// Outward normals at the points.
 pub(crate) struct Oriented {
-    /// Unit vectors `[n, d]`; zero where nothing is known.
+    /// Unit vectors `[n, d]`, zero where nothing is known.
     pub normals: Vec<f64>,
     pub how: SurfaceOrientation,
-    /// Whether neighbours have so much to do with one another that their signs can be compared.
+    /// True if normals of neighbours agree so well as lines that their signs can be compared.
     pub is_consistent: bool,
-    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    /// True where the evidence for the side of a point is contradictory, `[n]`.
     pub is_ambiguous: Vec<bool>,
 }
 
 impl Oriented {
-    /// Orients what is known of the normals; `given` are normals of the client, `[n, d]`, of any length but
-    /// 0, which decide.
+    /// Orients normals. If `given` are normals of the client, `[n, d]`, of any length but 0, they decide.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -113,7 +117,7 @@ impl Oriented {
         Self::of_directions(sampled, directions, given.is_some())
     }
 
-    /// [`Oriented::of`] without quadrics. Directions that are given keep their signs.
+    /// Orients normals without quadrics. Given directions keep their signs.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -136,12 +140,12 @@ impl Oriented {
     }
 }
 
-/// Positions that must be known around each point, itself among them.
+/// Returns how many positions must be known around each point, itself among them.
 pub(crate) fn n_around(cloud: &Cloud) -> usize {
     n_neighbours(cloud) + 1
 }
 
-/// Neighbours that a point shares edges with.
+/// Returns how many neighbours a point shares edges with.
 fn n_neighbours(cloud: &Cloud) -> usize {
     2 * cloud.dimension() + 2
 }

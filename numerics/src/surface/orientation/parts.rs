@@ -1,21 +1,21 @@
-//! A cloud as disjoint parts.
+//! A cloud divided into disjoint parts.
 
 use super::edges::{Edge, edges_of};
 use super::forest::Found;
 
-/// Weight from which an edge is sure: the surface leads from one of its points to the other.
+/// Agreement above which an edge is sure: the surface leads from one of its points to the other.
 const SURE: f64 = 0.5;
 
 /// The points of a cloud, part by part.
 pub(super) struct Parts {
     /// The part of each point, `[n]`.
     pub of_point: Vec<usize>,
-    /// The points of each part; parts in the order of their first points.
+    /// The points of each part. Parts are in the order of their first points.
     pub members: Vec<Vec<usize>>,
 }
 
 impl Parts {
-    /// Points with the same root.
+    /// Makes a part of the points with each root.
     pub(super) fn of(found: &[Found]) -> Self {
         let mut part_of_root = vec![usize::MAX; found.len()];
         let mut members: Vec<Vec<usize>> = Vec::new();
@@ -31,8 +31,10 @@ impl Parts {
         Self { of_point, members }
     }
 
-    /// Patches of at most so many points, each grown from its first one along edges that are sure and do not
-    /// contradict the signs of their ends; edges are by their first points.
+    /// Grows patches of at most `most` points, each from its first point along sure edges that agree with the
+    /// signs of their ends.
+    ///
+    /// `edges` are ordered by first point.
     pub(super) fn along_sure(edges: &[Edge], signs: &[f64], most: usize) -> Self {
         let mut patches = Self { of_point: vec![usize::MAX; signs.len()], members: Vec::new() };
         for first in 0..signs.len() {
@@ -56,17 +58,18 @@ impl Parts {
         patches
     }
 
-    /// The points of some parts.
+    /// Returns the points of some parts.
     pub(super) fn points_of(&self, parts: &[usize]) -> impl Iterator<Item = usize> {
         parts.iter().flat_map(|&part| &self.members[part]).copied()
     }
 
-    /// Multiplies the signs of the points of some parts with −1.
+    /// Flips the signs of the points of some parts.
     pub(super) fn turn(&self, turned: &[usize], signs: &mut [f64]) {
         self.points_of(turned).for_each(|point| signs[point] = -signs[point]);
     }
 
-    /// The share of the points of each part with such magnitudes of their misfits, `[n]`.
+    /// Returns the share of the points of each part for which `is_such` holds for the magnitude of the
+    /// misfit. `misfits` are `[n]`.
     pub(super) fn shares(&self, misfits: &[f64], is_such: impl Fn(f64) -> bool) -> Vec<f64> {
         let share = |points: &Vec<usize>| {
             let count = points.iter().filter(|&&point| is_such(misfits[point].abs())).count();
@@ -75,7 +78,7 @@ impl Parts {
         self.members.iter().map(share).collect()
     }
 
-    /// All parts, largest first.
+    /// Returns all parts, largest first.
     pub(super) fn by_size(&self) -> Vec<usize> {
         let mut parts: Vec<usize> = (0..self.members.len()).collect();
         parts.sort_by_key(|&part| (usize::MAX - self.members[part].len(), part));

@@ -3,15 +3,15 @@
 use super::{Directions, Sampled};
 use crate::points::cloud::Cloud;
 
-/// Factor by which the volume may shrink.
+/// Factor by which consistent signs may shrink the volume.
 const LOST_VOLUME: f64 = 1.05;
 
 /// Share of the gradients that must agree for their sign to be believed without the volume.
 const UNANIMITY: f64 = 0.95;
 
-/// Volume over that of a ball of as much surface as far from its centre, above which it is known better than
-/// any gradient: those of a wide kernel on an octahedron agree, and point inward. A torus with a tube of a
-/// seventh of its radius has twice as much.
+/// Volume of a piece, over that of a ball of as much surface as far from its centre, above which the volume
+/// decides. It is then known better than any gradient: those of a wide kernel on an octahedron agree, and
+/// point inward. A torus with a tube of a seventh of its radius has twice as much.
 const BULKY: f64 = 0.1;
 
 /// A connected part of the surface with signs relative to one another.
@@ -23,7 +23,7 @@ pub(super) struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Two ends of a curve, or a row of rim points of a surface.
+    /// Returns whether the piece has two ends of a curve, or a row of rim points of a surface.
     pub(super) fn has_rim(&self, is_at_rim: &[bool]) -> bool {
         let n_rim = self.points.iter().filter(|&&point| is_at_rim[point]).count();
         match self.sampled.cloud.dimension() {
@@ -32,8 +32,10 @@ impl Piece<'_> {
         }
     }
 
-    /// The sign of the volume, if there is much and no other piece around it; else that of most gradients by
-    /// area, or that of the volume where they disagree.
+    /// Returns the sign of the piece.
+    ///
+    /// Gradients vote by area. Their vote decides on a piece with a rim, and where they agree and the volume
+    /// is small or inside another piece. Otherwise the sign of the volume decides.
     pub(super) fn sign(&self, has_rim: bool, is_nested: bool) -> f64 {
         let signed = || self.points.iter().filter(|&&point| self.directions.has_sign[point]);
         let total: f64 = signed().map(|&point| self.area(point)).sum();
@@ -46,9 +48,10 @@ impl Piece<'_> {
         if decisive < 0.0 { -1.0 } else { 1.0 }
     }
 
-    /// Whether consistent signs enclose less than the gradients do by themselves: separate surfaces that
-    /// nearly touch, each of them right, were taken for one. Curves cross their own inside too often for this
-    /// to tell.
+    /// Returns whether consistent signs enclose less than the gradients do by themselves.
+    ///
+    /// Then separate surfaces that nearly touch, each of them right, were taken for one. Curves cross their
+    /// own inside too often for this to tell.
     pub(super) fn loses_volume(&self) -> bool {
         let signed = |sign: f64, point: usize| if self.directions.has_sign[point] { sign } else { 0.0 };
         let by_gradients = self.volume(|point| signed(1.0, point)).abs();
@@ -56,7 +59,7 @@ impl Piece<'_> {
         self.sampled.cloud.dimension() > 2 && by_gradients > LOST_VOLUME * repaired
     }
 
-    /// `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem.
+    /// Computes `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem.
     fn volume(&self, sign: impl Fn(usize) -> f64) -> f64 {
         let d = self.sampled.cloud.dimension();
         let centre = self.centre();
@@ -68,7 +71,7 @@ impl Piece<'_> {
         self.points.iter().map(of_point).sum()
     }
 
-    /// `Σ a |x − c|`.
+    /// Computes `Σ a |x − c|`, d times the volume of a ball of as much surface as far from its centre.
     fn volume_of_ball(&self) -> f64 {
         let (cloud, centre) = (self.sampled.cloud, self.centre());
         let distance = |x: &[f64]| x.iter().zip(&centre).map(|(x, c)| (x - c).powi(2)).sum::<f64>().sqrt();
@@ -90,7 +93,7 @@ impl Piece<'_> {
     }
 }
 
-/// The sides of a box around some points.
+/// The axis-parallel box around some points.
 pub(super) struct Bounds {
     least: Vec<f64>,
     greatest: Vec<f64>,

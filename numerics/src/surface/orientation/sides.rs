@@ -1,4 +1,4 @@
-//! Sides by winding numbers: pieces that are turned, and points whose sides stay ambiguous.
+//! Sides by winding numbers: pieces to turn, and points whose sides stay ambiguous.
 
 use super::edges::{Edge, averaged};
 use super::field::Field;
@@ -11,19 +11,19 @@ use crate::error::NumericsError;
 /// ambiguous.
 const DOUBT: f64 = 0.3;
 
-/// Blame for the misfits of others beyond which a side is ambiguous: a wrong sheet of which half of the space
-/// is seen has ½.
+/// Blame for misfits at other points beyond which a side is ambiguous. A wrong sheet from which half of the
+/// space is seen has ½.
 const BLAME: f64 = 0.25;
 
-/// [`BLAME`] on a piece that was cut into patches: what is left of its wrong sides is small.
+/// Bound [`BLAME`] for a piece that was cut into patches. What is left of its wrong sides is small.
 const BLAME_OF_CUT: f64 = 0.1;
 
 /// Share of the edges of a point, by weight, that may contradict its side.
 const CONTRADICTED: f64 = 0.5;
 
-/// Distance from ½ within which a part of the points of a piece must be for it to bound something, with the
-/// others: no such point is on a flat sheet or half a sphere, half of them are on a plate one side of which
-/// is wrong.
+/// Distance from ½, and the least share of the points of a piece within it for the piece to bound something,
+/// with the others. On a flat sheet or half a sphere no point is within it. On a plate with one wrong side
+/// half of the points are.
 const BOUNDS: f64 = 0.15;
 const BOUNDING_SHARE: f64 = 0.2;
 
@@ -31,23 +31,22 @@ const BOUNDING_SHARE: f64 = 0.2;
 const CLOSED: f64 = 0.2;
 const MAX_OFF: f64 = 0.03;
 
-/// Points of a piece below which its sign is not asked for: what it contributes to winding numbers is less than
-/// what they are off.
+/// Least number of points of a piece whose sign is asked for. A smaller one contributes less to winding
+/// numbers than they are off.
 const LEAST_PIECE: usize = 12;
 
-/// Median of |w − ½| on a piece that is turned, at most: on a cap of a sphere, which has no inside, it is
-/// 0.2.
+/// Largest median of |w − ½| on a piece that is turned. On a cap of a sphere, which has no inside, it is 0.2.
 const ON_PIECE: f64 = 0.12;
 
-/// What winding numbers say of a cloud.
+/// Sides of the points of a cloud by winding numbers.
 pub(super) struct Sides {
-    /// Whether what is known of the side of a point contradicts itself, `[n]`.
+    /// True where the evidence for the side of a point is contradictory, `[n]`.
     pub is_ambiguous: Vec<bool>,
-    /// Whether each piece is closed, with the others.
+    /// True for each piece that is closed, with the others.
     pub is_closed: Vec<bool>,
 }
 
-/// Turns pieces and patches of them that point to the wrong side, and tells what is left.
+/// Turns pieces, and patches of them, that point to the wrong side. Finds the sides that stay ambiguous.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -79,7 +78,7 @@ pub(super) fn settle(
     Ok(Sides { is_ambiguous, is_closed: off.iter().map(|share| *share <= MAX_OFF).collect() })
 }
 
-/// Whether the neighbours of each point contradict its side, `[n]`.
+/// Returns whether the neighbours of each point contradict its side, `[n]`.
 fn contradicted(edges: &[Edge], signs: &[f64]) -> Vec<bool> {
     let (mut weights, mut against) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
     for edge in edges {

@@ -24,7 +24,7 @@ fn directions(cloud: &Cloud, normals: Vec<f64>) -> Directions {
 fn a_flipped_region_of_a_sphere_is_turned_back() {
     let cloud = fibonacci_sphere(400);
     for (height, expected) in [(0.3, 140), (-0.4, 280)] {
-        // Normals point inward above the height: less than half of the sphere, and more.
+        // Normals point inward above the height: on less than half of the sphere, and on more.
         let sign = |x: &[f64]| if x[2] > height { -1.0 } else { 1.0 };
         let normals = cloud.points().flat_map(|x| x.iter().map(|c| sign(x) * c).collect::<Vec<_>>());
         let directions = directions(&cloud, normals.collect());
@@ -60,7 +60,7 @@ fn points_without_a_sign_follow_their_neighbours() {
     assert!(signs.signs.iter().enumerate().all(|(i, &s)| s == if i % 3 == 0 { -1.0 } else { 1.0 }));
 }
 
-/// Points of the curve r = 1 + cos(5t)/2 at random places, and their outward unit normals.
+/// Returns n random points of the curve r = 1 + cos(5t)/2, and their outward unit normals.
 fn random_star(n: usize) -> (Cloud, Vec<f64>) {
     let (mut points, mut normals, mut random) = (Vec::new(), Vec::new(), Random(3));
     for _ in 0..n {
@@ -76,7 +76,7 @@ fn random_star(n: usize) -> (Cloud, Vec<f64>) {
 #[test]
 fn a_curve_is_one_piece_across_its_gaps() {
     let (cloud, normals) = random_star(3000);
-    // Gradients that follow the curvature, inward on the five concave parts.
+    // Gradients follow the curvature: they point inward on the five concave parts.
     let is_concave = |x: &[f64]| x[0].hypot(x[1]) < 0.8;
     let turned = cloud.points().zip(normals.chunks_exact(2));
     let turned = turned.flat_map(|(x, n)| n.iter().map(move |c| if is_concave(x) { -c } else { *c }));

@@ -1,8 +1,9 @@
-//! Patches of pieces that are turned over.
+//! Turning of patches of pieces that point to the wrong side.
 //!
-//! Where a body is thinner than its points are apart, sure edges lead around its rim from one side to the other, and
-//! both sides point the same way. So a piece whose winding numbers say that much of it is wrong is cut into patches,
-//! wherever that may be, whose signs Gauss's formula finds with all others.
+//! Where a body is thinner than its points are apart, sure edges lead around its rim from one side to the
+//! other. Both sides then point the same way. So a piece is cut into patches, wherever that may be, if
+//! winding numbers say that much of it is wrong. Gauss's formula finds the signs of the patches with all
+//! others.
 
 use super::edges::{Edge, averaged};
 use super::field::Field;
@@ -10,48 +11,51 @@ use super::gauss::Problem;
 use super::parts::Parts;
 use crate::error::NumericsError;
 
-/// Distance of the winding number from ½, averaged over the neighbours on the sheet, from which a point is on the wrong
-/// side or faces one that is. With noise of a third of the spacing areas are too large, and it is 0.3 and more at
-/// half of the points whose sides are right.
+/// Distance of the winding number from ½ from which a point is on the wrong side or faces one that is. It is
+/// averaged over the neighbours on the sheet. With noise of a third of the spacing areas are too large. The
+/// distance is then 0.3 and more at half of the points whose sides are right.
 const WRONG: f64 = 0.6;
 
-/// Share of such points from which a piece is cut, and the share that may be left once it is. The bunny with 1 % of
-/// noise, whose sides are right, has 0.11; a plate one side of which is wrong has 0.3 and more.
+/// Share of points beyond [`WRONG`] from which a piece is cut, and the share that may be left once it is cut.
+/// The bunny with 1 % of noise, whose sides are right, has 0.11. A plate with one wrong side has 0.3 and
+/// more.
 const MUCH: f64 = 0.15;
 const LITTLE: f64 = 0.03;
 
-/// Points in question below which nothing is cut: single points of a noisy ellipse of 32 were turned over.
+/// Least number of points in question for a cut: of a noisy ellipse of 32 points, single ones were turned
+/// over.
 const LEAST_WRONG: usize = 100;
 
-/// Patches that the points in question would make at first, and the factor by which there are more from round to
-/// round: what straddles a rim is wrong by half until it is small.
+/// Number of patches that the points in question make at first, and the factor by which it grows from round
+/// to round. A patch that straddles a rim is half wrong until it is small.
 const N_PATCHES: f64 = 50.0;
 const REFINED: f64 = 1.4;
 
-/// Points of a patch, as far as sure edges join so many.
+/// Least number of points of a patch, as far as sure edges join so many.
 const LEAST_PATCH: usize = 12;
 
-/// Rounds at most: more have changed nothing.
+/// Most rounds. More have changed nothing.
 const N_ROUNDS: usize = 8;
 
-/// Median of |w − ½| on a patch that is turned, at most: more than on a piece, since others are still wrong.
+/// Largest median of |w − ½| on a patch that is turned. It is larger than on a piece, because others are
+/// still wrong.
 const ON_PATCH: f64 = 0.4;
 
-/// The share of the points in question that may be turned in one round: nearly all of them would be the whole surface
-/// inside out, and a cap of a sphere, which has no inside, is no better for that.
+/// Largest share of the points in question that one round may turn. Nearly all of them would be the whole
+/// surface inside out. A cap of a sphere, which has no inside, is no better for that.
 const MOST_TURNED: f64 = 0.75;
 
-/// What turning has come to.
+/// Result of turning patches.
 pub(super) struct Turned {
-    /// w − ½ at the points, `[n]`.
+    /// Misfits w − ½ at the points, `[n]`.
     pub misfits: Vec<f64>,
-    /// Whether patches of a piece were turned, for each piece.
+    /// True for each piece of which patches were turned.
     pub is_cut: Vec<bool>,
-    /// Points of patches of which it is not clear which sign is better.
+    /// Points of patches whose better sign is unclear.
     pub unclear: Vec<usize>,
 }
 
-/// Turns patches of wrong pieces, smaller ones from round to round, as long as winding numbers get better.
+/// Turns patches of wrong pieces, smaller ones from round to round, as long as winding numbers improve.
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
@@ -95,18 +99,18 @@ pub(super) fn turn_patches(
     Ok(so_far)
 }
 
-/// Patches of wrong points, those with the largest sums of misfits first.
+/// Returns patches of wrong points, those with the largest sums of misfits first.
 fn by_misfit(patches: &Parts, misfits: &[f64], is_wrong: impl Fn(usize) -> bool) -> Vec<usize> {
     let sum = |points: &[usize]| -> f64 { points.iter().map(|&point| misfits[point].abs()).sum() };
     let sums: Vec<f64> = patches.members.iter().map(|points| sum(points)).collect();
     let mut wanted = patches.by_size();
     wanted.retain(|&patch| patches.members[patch].first().is_some_and(|&point| is_wrong(point)));
-    // Stable: by size where they tie.
+    // The sort is stable, so that ties are ordered by size.
     wanted.sort_by(|&a, &b| sums[b].total_cmp(&sums[a]));
     wanted
 }
 
-/// Parts next to turned ones that most of their edges would have follow.
+/// Finds parts next to turned ones that most of their edges would turn as well.
 fn followers(parts: &Parts, edges: &[Edge], signs: &[f64], turned: &[usize]) -> Vec<usize> {
     let n_parts = parts.members.len();
     let (mut is_turned, mut is_next, mut votes) =

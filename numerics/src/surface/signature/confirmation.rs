@@ -1,11 +1,13 @@
-//! T3 and T4: whether the cloud confirms the curvatures of a surface.
+//! Criteria T3 and T4, by which the cloud confirms the curvatures of a surface.
 //!
-//! A kernel that is too wide or too narrow for the sampling gives smooth, wrong curvatures. Two opinions that do not depend
-//! on it are at hand (T4): a quadric through some neighbours, cheap and coarse, and the offset model on a patch, which costs
-//! as much as a hundred quadrics. Where the quadric agrees, nothing more is asked; where it does not, the patch decides.
-//! Small clouds, of which a patch may see both sides, have a third (T3): whether the signature function would have predicted
-//! the points nearby, had each of them been left out. It is there for all points at the price of a few patches, so where
-//! the quadric nearly agrees it is asked before the patch is.
+//! A kernel that is too wide or too narrow for the sampling gives smooth, wrong curvatures. Two estimates do
+//! not depend on the kernel (T4). A quadric through some neighbours is cheap and coarse. The offset model on
+//! a patch costs as much as a hundred quadrics. Where the quadric agrees, nothing more is asked. Where it
+//! does not, the patch decides.
+//!
+//! Small clouds, of which a patch may see both sides, have a third criterion (T3). It asks whether the
+//! signature function would have predicted the points nearby, had each of them been left out. It covers all
+//! points at the price of a few patches. So where the quadric nearly agrees, T3 is asked before the patch.
 
 use super::SignatureSurface;
 use super::offset::offset_jet_at;
@@ -14,56 +16,60 @@ use crate::points::local_quadrics::LocalQuadric;
 use crate::points::sampling::SPACING_NEIGHBOURS;
 use crate::surface::curvature::principal_curvatures;
 
-/// Differences, against the largest curvature, up to which the quadric confirms, and up to which the patch does.
+/// Differences, over the largest curvature, up to which the quadric confirms, and up to which the patch does.
 const CONFIRMED_BY_QUADRIC: f64 = 0.07;
 const CONFIRMED_BY_PATCH: f64 = 0.10;
 
-/// The same for answers of the patch itself: the quadric is the coarser of the two.
+/// Difference, over the largest curvature, up to which the quadric confirms an answer of the patch. The
+/// quadric is the coarser of the two.
 const CONFIRMED_OFFSET: f64 = 0.20;
 
-/// The difference from the quadric up to which leaving points out is asked before the patch.
+/// Difference from the quadric up to which leaving points out is asked before the patch.
 const CONFIRMED_WITH_PREDICTION: f64 = 0.10;
 
-/// Standard error of the curvatures of the quadric, against the largest curvature, beyond which nothing is confirmed: quadric and
-/// patch follow the same noise, and agree by chance.
+/// Standard error of the curvatures of the quadric, over the largest curvature, beyond which nothing is
+/// confirmed. Quadric and patch then follow the same noise, and agree by chance.
 const NOISY: f64 = 0.1;
 
-/// Curvature times radius below which the quartic terms that a quadric leaves out are small: `(κr)²/4` of a sphere's curvature.
+/// Curvature times radius below which the quartic terms that a quadric leaves out are small: `(κr)²/4` of a
+/// sphere's curvature.
 const QUADRIC_BEND: f64 = 0.6;
 
 /// Curvatures below this fraction of one over the radius of the cloud count as zero.
 const FLAT: f64 = 0.1;
 
-/// Angle by which the normal may turn from one point to the next for neighbours to show the surface at all.
+/// Angle, radians, by which the normal may turn from one point to the next for neighbours to show the surface
+/// at all.
 const RESOLVED_TURN: f64 = 0.8;
 
-/// The same for leaving points out, whose criterion would be met by curvatures that are large and wrong.
+/// Angle, radians, by which the normal may turn for T3 to count. Curvatures that are large and wrong would
+/// meet T3.
 const PREDICTED_TURN: f64 = 1.2;
 
-/// T3: the level surface may miss a point that was left out by this fraction of `h_q² κ`.
+/// T3: fraction of `h_q² κ` by which the level surface may miss a point that was left out.
 const LEFT_OUT_MISS: f64 = 0.01;
 
-/// The same where it stands in for the patch, which is the surer of the two.
+/// T3: fraction of `h_q² κ` where leaving points out stands in for the patch, which is the surer of the two.
 const LEFT_OUT_SURELY: f64 = 0.002;
 
 /// Curvatures at a query, to be confirmed.
 pub(crate) struct Unconfirmed<'a> {
     pub x: &'a [f64],
-    /// h_q, unit L.
+    /// Spacing h_q, unit L.
     pub spacing: f64,
     /// Principal curvatures `[d−1]`, ascending, for this unit normal.
     pub curvatures: &'a [f64],
     pub normal: &'a [f64],
-    /// |∇u| of the function that gave them.
+    /// Gradient norm |∇u| of the function that gave the curvatures.
     pub gradient_norm: f64,
     pub quadric: Option<LocalQuadric<'a>>,
     pub is_offset: bool,
-    /// Whether the cost of a patch was admitted.
+    /// True if the cost of a patch was admitted.
     pub may_use_patch: bool,
 }
 
 impl Unconfirmed<'_> {
-    /// Whether the points around x confirm the curvatures.
+    /// Returns whether the points around x confirm the curvatures.
     pub(crate) fn is_confirmed_by(&self, surface: &SignatureSurface) -> bool {
         let is_noisy = self.is_noisy(surface);
         let difference = self.difference_from_quadric(surface).unwrap_or(f64::INFINITY);
@@ -91,8 +97,9 @@ impl Unconfirmed<'_> {
         }
     }
 
-    /// Whether what the quadric leaves, taken for noise, makes up a tenth of the curvatures. A flat cloud counts as curved by half
-    /// of one over its radius.
+    /// Returns whether what the quadric leaves, taken for noise, makes up a tenth of the curvatures.
+    ///
+    /// A flat cloud counts as curved by half of one over its radius.
     fn is_noisy(&self, surface: &SignatureSurface) -> bool {
         let scale = self.largest().max(0.5 / surface.radius());
         self.quadric.is_some_and(|quadric| quadric.uncertainty > NOISY * scale)
@@ -112,7 +119,7 @@ impl Unconfirmed<'_> {
         Some(self.difference(surface, &quadric.curvatures_for(self.normal)))
     }
 
-    /// `None` where there is no patch.
+    /// Returns whether the patch agrees, or `None` where there is no patch.
     fn is_confirmed_by_patch(&self, surface: &SignatureSurface) -> Option<bool> {
         let jet = offset_jet_at(surface, self.x)?;
         let side = dot(&jet.gradient, self.normal).signum();
@@ -120,19 +127,21 @@ impl Unconfirmed<'_> {
         Some(self.difference(surface, &curvatures) <= CONFIRMED_BY_PATCH)
     }
 
-    /// Largest difference against the largest curvature.
+    /// Returns the largest difference from other curvatures, over the largest curvature.
     fn difference(&self, surface: &SignatureSurface, other: &[f64]) -> f64 {
         let floor = FLAT / surface.radius();
         let largest = other.iter().fold(self.largest().max(floor), |a, k| a.max(k.abs()));
         self.curvatures.iter().zip(other).fold(0.0, |a: f64, (k, o)| a.max((k - o).abs())) / largest
     }
 
-    /// T3: `|λ_i/((K+αI)⁻¹)_ii| ≤ share · |∇u| h_q² max|κ|` at the nearest points, the left side being what u misses at a point
-    /// that is left out (Rippa 1999).
+    /// Returns whether T3 holds at the nearest points: `|λ_i/((K+αI)⁻¹)_ii| ≤ share · |∇u| h_q² max|κ|`.
+    ///
+    /// The left side is what u misses at a point that is left out (Rippa 1999).
     fn is_predicted(&self, surface: &SignatureSurface, share: f64) -> bool {
         let Some(misses) = surface.left_out_misses() else { return false };
         let nearest = surface.sampling().neighbours().nearest_positions(self.x, SPACING_NEIGHBOURS);
-        // Away from the points, and at a rim where no one saw the other side, the prediction says nothing.
+        // The prediction says nothing away from the points, and at a rim, where no point shows the other
+        // side.
         let is_at_point =
             nearest.first().is_some_and(|found| found.squared_distance <= (0.5 * self.spacing).powi(2));
         if !is_at_point || self.quadric.is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable()) {

@@ -1,4 +1,4 @@
-//! How far the geometry of a signature function may be off: by what local regressions say, and by how much they differ.
+//! Standard deviations of the geometry of a signature function, from local regressions.
 
 use super::SignatureSurface;
 use crate::error::NumericsError;
@@ -9,11 +9,13 @@ use crate::points::cloud::Cloud;
 use crate::surface::curvature::principal_curvatures;
 use crate::surface::served::{Deviations, Served};
 
-/// Root of the sum of the squares of the deviations of a local regression and of the difference from it: a global function has no
-/// deviation of its own, and where both agree the regression's holds for it too.
+/// Computes deviations: the root of the sum of the squares of the deviation of a local regression and of the
+/// difference from it.
+///
+/// A global function has no deviation of its own. Where both agree, that of the regression holds for it too.
 ///
 /// # Errors
-/// Those of [`crate::patches::Patches::of`].
+/// Returns the errors of [`crate::patches::Patches::of`].
 pub(super) fn deviations(
     surface: &SignatureSurface,
     queries: &Cloud,

@@ -11,13 +11,14 @@ use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::is_no_normal;
 use crate::surface::orientation::Directions;
 
-/// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the points.
+/// Step of the difference quotient along a local normal, in spacings, for kernels without a gradient at the
+/// points.
 const DIFFERENCE_STEP: f64 = 0.25;
 
-/// What is known of the normals from the signature function and the quadrics.
+/// Computes normals from the signature function and the quadrics, before their signs are made consistent.
 ///
 /// # Errors
-/// Those of [`crate::function::interpolant::Interpolant::at`].
+/// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
 pub(crate) fn directions(
     signature: &Signature,
     sampling: &Sampling,
@@ -29,7 +30,7 @@ pub(crate) fn directions(
         Some(jets) => along_gradients(signature, jets, sampling, quadrics),
         None => along_quadrics(signature, sampling, quadrics, observer)?,
     };
-    // The tip of a hairpin looks like the end of a curve; no quadric fits there.
+    // The tip of a hairpin looks like the end of a curve, but no quadric fits there.
     let is_at_rim =
         |point| quadrics.at(point).is_some_and(|quadric| quadric.is_at_rim && quadric.is_reliable());
     Ok(Directions { normals, has_sign, is_at_rim: (0..n).map(is_at_rim).collect() })
@@ -57,8 +58,10 @@ fn along_gradients(
     (normals, has_sign)
 }
 
-/// For kernels without a gradient at the points: `u(x + δn) − u(x − δn)` along the normal of the quadric gives the sign, and the
-/// kink of the kernel at x, which is even, drops out.
+/// Computes normals for kernels without a gradient at the points.
+///
+/// The sign comes from `u(x + δn) − u(x − δn)`, n the normal of the quadric. The kink of the kernel at x is
+/// even, so it drops out.
 fn along_quadrics(
     signature: &Signature,
     sampling: &Sampling,

@@ -1,7 +1,8 @@
 //! Normals that the points around them do not confirm.
 //!
-//! A smooth kernel with a small α follows what a scan has of noise and edges. Quadrics through a few points see some of it; where they do not
-//! plainly agree, the local regression is asked, which knows how far off it may be itself.
+//! A smooth kernel with a small α follows the noise and the edges of a scan. Quadrics through a few points
+//! see some of it. Where they do not plainly agree, the local regression is asked, because it knows how far
+//! off it may be itself.
 
 use super::SignatureSurface;
 use crate::error::NumericsError;
@@ -15,25 +16,26 @@ use crate::surface::served::Served;
 /// Cosine of the angle to the normal of the quadric, 0.15 rad, up to which a normal is not doubted.
 const PLAINLY: f64 = 0.989;
 
-/// The same, 25°, beyond which it is flagged where there is no local regression.
+/// Cosine of the angle to the normal of the quadric, 25°, beyond which a normal is flagged where there is no
+/// local regression.
 const AGREES: f64 = 0.906;
 
 /// Curvature times radius below which a quadric sees less than half of a circle.
 const ONE_SIDE: f64 = 1.5;
 
-/// Deviation of a normal, radians, beyond which it is flagged: that of the regression, and the angle from it. More than for the normals of
-/// regressions, since there are two opinions.
+/// Deviation of a normal, radians, beyond which it is flagged. It combines that of the regression and the
+/// angle from it. The bound is higher than for the normals of regressions, since there are two estimates.
 const UNCERTAIN: f64 = 0.4;
 
-/// Whether the quadric of a query leaves the normal along a gradient in doubt.
+/// Returns whether the quadric of a query leaves the normal along a gradient in doubt.
 pub(super) fn is_doubtful(gradient: &[f64], quadric: Option<LocalQuadric<'_>>) -> bool {
     !quadric.is_some_and(|quadric| quadric.bend() < ONE_SIDE && !is_off(gradient, quadric.normal, PLAINLY))
 }
 
-/// Those of the doubtful queries whose normals are uncertain.
+/// Finds the doubtful queries whose normals are uncertain.
 ///
 /// # Errors
-/// Those of [`crate::patches::Patches::of`].
+/// Returns the errors of [`crate::patches::Patches::of`].
 pub(super) fn uncertain<'a>(
     surface: &SignatureSurface,
     queries: &Cloud,
@@ -43,7 +45,7 @@ pub(super) fn uncertain<'a>(
     observer: &dyn Observer,
 ) -> Result<Vec<usize>, NumericsError> {
     let d = queries.dimension();
-    // Fewer points than that may all be seen from each of them.
+    // In a smaller cloud each point may see all others.
     if doubtful.is_empty() || surface.cloud().n_points() < 4 * n_quadric_neighbours(d) {
         return Ok(Vec::new());
     }

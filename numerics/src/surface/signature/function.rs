@@ -1,4 +1,4 @@
-//! The function whose level surface it is.
+//! The signature function of a cloud.
 
 use std::sync::Arc;
 
@@ -10,28 +10,29 @@ use crate::solver::{Solution, Solver};
 use crate::sums::jets::{JetOrder, Jets};
 use crate::surface::degeneracy::roundings;
 
-/// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the points.
+/// The paper's signature function u_X, the fit of the constant 1, with its values and derivatives at the
+/// points.
 ///
-/// Its level 1 is the surface (with α > 0, the level that is the mean of u over the cloud). On closed clouds u > 1 inside
-/// while ℓ is not small against the features (errata.md, 2 and 13).
+/// The surface is the level 1 of u. With α > 0 it is the level that is the mean of u over the cloud. On
+/// closed clouds u > 1 inside while ℓ is not small against the features (errata.md, 2 and 13).
 pub struct Signature {
     function: Interpolant,
     /// Absent for kernels with a kink at the points.
     at_points: Option<AtPoints>,
 }
 
-/// u and its derivatives at the points.
+/// Values and derivatives of u at the points.
 struct AtPoints {
     jets: Jets,
-    /// Whether ∇u is rounding (T1), `[n]`.
+    /// True where ∇u is rounding (T1), `[n]`.
     is_rounding: Vec<bool>,
 }
 
 impl Signature {
-    /// Solves for the weights, and evaluates in the same pass that finds their residual.
+    /// Solves for the weights, and evaluates u in the same pass that finds their residual.
     ///
     /// # Errors
-    /// Those of [`Solution::with_jets`].
+    /// Returns the errors of [`Solution::with_jets`].
     pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let ones = vec![1.0; solver.n_points()];
         let (solution, jets) = match solver.kernel().has_kink() {
@@ -41,10 +42,10 @@ impl Signature {
         Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)
     }
 
-    /// The same of weights that are known.
+    /// Builds the signature function from weights that are known.
     ///
     /// # Errors
-    /// Those of [`Interpolant::at`].
+    /// Returns the errors of [`Interpolant::at`].
     pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let solver = &function.solver;
         let jets = match solver.kernel().has_kink() {
@@ -69,17 +70,17 @@ impl Signature {
         Ok(Self { function, at_points })
     }
 
-    /// u.
+    /// The function u.
     pub fn function(&self) -> &Interpolant {
         &self.function
     }
 
-    /// u, ∇u and D²u at the points, where they exist.
+    /// Jets u, ∇u and D²u at the points, where they exist.
     pub(crate) fn jets(&self) -> Option<&Jets> {
         self.at_points.as_ref().map(|at_points| &at_points.jets)
     }
 
-    /// Whether ∇u at a point is rounding; false where there is none.
+    /// Returns whether ∇u at a point is rounding, and false where there is no ∇u.
     pub(crate) fn is_rounding(&self, point: usize) -> bool {
         self.at_points.as_ref().is_some_and(|at_points| at_points.is_rounding[point])
     }

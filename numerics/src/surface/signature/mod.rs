@@ -1,4 +1,4 @@
-//! The level surface of a signature function, with what its points say about it by themselves.
+//! The level surface of a signature function, with local quadrics and normals at its points.
 
 mod confirmation;
 mod deviations;
@@ -34,7 +34,8 @@ pub(crate) use serving::serve;
 
 /// A surface with local quadrics and consistently oriented normals at the points, d ≥ 2.
 ///
-/// Made once per factorization: it costs one evaluation at all points, and a quadric through the neighbours of each.
+/// Building it costs one evaluation at all points and a quadric through the neighbours of each. So it is made
+/// once per factorization.
 pub struct SignatureSurface {
     signature: Signature,
     sampling: Arc<Sampling>,
@@ -47,10 +48,12 @@ pub struct SignatureSurface {
 }
 
 impl SignatureSurface {
-    /// The surface of a signature function; `given` are normals of the points, `[n, d]`, of any length but 0.
+    /// Builds the surface of a signature function. `given` are normals of the points, `[n, d]`, of any length
+    /// but 0.
     ///
     /// # Errors
-    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Overflow`],
+    /// [`NumericsError::Cancelled`].
     pub fn of(
         signature: Interpolant,
         given: Option<&Cloud>,
@@ -60,10 +63,10 @@ impl SignatureSurface {
         Self::over(sampling, Signature::of(signature, observer)?, given, observer)
     }
 
-    /// [`SignatureSurface::of`] over a sampling of the same cloud that is there already.
+    /// Builds the surface over a sampling of the same cloud that exists already.
     ///
     /// # Errors
-    /// Those of [`SignatureSurface::of`].
+    /// Returns the errors of [`SignatureSurface::of`].
     pub fn over(
         sampling: Arc<Sampling>,
         signature: Signature,
@@ -113,12 +116,13 @@ impl SignatureSurface {
         &self.sampling
     }
 
-    /// Whether ∇u at each point is rounding; false where there is none.
+    /// Returns whether ∇u at a point is rounding, and false where there is no ∇u.
     pub(crate) fn is_rounding(&self, point: usize) -> bool {
         self.signature.is_rounding(point)
     }
 
-    /// Whether the points around x lie on a line, or span for another reason fewer directions than a surface has.
+    /// Returns whether the points around x lie on a line, or span for another reason fewer directions than a
+    /// surface has.
     pub(crate) fn is_thread(&self, x: &[f64]) -> bool {
         let count = n_quadric_neighbours(self.cloud().dimension());
         let nearest = self.sampling.neighbours().nearest_positions(x, count);
@@ -126,37 +130,39 @@ impl SignatureSurface {
         patch.is_some_and(|patch| patch.n_points() == count && patch.is_thread())
     }
 
-    /// Whether second derivatives at the points see the cusp of the kernel.
+    /// Returns whether second derivatives at the points see the cusp of the kernel.
     pub(crate) fn is_too_rough(&self) -> bool {
         self.is_too_rough
     }
 
-    /// Half the diagonal of the bounding box, unit L; 1 for a single position.
+    /// Half the diagonal of the bounding box, unit L, and 1 for a single position.
     pub(crate) fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999); for small clouds with a Cholesky
-    /// factor only.
+    /// Returns `|λ_i/((K+αI)⁻¹)_ii|`, what u misses at each point when that is left out (Rippa 1999).
+    ///
+    /// Only small clouds with a Cholesky factor have it.
     pub(crate) fn left_out_misses(&self) -> Option<&[f64]> {
         if self.left_out_misses.get().is_none() {
-            // Outside the cell, which a thread that waits for the others would otherwise hold: the job that it takes up
-            // meanwhile may ask for the same. A few threads make it twice; the first one puts it in.
+            // Computed outside the cell. A thread that waits for the others would otherwise hold the cell,
+            // and the job that it takes up meanwhile may ask for the same. A few threads may compute it, and
+            // the first result is stored.
             let made = self.compute_left_out_misses();
             let _ = self.left_out_misses.set(made);
         }
         self.left_out_misses.get()?.as_deref()
     }
 
-    /// Local regressions of the same points, made when deviations are asked for, or a normal is in doubt.
+    /// Local regressions of the same points, made when deviations are asked for or a normal is in doubt.
     ///
     /// # Errors
-    /// Those of [`Patches::of`].
+    /// Returns the errors of [`Patches::of`].
     fn patches(&self, observer: &dyn Observer) -> Result<Arc<Patches>, NumericsError> {
         if let Some(patches) = self.patches.get() {
             return Ok(patches.clone());
         }
-        // Outside the cell, as above.
+        // Computed outside the cell, as in `left_out_misses`.
         let cloud = self.signature.function().solver.cloud().clone();
         let made = Arc::new(Patches::of(cloud, self.sampling.clone(), observer)?);
         let _ = self.patches.set(made.clone());
@@ -179,12 +185,12 @@ impl SignatureSurface {
         &self.oriented.normals[point * d..][..d]
     }
 
-    /// Whether what is known of the side of a point contradicts itself.
+    /// Returns whether the evidence for the side of a point is contradictory.
     pub(crate) fn has_ambiguous_side(&self, point: usize) -> bool {
         self.oriented.is_ambiguous[point]
     }
 
-    /// u, ∇u and D²u at the points, where they were kept.
+    /// Jets u, ∇u and D²u at the points, where they were kept.
     pub(crate) fn jets_at_points(&self) -> Option<&Jets> {
         self.signature.jets()
     }
@@ -194,9 +200,10 @@ impl SignatureSurface {
         self.quadrics.at(point)
     }
 
-    /// The sign that turns ∇u at x into an outward direction: that of the points near x (a narrow kernel makes u a ridge, and −∇u
-    /// points inward just inside), −1 on clouds that do not resolve their surface.
-    /// `found` is room for them.
+    /// Returns the sign that turns ∇u at x into an outward direction. `found` is a buffer.
+    ///
+    /// The points near x decide: a narrow kernel makes u a ridge, and −∇u points inward just inside. On
+    /// clouds that do not resolve their surface the sign is −1.
     pub(crate) fn outward_sign(&self, x: &[f64], gradient: &[f64], found: &mut Vec<Neighbour>) -> f64 {
         if !self.oriented.is_consistent && !self.orientation().is_given {
             return -1.0;
@@ -205,7 +212,7 @@ impl SignatureSurface {
         let along: f64 = found
             .iter()
             .map(|found| {
-                // Near a thin sheet the point on this side of it decides.
+                // Near a thin sheet this lets the point on x's side decide.
                 let spacing = self.sampling.spacing(found.point);
                 let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
                 weight * dot(self.normal(found.point), gradient)
@@ -214,8 +221,9 @@ impl SignatureSurface {
         if along > 0.0 { 1.0 } else { -1.0 }
     }
 
-    /// Whether ∇u at the points near x goes the way of a direction, +1 or −1; −1, inward, where there is no ∇u. `found` is
-    /// room for them.
+    /// Returns +1 if ∇u at the points near x goes along `outward`, else −1. `found` is a buffer.
+    ///
+    /// It is −1, inward, also where there is no ∇u.
     pub(crate) fn gradient_side(&self, x: &[f64], outward: &[f64], found: &mut Vec<Neighbour>) -> f64 {
         let Some(jets) = self.jets_at_points() else { return -1.0 };
         self.sampling.neighbours().nearest_positions_into(x, SPACING_NEIGHBOURS, found);
@@ -226,7 +234,7 @@ impl SignatureSurface {
     /// Bytes held on the heap beside the factor.
     pub fn n_bytes(&self) -> usize {
         let n = self.cloud().n_points();
-        // Asked for later, if at all.
+        // Counted although they are computed later, if at all.
         let left_out_misses = if n <= MAX_INVERSE_DIAGONAL { block_bytes(n * size_of::<f64>()) } else { 0 };
         self.signature.n_bytes()
             + self.sampling.n_bytes()

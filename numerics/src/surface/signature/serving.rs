@@ -1,4 +1,4 @@
-//! Which function serves each query of a surface, and what is wrong there.
+//! The choice of the function that serves each query of a surface, and of the flags of its answer.
 
 use std::borrow::Cow;
 
@@ -24,14 +24,14 @@ use crate::surface::degeneracy::{DegeneracyReason, is_far, is_no_normal, is_weak
 use crate::surface::request::{GeometryRequest, Orientation, SurfaceModel};
 use crate::surface::served::{Served, ServedBy, Verdict};
 
-/// Distance from the local quadric, in spacings, up to which a query counts as on the surface: there the gradient must be
-/// normal to it.
+/// Distance from the local quadric, in spacings, up to which a query counts as on the surface. There the
+/// gradient must be normal to the quadric.
 const ON_SURFACE_SPACINGS: f64 = 0.5;
 
-/// Finds everything that is known at each query.
+/// Computes gradient, Hessian, sign and flag at each query, with deviations if they are asked for.
 ///
 /// # Errors
-/// Those of [`crate::function::interpolant::Interpolant::at`].
+/// Returns the errors of [`crate::function::interpolant::Interpolant::at`].
 pub(crate) fn serve(
     surface: &SignatureSurface,
     queries: &Cloud,
@@ -64,11 +64,11 @@ pub(crate) fn serve(
     Ok(served)
 }
 
-/// What lies around the queries.
+/// Points and quadrics around the queries.
 enum Surroundings {
-    /// They are the points of the cloud, of which the surface knows.
+    /// The queries are the points of the cloud, so the surface knows what is around them.
     OfPoints,
-    /// Their nearest points, and quadrics of their own where curvatures are held against them.
+    /// Nearest points of the queries, with quadrics of their own where curvatures are checked against them.
     OfQueries { around: Neighbourhoods, quadrics: Option<LocalQuadrics> },
 }
 
@@ -110,12 +110,12 @@ struct Service<'a> {
     queries: &'a Cloud,
     request: &'a GeometryRequest,
     jets: Cow<'a, Jets>,
-    /// T1 at each query, where the jets have gradients.
+    /// True where ∇u is rounding (T1), `[m]`. Empty where the jets have no gradients.
     is_rounding: Vec<bool>,
     surroundings: Surroundings,
 }
 
-/// Where the numbers of a query go.
+/// Room for the gradient and the Hessian of a query.
 struct Slot<'a> {
     gradient: &'a mut [f64],
     hessian: &'a mut [f64],
@@ -189,7 +189,8 @@ impl Service<'_> {
             Surroundings::OfQueries { around, quadrics: Some(quadrics) } => {
                 (around.nearest(query), quadrics.at(query))
             }
-            // Normals are held against a quadric to see whether they are oblique; that of the nearest point is good enough.
+            // The quadric only shows whether a normal is oblique, so that of the nearest point is good
+            // enough.
             Surroundings::OfQueries { around, quadrics: None } => {
                 let nearest = around.nearest(query);
                 let quadric = surface.quadric(nearest.point);
@@ -216,8 +217,8 @@ impl Service<'_> {
         is_on_thread || self.is_rounding[query] || is_no_normal(&self.jets, query, site.spacing, quadric)
     }
 
-    /// Whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours are free of noise, which
-    /// the offset model interpolates.
+    /// Returns whether the offset model is preferred for curvatures: the gradient is weak, and the neighbours
+    /// are free of noise. The offset model would interpolate noise.
     fn is_weak(&self, query: usize, site: &Site<'_>) -> bool {
         self.request.checks_curvatures
             && site.quadric.is_some_and(|quadric| quadric.is_smooth())
@@ -243,7 +244,7 @@ impl Service<'_> {
         Verdict { sign, by: ServedBy::Signature, reason: None }
     }
 
-    /// The offset model, whose gradient points outward.
+    /// Serves a query by the offset model, whose gradient points outward.
     fn by_offset(
         &self,
         query: usize,
@@ -262,7 +263,7 @@ impl Service<'_> {
         Verdict { sign, by: ServedBy::Offset, reason: None }
     }
 
-    /// What there is without the offset model: a weak gradient is better than nothing.
+    /// Serves a query without the offset model. A weak gradient is better than nothing.
     fn without_offset(
         &self,
         query: usize,
@@ -289,7 +290,7 @@ impl Service<'_> {
         Verdict { sign: 1.0, by, reason: Some(reason) }
     }
 
-    /// What makes an answer doubtful.
+    /// Returns the reason why an answer is doubtful.
     fn flag(&self, verdict: Verdict, slot: &Slot<'_>, site: &Site<'_>) -> Option<DegeneracyReason> {
         if is_far(site.nearest.squared_distance, site.spacing) {
             return Some(DegeneracyReason::FarFromCloud);

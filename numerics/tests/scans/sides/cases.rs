@@ -1,4 +1,4 @@
-//! The clouds whose sides are counted, by name.
+//! Named clouds on which the sides of normals are counted.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use super::clouds::{
 };
 use crate::common::random::Random;
 
-/// A cloud, and how far its sheets are apart, in spacings; infinite where there is one only.
+/// A cloud, and the distance between its sheets in spacings, infinite for a single sheet.
 pub struct Case {
     pub name: String,
     pub sided: Sided,
@@ -39,10 +39,10 @@ pub fn curves(n: usize, seed: u64) -> Vec<Case> {
     cases
 }
 
-/// A strip in the plane that is folded five times, so many spacings thick and apart.
+/// A plane strip folded five times. Its thickness and gaps are `thickness` spacings.
 pub fn folded_curve(n: usize, thickness: f64, seed: u64) -> Case {
     let outline_of = |length: f64| folded_strip(1.0, 1.0, 6, length);
-    // Both sides of six layers, and the ends: n points with a spacing of 1.25 times length over n.
+    // Both sides of six layers and the ends, n points with a spacing of 1.25 times length over n.
     let wanted = n as f64 / (1.25 * thickness);
     let ends = length_of(&outline_of(1.0)) - 12.0;
     let outline = outline_of(((wanted - ends) / 12.0).max(1.0));
@@ -50,7 +50,8 @@ pub fn folded_curve(n: usize, thickness: f64, seed: u64) -> Case {
     Case::new(format!("folded strip, {thickness}"), along(&outline, n, &mut Random(seed)), thickness)
 }
 
-/// A ring whose section is a strip that is folded, in so many layers, so many spacings thick and apart.
+/// A ring whose section is a folded strip of `n_layers` layers. Its thickness and gaps
+/// are `thickness` spacings.
 pub fn folded_sheet(n_layers: usize, thickness: f64, seed: u64) -> Case {
     let mut outline = folded_strip(1.0, 1.0, n_layers, 2.0);
     outline.iter_mut().for_each(|(x, _)| x[0] += 2.0);
@@ -59,29 +60,29 @@ pub fn folded_sheet(n_layers: usize, thickness: f64, seed: u64) -> Case {
     Case::new(name, revolved(&outline, n, &mut Random(seed)), thickness)
 }
 
-/// A round plate with a round rim, so many spacings thick.
+/// A round plate with a round rim, `thickness` spacings thick.
 pub fn plate(n: usize, thickness: f64, seed: u64) -> Case {
     let spacing = surface_spacing(TAU, n);
     let outline = half_plate(1.0, thickness * spacing);
     Case::new(format!("plate, {thickness}"), revolved(&outline, n, &mut Random(seed)), thickness)
 }
 
-/// Two caps of spheres that meet in an edge, so many spacings thick in the middle.
+/// A lens: two spherical caps that meet in an edge, `thickness` spacings thick in the middle.
 pub fn lens(n: usize, thickness: f64, seed: u64) -> Case {
     let spacing = surface_spacing(TAU, n);
     let outline = half_lens(1.0, thickness * spacing);
     Case::new(format!("lens, {thickness}"), revolved(&outline, n, &mut Random(seed)), thickness)
 }
 
-/// A thin torus, its tube so many spacings in radius.
+/// A thin torus whose tube has a radius of `radius` spacings.
 pub fn tube(n: usize, radius: f64, seed: u64) -> Case {
-    // h = 0.82 √(4π² R r / n) and r = radius h for R = 1.
+    // h = 0.82 √(4π² R r / n), and r is `radius` times h, for R = 1.
     let tube = (radius * 0.82 * TAU).powi(2) / n as f64;
     let sided = revolved(&ring(1.0, tube), n, &mut Random(seed));
     Case::new(format!("tube, {radius}"), sided, 2.0 * radius)
 }
 
-/// Two spheres that touch, or are so many spacings apart.
+/// Two unit spheres, `gap` spacings apart. They touch if `gap` is 0.
 pub fn two_spheres(n: usize, gap: f64, seed: u64) -> Case {
     let mut random = Random(seed);
     let spacing = surface_spacing(2.0 * TAU, n / 2);
@@ -89,7 +90,7 @@ pub fn two_spheres(n: usize, gap: f64, seed: u64) -> Case {
     Case::new(format!("two spheres, {gap}"), Sided::together(&parts), gap)
 }
 
-/// A hollow ball: a sphere within a sphere, of this share of its radius, with normals into the cavity.
+/// A hollow ball: a unit sphere around a sphere of radius `share`, whose normals point into the cavity.
 pub fn nested_spheres(n: usize, share: f64, seed: u64) -> Case {
     let mut random = Random(seed);
     let n_inner = (n as f64 * share * share / (1.0 + share * share)) as usize;

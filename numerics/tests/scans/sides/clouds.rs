@@ -1,4 +1,4 @@
-//! Closed curves and surfaces, thin ones and near ones among them, with their outward normals.
+//! Closed curves and surfaces with outward normals, some of them thin or close to one another.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,14 +21,14 @@ impl Sided {
         Self { cloud: Cloud::new(points.concat(), D).unwrap(), normals: normals.concat() }
     }
 
-    /// The points of several clouds as one.
+    /// Joins the points of several clouds into one.
     pub fn together(parts: &[Self]) -> Self {
         let points = parts.iter().flat_map(|part| part.cloud.coordinates().iter().copied()).collect();
         let normals = parts.iter().flat_map(|part| part.normals.iter().copied()).collect();
         Self { cloud: Cloud::new(points, parts[0].cloud.dimension()).unwrap(), normals }
     }
 
-    /// Normals that point the other way, as those of a cavity do.
+    /// Reverses the normals, as for a cavity.
     pub fn inside_out(mut self) -> Self {
         self.normals.iter_mut().for_each(|c| *c = -*c);
         self
@@ -51,7 +51,7 @@ pub fn polar(r: impl Fn(f64) -> f64, n: usize, random: Option<&mut Random>) -> S
     }))
 }
 
-/// The oval of Cassini `|x − (a, 0)| |x + (a, 0)| = b²`, a < b, in polar coordinates.
+/// The oval of Cassini `|x − (a, 0)| |x + (a, 0)| = b²`, a < b, as radius over angle.
 pub fn cassini(a: f64, b: f64) -> impl Fn(f64) -> f64 {
     move |t: f64| {
         let root = (b.powi(4) - (a * a * (2.0 * t).sin()).powi(2)).sqrt();
@@ -59,12 +59,13 @@ pub fn cassini(a: f64, b: f64) -> impl Fn(f64) -> f64 {
     }
 }
 
-/// The outline of a strip of a thickness that is folded, `n_layers` straight parts of a length one above the
-/// other, `gap` apart, with round ends; from the axis on, to the right.
+/// The outline of a folded strip: `n_layers` straight parts of a length one above the other, `gap` apart.
+///
+/// The strip has a thickness and round ends. It starts at the axis x = 0 and lies to the right of it.
 pub fn folded_strip(thickness: f64, gap: f64, n_layers: usize, length: f64) -> Vec<Place> {
     let fine = 0.02 * thickness.min(gap);
     let radius = 0.5 * (thickness + gap);
-    // Middle line: a point, and the direction to the left of the walk.
+    // The middle line: points, and the direction to the left of the walk.
     let mut middle: Vec<Place> = Vec::new();
     for layer in 0..n_layers {
         let y = 2.0 * radius * layer as f64;
@@ -81,7 +82,7 @@ pub fn folded_strip(thickness: f64, gap: f64, n_layers: usize, length: f64) -> V
             }));
         }
     }
-    // On the arcs left of a walk to the right is towards the centre.
+    // On the arcs the left of a walk to the right faces the centre.
     let offset = |(x, left): Place, side: f64| {
         let normal = left.map(|c| side * c);
         ([x[0] + 0.5 * thickness * normal[0], x[1] + 0.5 * thickness * normal[1]], normal)
@@ -89,7 +90,7 @@ pub fn folded_strip(thickness: f64, gap: f64, n_layers: usize, length: f64) -> V
     let cap = |(x, left): Place, turn: f64| {
         (1..60).map(move |i| {
             let (s, c) = (PI * f64::from(i) / 60.0).sin_cos();
-            // From the left side over the end to the right one.
+            // From the left side over the end to the right side.
             let ahead = [left[1] * turn, -left[0] * turn];
             let normal = [c * left[0] + s * ahead[0], c * left[1] + s * ahead[1]];
             ([x[0] + 0.5 * thickness * normal[0], x[1] + 0.5 * thickness * normal[1]], normal)
@@ -104,8 +105,7 @@ pub fn folded_strip(thickness: f64, gap: f64, n_layers: usize, length: f64) -> V
     outline
 }
 
-/// Half of the outline of a round plate of a radius and a thickness with a round rim, from the axis x = 0 to
-/// the right.
+/// Half of the outline of a round plate with a round rim, from the axis x = 0 to the right.
 pub fn half_plate(radius: f64, thickness: f64) -> Vec<Place> {
     let (inner, half) = (radius - 0.5 * thickness, 0.5 * thickness);
     let across = |i: i32| inner * f64::from(i) / 4000.0;
@@ -118,7 +118,8 @@ pub fn half_plate(radius: f64, thickness: f64) -> Vec<Place> {
     below.chain(rim).chain(above).collect()
 }
 
-/// Half the section of a lens of a radius whose caps are spheres, so thick in the middle; from the axis on.
+/// Half of the section of a lens with a radius and a thickness in the middle, whose caps are
+/// spheres, from the axis on.
 pub fn half_lens(radius: f64, thickness: f64) -> Vec<Place> {
     let half = 0.5 * thickness;
     let of_cap = (radius * radius + half * half) / (2.0 * half);
@@ -130,7 +131,7 @@ pub fn half_lens(radius: f64, thickness: f64) -> Vec<Place> {
     (0..=4000).map(|i| cap(i, -1.0)).chain((0..=4000).rev().map(|i| cap(i, 1.0))).collect()
 }
 
-/// A circle of a radius about (at, 0).
+/// A circle with a radius about (at, 0).
 pub fn ring(at: f64, radius: f64) -> Vec<Place> {
     let place = |i: i32| {
         let (s, c) = (TAU * f64::from(i) / 4000.0).sin_cos();
@@ -145,7 +146,7 @@ pub fn along(outline: &[Place], n: usize, random: &mut Random) -> Sided {
     Sided::of((0..n).map(|_| lot.draw(random)))
 }
 
-/// Random points of the surface that an outline sweeps when it is turned about x = 0, uniform in area.
+/// Random points, uniform in area, of the surface that an outline sweeps when turned about x = 0.
 pub fn revolved(outline: &[Place], n: usize, random: &mut Random) -> Sided {
     let lot = Lot::of(outline, |x| x[0]);
     Sided::of((0..n).map(|_| {
@@ -154,7 +155,7 @@ pub fn revolved(outline: &[Place], n: usize, random: &mut Random) -> Sided {
     }))
 }
 
-/// The area of such a surface.
+/// The area of the surface that an outline sweeps when turned about x = 0.
 pub fn revolved_area(outline: &[Place]) -> f64 {
     TAU * Lot::of(outline, |x| x[0]).total()
 }
@@ -172,12 +173,12 @@ pub fn sphere(centre: [f64; 3], radius: f64, n: usize, random: &mut Random) -> S
     }))
 }
 
-/// Mean distance to the four nearest of n random points of a surface with this area.
+/// Mean distance to the four nearest others, for n random points of a surface with this area.
 pub fn surface_spacing(area: f64, n: usize) -> f64 {
     0.82 * (area / n as f64).sqrt()
 }
 
-/// Parts of an outline to be drawn by their length times a weight.
+/// A sampler of points of an outline, with probability by length times a weight.
 struct Lot<'a> {
     outline: &'a [Place],
     sums: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Sides of normals on closed curves and surfaces: right, or flagged.
+//! Sides of normals on closed curves and surfaces: they are right, or flagged.
 
 #![allow(dead_code, reason = "the tests and the example each take what they need")]
 

@@ -1,8 +1,8 @@
-//! How the sides of normals turned out.
+//! Counts of the sides of normals, by truth and flag.
 
 use std::sync::Arc;
 
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
@@ -18,27 +18,27 @@ const NORMALS: GeometryRequest = GeometryRequest { checks_curvatures: false, ..G
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SideTally {
     pub n_points: usize,
-    /// Normals that point to the other side, with a flag or without.
+    /// Normals that point to the wrong side, with a flag or without.
     pub n_flipped: usize,
     pub n_flipped_unflagged: usize,
-    /// Points with a flag, for any reason and for their sides.
+    /// Points with a flag, for any reason (here) and for an ambiguous side (`n_ambiguous`).
     pub n_flagged: usize,
     pub n_ambiguous: usize,
-    /// Normals without a flag that are off by 30° and more, whatever their side.
+    /// Normals without a flag that are off by more than 30° as lines, whatever their side.
     pub n_off_unflagged: usize,
 }
 
-/// Cosine of 30°.
+/// Cosine of 30°, beyond which a normal counts as off.
 const OFF: f64 = 0.866;
 
 impl SideTally {
-    /// Sides of the signature function, by default.
+    /// Counts sides by the signature function with default parameters.
     pub fn dense(sided: &Sided) -> Self {
         let (kernel, alpha) = default_kernel_and_alpha(&sided.cloud, Purpose::Normals);
         Self::of(&surface(&factorize(&sided.cloud, kernel, alpha)), sided)
     }
 
-    /// Sides of local regressions.
+    /// Counts sides by local regressions.
     pub fn local(sided: &Sided) -> Self {
         let cloud = Arc::new(sided.cloud.clone());
         let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
@@ -66,7 +66,7 @@ impl SideTally {
         }
     }
 
-    /// Of both clouds together.
+    /// The counts of two clouds together.
     pub fn with(&self, other: &Self) -> Self {
         Self {
             n_points: self.n_points + other.n_points,
@@ -82,17 +82,17 @@ impl SideTally {
         self.n_flipped as f64 / self.n_points as f64
     }
 
-    /// The share of all points that are wrong without a flag.
+    /// Share of all points that are flipped without a flag.
     pub fn flipped_unflagged(&self) -> f64 {
         self.n_flipped_unflagged as f64 / self.n_points as f64
     }
 
-    /// The share of what has no flag that is wrong.
+    /// Share of the points without a flag that are flipped.
     pub fn wrong_of_unflagged(&self) -> f64 {
         self.n_flipped_unflagged as f64 / (self.n_points - self.n_flagged).max(1) as f64
     }
 
-    /// The share of all points that are off without a flag.
+    /// Share of all points that are off without a flag.
     pub fn off_unflagged(&self) -> f64 {
         self.n_off_unflagged as f64 / self.n_points as f64
     }

@@ -1,13 +1,17 @@
-//! What the sides of closed curves and surfaces must hold.
+//! Bounds on the sides of normals of closed curves and surfaces.
 
 use super::cases::{
     Case, curves, folded_curve, folded_sheet, lens, nested_spheres, plate, tube, two_spheres,
 };
 use super::tally::SideTally;
 
-/// What may be wrong without a flag: 0.1 % of the points where sheets are two spacings apart or more, 1 % of
-/// what has no flag elsewhere. Sides are in doubt on 1 % of the points where sheets are four spacings apart. Whatever
-/// its side, a normal without a flag is off by 30° at 0.5 % of the points; around the rims of thinner plates at more.
+/// Checks the counts of a cloud against bounds by the distance of its sheets.
+///
+/// - From two spacings on, at most 0.1 % of the points are flipped without a flag. Below, at most 1 % of the
+///   points without a flag are.
+/// - From four spacings on, the sides of at most 1 % of the points are in doubt.
+/// - From one spacing on, at most 0.5 % of the points are off by 30° without a flag, whatever their side.
+///   Thinner plates have more around their rims.
 fn check(case: &Case, way: &str, tally: SideTally) {
     println!("{}, {way}: {tally:?}", case.name);
     if case.thickness >= 2.0 {
@@ -45,12 +49,14 @@ fn plates_have_right_sides_or_flags() {
     }
 }
 
-/// Lenses are thinner than they say nearly everywhere, and thin out to nothing at their edge, where both sides have
-/// about the same normals: they used to point the same way all over.
+/// Lenses are nearly everywhere thinner than their nominal thickness. They thin out to nothing at
+/// their edge, where both sides have about the same normals. Before pieces were cut, both sides
+/// pointed the same way all over.
 #[test]
 fn both_sides_of_a_lens_point_apart_or_have_flags() {
     for thickness in [1.0, 1.5, 2.0, 3.0] {
-        // One cloud in six has 1.3 % of them, all together have half a per cent.
+        // Single clouds scatter: one in six has 1.3 % flipped without a flag, all
+        // together have half a per cent.
         let cases: Vec<Case> = (1..=3).map(|seed| lens(1500, thickness, seed)).collect();
         for way in [SideTally::dense, SideTally::local] {
             let tally = cases.iter().map(|case| way(&case.sided)).reduce(|a, b| a.with(&b)).unwrap();
@@ -62,7 +68,8 @@ fn both_sides_of_a_lens_point_apart_or_have_flags() {
 
 #[test]
 fn a_folded_strip_has_right_sides_or_flags() {
-    // Gaps between random points of a curve are as wide as the strip is thick, so that more than elsewhere is in doubt.
+    // Gaps between random points of a curve are as wide as the strip is thick, so more
+    // is in doubt than elsewhere.
     let case = folded_curve(1500, 4.0, 1);
     let (dense, local) = (SideTally::dense(&case.sided), SideTally::local(&case.sided));
     assert!(dense.flipped_unflagged() <= 0.01, "{dense:?}");

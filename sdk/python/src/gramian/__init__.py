@@ -31,10 +31,20 @@ from .answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
+from .arguments.fit import (
+    Fit,
+    Geometry,
+    GeometryFields,
+    GeometryLike,
+    Kernel,
+    KernelFields,
+    KernelLike,
+    OperatorFit,
+    ValuesFit,
+)
 from .client import Client
 from .cloud import Cloud
-from .fit import Fit, Geometry, GeometryFields, GeometryLike, Kernel, KernelFields, KernelLike, OperatorFit, ValuesFit
-from .problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
+from .resources.selection import Bounds, FreeParameterFields, Vary
 from .rest.models import (
     Degenerate,
     DegenerateReason,
@@ -59,7 +69,7 @@ from .rest.models import (
     WarningCode,
 )
 from .rest.types import UNSET, Unset
-from .selection import Bounds, FreeParameterFields, Vary
+from .wire.problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
 
 # The generated code compares with this one object, which therefore must stay one when an answer is pickled or copied.
 copyreg.pickle(Unset, lambda _: "UNSET")

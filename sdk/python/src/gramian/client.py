@@ -14,17 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from . import rest
-from .arrays import Sizes
+from .arguments.arrays import Sizes
+from .arguments.fit import Whole
+from .arguments.keywords import suggest_names
+from .arguments.normalise import CLIENT, REQUEST, normalise
+from .arguments.registration import register, register_file
 from .cloud import Cloud
-from .fit import Whole
-from .jobs import Bar, Progress, Told
-from .keywords import suggest_names
-from .normalise import CLIENT, REQUEST, normalise
-from .problems import Problem
-from .registration import register, register_file
 from .rest.models import CloudList, Job, KernelDescription, KernelList, Version
-from .tensors import Array, Format, available_format
-from .transport import Connection, RetryingClient
+from .wire.connection import Connection
+from .wire.problems import Problem
+from .wire.progress import Bar, Progress, Told
+from .wire.tensors import Array, Format, available_format
+from .wire.transport import RetryingClient
 
 T = TypeVar("T", CloudList, KernelList, Version)
 

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .answers import Posterior
+from .arguments.fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
 from .client import Client
 from .cloud import Cloud
-from .fit import Duplicates, KernelLike, Mean, Number, Quantity, Solver
-from .problems import NotPositiveDefinite, Problem
 from .rest.models import KernelUsed, SolverUsed
 from .rest.types import Unset
-from .tensors import Array
+from .wire.problems import NotPositiveDefinite, Problem
+from .wire.tensors import Array
 
 try:
     from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin

@@ -9,29 +9,29 @@ use crate::http::fields::{
 };
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::serve::fitted::{Fits, SurfaceGeometry};
+use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
-use crate::http::serve::plan::Cost;
-use crate::http::serve::plan::PlannedFit;
-use crate::http::serve::planner::Planner;
+use crate::http::serve::plan::{Cost, PlannedSurface, Values};
+use crate::http::serve::planner::{GivenValues, OperatorFits, Planner};
+use crate::http::serve::surface::SurfaceGeometry;
 use crate::http::wire::read::points::Points;
 use crate::store::clouds::RegisteredCloud;
-use gramian_numerics::defaults::Purpose;
 use gramian_numerics::error::NumericsError;
+use gramian_numerics::kernel::defaults::Purpose;
+use gramian_numerics::model::Report;
+use gramian_numerics::model::price::{OperatorAsked, Sizes, geometry_price, operator_price};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::neighbours::Neighbours;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::learning_price;
 use gramian_numerics::solver::choose::{
-    Asked, AskedOfSurface, MAX_OFFSETS, Offsets, deviations_price, judging_price, kriged_operator_price,
-    n_entries_per_row, sampling_bytes, work_price,
+    Asked, AskedOfSurface, MAX_OFFSETS, Offsets, n_entries_per_row, sampling_bytes, work_price,
 };
-use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{
     Geometry as SurfaceGeometryAtQueries, GeometryRequest, Orientation, SurfaceModel,
 };
-use gramian_numerics::surface::operators::{JUDGED_FUNCTIONALS, Kriged, OfKriged, SparseMatrix, Stencils};
+use gramian_numerics::surface::operators::{Kriged, OfKriged, SparseMatrix, Stencils};
 
 /// A checked request for normals or curvatures.
 pub struct GeometryWork {
@@ -41,7 +41,7 @@ pub struct GeometryWork {
 
 /// A checked request to apply an operator to values.
 pub struct AppliedWork {
-    pub values: Arc<Vec<f64>>,
+    pub values: Arc<Values>,
     pub queries: Arc<Cloud>,
     pub request: GeometryRequest,
 }
@@ -49,7 +49,7 @@ pub struct AppliedWork {
 /// What a request to apply an operator has beside its fit.
 pub struct Applied {
     pub geometry: Option<Geometry>,
-    pub values: Arc<Vec<f64>>,
+    pub values: Vec<f64>,
     pub queries: Option<Points>,
     pub include: Option<Vec<ValuesInclude>>,
 }
@@ -72,12 +72,13 @@ impl MatrixWork {
         observer: &JobObserver,
     ) -> Result<Diagnostics, Problem> {
         let m = self.queries.n_points();
-        let constant = match (&fits.surface, &*surface.surface) {
-            (None, Surface::Signature(surface)) => surface.signature().clone(),
+        let constant = match (&fits.surface, surface.surface.signature()) {
+            (None, Some(signature)) => signature.clone(),
             _ => fits.interpolant_of_one(observer)?,
         };
-        let mut diagnostics = fits.main.diagnostics(&constant.solution, m)?;
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
+        let report = Report::of_function(&constant.solver, &constant.solution, 1.0);
+        let mut diagnostics = fits.main.diagnostics(&report, m);
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         Ok(diagnostics)
     }
 }
@@ -95,16 +96,14 @@ pub fn plan_geometry(
     numbers_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<GeometryWork>, Problem> {
     let mut main = planner.surface_fit(fit, purpose, &request)?;
-    check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &mut [&mut main])?;
-    let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
+    check_is_surface(&main.on.stored.cloud)?;
+    let queries = planner.queries(queries, &mut main.on)?;
+    let (m, d) = (queries.n_points(), queries.dimension());
     let n_numbers = planner.check_answer(m.checked_mul(numbers_per_query(d)))?;
-    let asked = match main.is_local() {
-        true => Asked::LocalGeometry,
-        false => Asked::Geometry(asked_of(&request, &main, &queries)),
-    };
-    let cost = Cost { work: work_price(asked, n, m, d), n_numbers, n_held: m * d };
-    Ok(Plan { main, surface: None, work: GeometryWork { queries, request }, cost })
+    let sizes = Sizes { n_points: main.on.n_points(), n_queries: m, dimension: d };
+    let work = geometry_price(main.solver(), asked_of(&request, &main, &queries), sizes);
+    let cost = Cost { work, n_numbers, n_held: m * d };
+    Ok(Plan { main: main.into(), surface: None, work: GeometryWork { queries, request }, cost })
 }
 
 /// Plans an operator applied to values, with so many numbers of answer per query.
@@ -120,41 +119,29 @@ pub fn plan_applied(
     let Applied { geometry, values, queries, include } = applied;
     let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
     let request = GeometryRequest { has_deviations, ..operator_request(&geometry) };
-    let (mut main, mut surface) = planner.operator_fits(fit, geometry, &request)?;
-    check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
-    let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-    let n_surface_points = surface.n_points();
-    let mut n_numbers = m.checked_mul(numbers_per_query(d));
-    let of_operator = n_numbers.unwrap_or(usize::MAX);
-    let of_surface = asked_of(&request, &surface, &queries);
-    let mut work = match main.is_moving() {
-        true => {
-            let geometry = match surface.is_local() {
-                true => Asked::LocalGeometry,
-                false => Asked::Geometry(of_surface),
-            };
-            let geometry = work_price(geometry, n_surface_points, m, d);
-            geometry.and(kriged_operator_price(n, m, d))
-        }
-        false => {
-            let asked = Asked::Operator { n_surface_points, surface: of_surface };
-            let judging = judging_price((n, d), m, of_operator.min(JUDGED_FUNCTIONALS));
-            work_price(asked, n, m, d).and(judging)
-        }
+    let OperatorFits { mut main, values, mut surface } =
+        planner.operator_fits(fit, GivenValues::one(values), geometry, &request)?;
+    check_is_surface(&main.on.stored.cloud)?;
+    let queries = planner.queries(queries, &mut surface.on)?;
+    main.on.pointers.queries = surface.on.pointers.queries;
+    let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
+    let n_surface_points = surface.on.n_points();
+    let of_operator = m.checked_mul(numbers_per_query(d));
+    let asked = OperatorAsked {
+        n_surface_points,
+        n_numbers: of_operator.unwrap_or(usize::MAX),
+        surface: asked_of(&request, &surface, &queries),
+        has_deviations,
     };
-    work = work.and(learning_price(n, d, 1));
+    let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
+    let mut work = operator_price(main.solver, surface.solver(), asked, sizes).and(learning_price(n, d, 1));
     // Where the kernel stretches the cloud or duplicates are merged, it is another cloud.
     work.n_bytes = work.n_bytes.saturating_add(sampling_bytes(n, d));
-    if has_deviations {
-        if !main.is_moving() {
-            work = work.and(deviations_price(n, of_operator, d));
-        }
-        n_numbers = n_numbers.and_then(|n| n.checked_mul(2));
-    }
-    let cost =
-        Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: n + n_surface_points + m * d };
-    Ok(Plan { main, surface: Some(surface), work: AppliedWork { values, queries, request }, cost })
+    let n_lists = if has_deviations { 2 } else { 1 };
+    let n_numbers = planner.check_answer(of_operator.and_then(|n| n.checked_mul(n_lists)))?;
+    let cost = Cost { work, n_numbers, n_held: n + n_surface_points + m * d };
+    let work = AppliedWork { values, queries, request };
+    Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
 }
 
 /// Plans an operator as a matrix, with so many rows per query.
@@ -169,14 +156,15 @@ pub fn plan_matrix(
     rows_per_query: impl Fn(usize) -> usize,
 ) -> Result<Plan<MatrixWork>, Problem> {
     let request = operator_request(&geometry);
-    let (mut main, mut surface) = planner.fits(fit, geometry, &request)?;
-    check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &mut [&mut main, &mut surface])?;
-    let n = main.stored.cloud.n_points();
+    let (mut main, mut surface) = planner.matrix_fits(fit, geometry, &request)?;
+    check_is_surface(&main.on.stored.cloud)?;
+    let queries = planner.queries(queries, &mut surface.on)?;
+    main.on.pointers.queries = surface.on.pointers.queries;
+    let n = main.on.n_points();
     let (m, d) = (queries.n_points(), queries.dimension());
     let n_rows = m.checked_mul(rows_per_query(d));
     let asked = Asked::OperatorMatrix {
-        n_surface_points: surface.n_points(),
+        n_surface_points: surface.on.n_points(),
         n_rows: n_rows.unwrap_or(usize::MAX),
         surface: asked_of(&request, &surface, &queries),
     };
@@ -185,7 +173,8 @@ pub fn plan_matrix(
         work: work_price(asked, n, m, d),
         n_held: m * d,
     };
-    Ok(Plan { main, surface: Some(surface), work: MatrixWork { queries, request }, cost })
+    let work = MatrixWork { queries, request };
+    Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
 }
 
 /// Checked work of an operator as a sparse matrix.
@@ -265,17 +254,23 @@ impl AppliedWork {
         operator: OnKriged,
         observer: &JobObserver,
     ) -> Result<Option<KrigedAnswer>, Problem> {
-        let Some(moving) = fits.main.stored.of_queries() else { return Ok(None) };
+        let Some(moving) = fits.main.model().kriging() else { return Ok(None) };
         let refused = |error| fits.main.refused(error);
-        let (plan, values) = (&fits.main.plan, fits.main.merged(&self.values));
-        let function = Kriged { moving, values: &values, trend: plan.trend(), factor: plan.scale };
+        let (plan, values) = (&fits.main.plan, fits.main.plan.merged(&self.values.list));
+        let (trend, factor) = (plan.trend(), plan.process.scale);
+        let function = Kriged { moving, values: &values, trend, factor };
         let found = operator(&surface.geometry, function, &self.queries, observer).map_err(refused)?;
         let mut degenerate = surface.degenerate();
         surface.flag_uncertain(Ok(found.uncertain), &mut degenerate).map_err(refused)?;
-        let m = self.queries.n_points();
-        let mut diagnostics = fits.main.moving_diagnostics((m, found.n_dependent), moving.n_neighbours())?;
+        let report = Report {
+            trend: trend.cloned(),
+            n_neighbours: moving.n_neighbours(),
+            n_dependent: found.n_dependent,
+            ..Report::default()
+        };
+        let mut diagnostics = fits.main.diagnostics(&report, self.queries.n_points());
         fits.main.warn_of_misfit(&mut diagnostics, None, self.request.has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         let deviations = self.request.has_deviations.then_some(found.deviations);
         Ok(Some(KrigedAnswer { values: found.values, deviations, degenerate, diagnostics }))
     }
@@ -314,8 +309,8 @@ pub fn plan_stencils(
 ) -> Result<Plan<StencilWork>, Problem> {
     let request = operator_request(&geometry);
     let (nodes, mut main) = planner.stencils(fit, geometry, &request)?;
-    check_is_surface(&main.stored.cloud)?;
-    let queries = planner.queries(queries, &mut [&mut main])?;
+    check_is_surface(&main.on.stored.cloud)?;
+    let queries = planner.queries(queries, &mut main.on)?;
     let (m, d) = (queries.n_points(), queries.dimension());
     let n_entries = m.checked_mul(n_entries_per_row(d)).and_then(|n| n.checked_mul(1 + n_components(d)));
     let cost = Cost {
@@ -323,7 +318,8 @@ pub fn plan_stencils(
         n_numbers: planner.check_answer(n_entries)?,
         n_held: m * d,
     };
-    Ok(Plan { main, surface: None, work: StencilWork { nodes, queries, request }, cost })
+    let work = StencilWork { nodes, queries, request };
+    Ok(Plan { main: main.into(), surface: None, work, cost })
 }
 
 /// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
@@ -357,13 +353,13 @@ pub fn geometry_request(
 }
 
 /// What a request takes of its surface, as far as its price goes.
-fn asked_of(request: &GeometryRequest, surface: &PlannedFit, queries: &Cloud) -> AskedOfSurface {
+fn asked_of(request: &GeometryRequest, surface: &PlannedSurface, queries: &Cloud) -> AskedOfSurface {
     let offsets = match (request.model, request.checks_curvatures) {
         (SurfaceModel::Offset, _) => Offsets::Everywhere,
         (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, true) => Offsets::Confirmations,
         (SurfaceModel::Auto | SurfaceModel::Signature | SurfaceModel::Local, false) => Offsets::Rescues,
     };
-    let are_points = *queries == *surface.stored.cloud;
+    let are_points = *queries == *surface.on.stored.cloud;
     AskedOfSurface {
         offsets,
         has_own_quadrics: request.checks_curvatures && !are_points,

@@ -29,6 +29,7 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::Owner;
+use gramian_numerics::model::Report;
 use gramian_numerics::surface::operators::{
     Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix,
     laplace_beltrami_of_kriged, laplace_beltrami_stencils,
@@ -173,8 +174,8 @@ impl Operation for LaplaceBeltramiRequest {
     }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
-        let values = Arc::new(std::mem::take(&mut self.values));
-        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let values = std::mem::take(&mut self.values);
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let applied =
             Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
         plan_applied(planner, fit, applied, |_| 1)
@@ -200,11 +201,12 @@ impl Operation for LaplaceBeltramiRequest {
         let values = laplace_beltrami(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let m = geometry.n_queries();
-        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
+        let (factor, queries) = (fits.main.plan.process.scale, &*work.queries);
+        let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
+        let mut diagnostics = fits.main.diagnostics(&report, m);
         let has_deviations = work.request.has_deviations;
-        fits.main.warn_of_misfit(&mut diagnostics, Some(&interpolant.solution), has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
-        let (factor, queries) = (fits.main.plan.scale, &*work.queries);
+        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, has_deviations);
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         let interpolant = &interpolant;
         let deviations = || laplace_beltrami_deviations(geometry, interpolant, factor, queries, observer);
         let deviations = work.request.has_deviations.then(deviations).transpose();
@@ -212,7 +214,7 @@ impl Operation for LaplaceBeltramiRequest {
         let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
         let judge = |judged: Judged<'_>| judged.laplace_beltrami(observer);
         let of = (fits, &surface);
-        let degenerate = degenerate(of, &work.values, judged, deviations.as_deref(), judge, observer)?;
+        let degenerate = degenerate(of, &work.values.list, judged, deviations.as_deref(), judge, observer)?;
         Ok(LaplaceBeltramiResponse {
             values: surface.per_query(values, &[m]),
             value_deviations: deviations.map(|found| surface.known_per_query(found, &[m])),
@@ -248,9 +250,9 @@ impl Operation for LaplaceBeltramiMatrixRequest {
         let geometry = &surface.geometry;
         let matrix = laplace_beltrami_matrix(
             geometry,
-            fits.main.solver()?,
+            fits.main.model().solver().map_err(|error| fits.main.refused(error))?,
             &work.queries,
-            fits.main.plan.mean,
+            fits.main.plan.process.mean,
             observer,
         )
         .map_err(|error| fits.main.refused(error))?;
@@ -361,7 +363,7 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
             indices: Integers::new(matrix.indices),
             data,
             degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits)?,
+            diagnostics: surface.diagnostics(fits),
         })
     }
 }

@@ -22,7 +22,7 @@ use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::store::Owner;
-use gramian_numerics::defaults::Purpose;
+use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
     /// A cloud that samples a hypersurface, and where its normals are wanted.
@@ -122,7 +122,7 @@ impl Operation for NormalsRequest {
             surfaces: surface.surfaces(),
             degenerate: surface.degenerate(),
             normal_deviations: surface.deviations().map(|deviations| deviations.normal),
-            diagnostics: surface.diagnostics(fits)?,
+            diagnostics: surface.diagnostics(fits),
         })
     }
 }

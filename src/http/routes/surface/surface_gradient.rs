@@ -27,6 +27,7 @@ use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::Owner;
+use gramian_numerics::model::Report;
 use gramian_numerics::surface::operators::{
     Judged, surface_gradient, surface_gradient_deviations, surface_gradient_matrices,
     surface_gradient_of_kriged, surface_gradient_stencils,
@@ -157,8 +158,8 @@ impl Operation for SurfaceGradientRequest {
     }
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<AppliedWork>, Problem> {
-        let values = Arc::new(std::mem::take(&mut self.values));
-        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let values = std::mem::take(&mut self.values);
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let applied =
             Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
         plan_applied(planner, fit, applied, |d| d)
@@ -184,11 +185,12 @@ impl Operation for SurfaceGradientRequest {
         let gradients = surface_gradient(geometry, &interpolant, &work.queries, observer)
             .map_err(|error| fits.main.refused(error))?;
         let (m, d) = (geometry.n_queries(), geometry.dimension());
-        let mut diagnostics = fits.main.diagnostics(&interpolant.solution, m)?;
+        let (factor, queries) = (fits.main.plan.process.scale, &*work.queries);
+        let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
+        let mut diagnostics = fits.main.diagnostics(&report, m);
         let has_deviations = work.request.has_deviations;
-        fits.main.warn_of_misfit(&mut diagnostics, Some(&interpolant.solution), has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)?));
-        let (factor, queries) = (fits.main.plan.scale, &*work.queries);
+        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, has_deviations);
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
         let interpolant = &interpolant;
         let deviations = || surface_gradient_deviations(geometry, interpolant, factor, queries, observer);
         let deviations = work.request.has_deviations.then(deviations).transpose();
@@ -196,7 +198,7 @@ impl Operation for SurfaceGradientRequest {
         let judged = Judged { geometry, interpolant, factor, queries, found: &gradients, learned: None };
         let judge = |judged: Judged<'_>| judged.surface_gradient(observer);
         let of = (fits, &surface);
-        let degenerate = degenerate(of, &work.values, judged, deviations.as_deref(), judge, observer)?;
+        let degenerate = degenerate(of, &work.values.list, judged, deviations.as_deref(), judge, observer)?;
         Ok(SurfaceGradientResponse {
             gradients: surface.per_query(gradients, &[m, d]),
             gradient_deviations: deviations.map(|found| surface.known_per_query(found, &[m, d])),
@@ -231,9 +233,9 @@ impl Operation for SurfaceGradientMatrixRequest {
         let geometry = &surface.geometry;
         let matrices = surface_gradient_matrices(
             geometry,
-            fits.main.solver()?,
+            fits.main.model().solver().map_err(|error| fits.main.refused(error))?,
             &work.queries,
-            fits.main.plan.mean,
+            fits.main.plan.process.mean,
             observer,
         )
         .map_err(|error| fits.main.refused(error))?;
@@ -342,7 +344,7 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
             indices: Integers::new(matrix.indices),
             data,
             degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits)?,
+            diagnostics: surface.diagnostics(fits),
         })
     }
 }

@@ -18,7 +18,7 @@ use crate::http::problem::slug::Slug;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::{DenseOnly, Planner};
+use crate::http::serve::planner::{DenseOnly, GivenValues, Planner};
 use crate::http::state::app::App;
 use crate::http::wire::read::members::{present, present_word, present_words, word};
 use crate::http::wire::write::answer::{Member, Parts, answer};
@@ -232,22 +232,22 @@ impl Operation for ModelSelectionRequest {
             let detail = "what is left out are points of the cloud: merge those that coincide beforehand";
             return Err(Problem::invalid_request("/duplicates", detail));
         }
-        let values = Arc::new(std::mem::take(&mut self.values));
-        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let given = GivenValues::one(std::mem::take(&mut self.values));
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let dense_only = DenseOnly { name: "model selection", pointer: "/solver" };
-        let mut main = planner.values_fit(fit, Some(dense_only))?;
-        planner.queries(None, &mut [&mut main])?;
-        let (n, d) = (main.n_points(), main.stored.cloud.dimension());
+        let (mut main, values) = planner.values_fit(fit, given, Some(dense_only))?;
+        planner.queries(None, &mut main.on)?;
+        let (n, d) = (main.on.n_points(), main.on.stored.cloud.dimension());
         if n > MAX_POINTS {
             let problem =
                 Problem::too_large(Slug::ProblemTooLarge, "points of a selection", MAX_POINTS, Some(n));
             let remedy = "select on a sample of the points, and send what was found with all of them";
-            return Err(problem.at(main.pointers.points).with_remedy(remedy));
+            return Err(problem.at(main.on.pointers.points).with_remedy(remedy));
         }
         search.check_axes_of(d)?;
         let n_numbers = planner.check_answer(n.checked_mul(3).and_then(|n| n.checked_add(4 * N_ALPHAS)))?;
         let cost = Cost { work: search.price((n, d), main.n_length_scales()), n_numbers, n_held: n };
-        Ok(Plan { main, surface: None, work: Work { values, search }, cost })
+        Ok(Plan { main: main.into(), surface: None, work: Work { values, search }, cost })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<ModelSelectionResponse, Problem> {

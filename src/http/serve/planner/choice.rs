@@ -1,13 +1,11 @@
 //! What a request chose of kernel, regularization and solver, where it said so, and what does not go together.
 
-use std::sync::Arc;
-
 use super::inputs::length_mismatch;
-use crate::http::fields::{Fit, Geometry, Kernel};
+use crate::http::fields::{Fit, Geometry, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
+use crate::http::serve::plan::FittedCloud;
 use crate::http::wire::read::points::Points;
-use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 
@@ -76,49 +74,52 @@ pub(super) fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Poi
     }
 }
 
-/// What the client chose of kernel and regularization, for values or without.
-#[derive(Default)]
-pub(super) struct Chosen {
+/// What the client chose of kernel, regularization, mean and solver.
+#[derive(Default, Clone)]
+pub(super) struct FitOptions {
     pub(super) kernel: Option<Kernel>,
     pub(super) alpha: Option<f64>,
     pub(super) noise_variances: Option<Vec<f64>>,
-    pub(super) values: Option<Arc<Vec<f64>>>,
-    pub(super) n_lists: usize,
+    pub(super) solver: SolverChoice,
     pub(super) mean: Option<Mean>,
     pub(super) sites: Option<Points>,
 }
 
-impl Chosen {
+impl FitOptions {
     pub(super) fn of(fit: Fit) -> Self {
         Self {
             kernel: fit.kernel,
             alpha: fit.alpha,
             noise_variances: fit.noise_variances,
-            values: fit.values,
-            n_lists: fit.n_lists,
+            solver: fit.solver,
             mean: fit.mean.map(Mean::from),
             sites: fit.sites,
         }
     }
 
+    /// Where kernel or noise stand, if one of them is given.
+    pub(super) fn given_process(&self, pointers: Pointers) -> Option<&'static str> {
+        if self.kernel.is_some() {
+            return Some(pointers.kernel);
+        }
+        let has_noise = self.alpha.is_some() || self.noise_variances.is_some();
+        has_noise.then_some(pointers.regularization)
+    }
+
     /// What is given; `None` leaves it to the service.
-    pub(super) fn regularization(
-        self,
-        stored: &RegisteredCloud,
-        pointers: Pointers,
-    ) -> Result<Option<Regularization>, Problem> {
-        let refuse = |error| Problem::from_numerics(error, pointers);
+    pub(super) fn regularization(self, on: &FittedCloud) -> Result<Option<Regularization>, Problem> {
+        let refuse = |error| Problem::from_numerics(error, on.pointers);
         match (self.alpha, self.noise_variances) {
             (Some(_), Some(_)) => {
                 let detail = "noise_variances stands instead of alpha; give one of them";
-                Err(Problem::invalid_request(pointers.regularization, detail))
+                Err(Problem::invalid_request(on.pointers.regularization, detail))
             }
             (None, None) => Ok(None),
             (Some(alpha), None) => Regularization::uniform(alpha).map(Some).map_err(refuse),
             (None, Some(variances)) => {
                 let found = variances.len();
-                if stored.cloud.n_points() != found {
-                    return Err(length_mismatch(pointers.regularization, &stored.cloud, found));
+                if on.n_points() != found {
+                    return Err(length_mismatch(on.pointers.regularization, &on.stored.cloud, found));
                 }
                 Regularization::per_point(variances).map(Some).map_err(refuse)
             }

@@ -8,7 +8,7 @@ use crate::http::fields::CloudRef;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::serve::durable::TRUST;
-use crate::http::serve::plan::PlannedFit;
+use crate::http::serve::plan::FittedCloud;
 use crate::http::wire::read::limits::{too_many_coordinates, too_many_points, too_many_queries, transposed};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::store::clouds::RegisteredCloud;
@@ -19,29 +19,21 @@ use gramian_numerics::points::cloud::Cloud;
 /// Bytes that a number takes in JSON at most, with its comma.
 const BYTES_PER_NUMBER: usize = 25;
 impl Planner<'_> {
-    /// Queries of the dimension of a fit's cloud; absent, its points. The fits are told where their queries stand.
+    /// Queries of the dimension of a fit's cloud; absent, its points. The fit is told where its queries stand.
     ///
     /// # Errors
     /// 413 beyond the limit, 422 for what is no list of points of this dimension.
-    pub fn queries(
-        &self,
-        queries: Option<Points>,
-        fits: &mut [&mut PlannedFit],
-    ) -> Result<Arc<Cloud>, Problem> {
-        // The last fit is that of the surface, whose points are the default.
-        let Some(default) = fits.last().map(|fit| (fit.stored.cloud.clone(), fit.pointers.points)) else {
-            return Err(Problem::internal());
-        };
+    pub fn queries(&self, queries: Option<Points>, of: &mut FittedCloud) -> Result<Arc<Cloud>, Problem> {
         let Some(points) = queries else {
-            fits.iter_mut().for_each(|fit| fit.pointers.queries = default.1);
-            return Ok(default.0);
+            of.pointers.queries = of.pointers.points;
+            return Ok(of.stored.cloud.clone());
         };
         let queries = rectangular(points, "/queries", Slug::InvalidRequest)?;
         let (limit, required) = (self.app.config.max_queries, queries.n_points());
         if required > limit {
             return Err(too_many_queries(limit, required).at("/queries"));
         }
-        let (expected, found) = (default.0.dimension(), queries.dimension());
+        let (expected, found) = (of.stored.cloud.dimension(), queries.dimension());
         if expected != found {
             return Err(dimension_mismatch("/queries", expected, &queries));
         }
@@ -178,17 +170,30 @@ pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
     }
 }
 
-/// Lists of values of one length, and how many they are.
+/// Values of a request, one for each point of its cloud.
+pub struct GivenValues {
+    pub list: Vec<f64>,
+    /// k, where there are k lists.
+    pub n_lists: Option<usize>,
+}
+
+impl GivenValues {
+    pub fn one(list: Vec<f64>) -> Self {
+        Self { list, n_lists: None }
+    }
+}
+
+/// Lists of values of one length.
 ///
 /// # Errors
 /// 422 for no list, and for one of another length than the first.
-pub fn value_lists(ValueLists(lists): ValueLists) -> Result<(Arc<Vec<f64>>, usize), Problem> {
+pub fn value_lists(ValueLists(lists): ValueLists) -> Result<GivenValues, Problem> {
     if let Some((row, found)) = lists.ragged {
         return Err(Problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
     }
     match lists.n_rows {
         0 => Err(Problem::invalid_request("/values", "at least one list of values is needed")),
-        n_rows => Ok((Arc::new(lists.coordinates), n_rows)),
+        n_rows => Ok(GivenValues { list: lists.coordinates, n_lists: Some(n_rows) }),
     }
 }
 

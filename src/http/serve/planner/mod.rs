@@ -6,11 +6,11 @@ mod inputs;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use super::plan::{LocalReason, PlannedFit, PlannedValues, Way};
+use super::plan::{FittedCloud, PlannedSurface, PlannedValues, SurfaceChoice, Values};
 use crate::http::fields::kernel::PlannedKernel;
-use crate::http::fields::{DuplicatePolicy, Fit, Geometry, SolverChoice};
+use crate::http::fields::{Fit, Geometry, SolverChoice};
+use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::problem::{Pointers, Problem};
 use crate::http::state::app::App;
 use crate::http::wire::read::limits::too_many_dense_points;
 use crate::store::Owner;
@@ -18,16 +18,15 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::DenseOnly;
 use choice::{
-    Chosen, TRY_LOCAL, local_lacks_operators, only_local_has_sites, pointers_of, pointers_of_surface,
+    FitOptions, TRY_LOCAL, local_lacks_operators, only_local_has_sites, pointers_of, pointers_of_surface,
 };
-use gramian_numerics::defaults::Purpose;
-use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::error::SolverKind;
+use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
 use gramian_numerics::solver::trend::Mean;
-use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use inputs::length_mismatch;
-pub use inputs::{check_seed, unknown_cloud, value_lists};
+pub use inputs::{GivenValues, check_seed, unknown_cloud, value_lists};
 
 /// Validates the parts of a request against the limits and the stored clouds.
 pub struct Planner<'a> {
@@ -63,18 +62,21 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn values_fit(&self, mut fit: Fit, dense_only: Option<DenseOnly>) -> Result<PlannedFit, Problem> {
-        let pointers = pointers_of(&fit);
-        let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let way = match (self.way_of_values(&fit, &stored), dense_only) {
-            (Way::Moving(LocalReason::Asked), Some(asked)) => return Err(asked.refused_by_local()),
-            (Way::Moving(_), Some(asked)) => {
-                return Err(self.beyond_dense(&stored, pointers).with_remedy(&asked.remedy()));
-            }
-            (way, _) => way,
-        };
-        let duplicates = fit.duplicates;
-        self.plan(stored, Chosen::of(fit), way, duplicates, Purpose::Values, pointers)
+    pub fn values_fit(
+        &self,
+        mut fit: Fit,
+        given: GivenValues,
+        dense_only: Option<DenseOnly>,
+    ) -> Result<(PlannedValues, Arc<Values>), Problem> {
+        let on = self.fitted_cloud(&mut fit)?;
+        let solver = self.solver_of_values(&fit, &on.stored);
+        if let Some(asked) = dense_only.filter(|_| solver.kind == SolverKind::Local) {
+            return Err(match solver.reason {
+                None => asked.refused_by_local(),
+                Some(_) => self.beyond_dense(&on).with_remedy(&asked.remedy()),
+            });
+        }
+        self.plan_given_values(on, FitOptions::of(fit), solver, given)
     }
 
     /// Checks the fit of a surface: of a signature function, or local regressions.
@@ -86,62 +88,53 @@ impl<'a> Planner<'a> {
         mut fit: Fit,
         purpose: Purpose,
         request: &GeometryRequest,
-    ) -> Result<PlannedFit, Problem> {
-        let pointers = pointers_of(&fit);
+    ) -> Result<PlannedSurface, Problem> {
+        let on = self.fitted_cloud(&mut fit)?;
+        self.plan_surface(on, FitOptions::of(fit), purpose, request)
+    }
+
+    /// The cloud of a request, taken out of its fit.
+    fn fitted_cloud(&self, fit: &mut Fit) -> Result<FittedCloud, Problem> {
+        let pointers = pointers_of(fit);
         let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let (solver, duplicates) = (fit.solver, fit.duplicates);
-        self.plan_surface(stored, Chosen::of(fit), solver, duplicates, (purpose, request), pointers)
+        Ok(FittedCloud { owner: self.owner, stored, pointers, duplicates: fit.duplicates })
     }
 
     fn plan_surface(
         &self,
-        stored: Arc<RegisteredCloud>,
-        chosen: Chosen,
-        solver: SolverChoice,
-        duplicates: DuplicatePolicy,
-        (purpose, request): (Purpose, &GeometryRequest),
-        pointers: Pointers,
-    ) -> Result<PlannedFit, Problem> {
-        let Some(reason) = self.local_reason(&stored.cloud, &chosen, solver, request, pointers)? else {
-            if chosen.sites.is_some() {
-                return Err(only_local_has_sites());
+        on: FittedCloud,
+        mut options: FitOptions,
+        purpose: Purpose,
+        request: &GeometryRequest,
+    ) -> Result<PlannedSurface, Problem> {
+        let sites = options.sites.take();
+        let choice = match self.choice_of_surface(&on, &options, request)? {
+            Regressed::Locally(reason) => {
+                let sites = sites.map(|sites| self.sites(sites, &on.stored.cloud)).transpose()?;
+                SurfaceChoice::Regressions { reason, sites }
             }
-            return self.plan(stored, chosen, Way::Dense, duplicates, purpose, pointers);
+            Regressed::No if sites.is_some() => return Err(only_local_has_sites()),
+            Regressed::No => {
+                self.check_max_dense_points(&on)?;
+                let kernel = options.kernel.as_ref().map(|kernel| kernel.plan(on.pointers)).transpose()?;
+                let regularization = options.regularization(&on)?;
+                SurfaceChoice::Signature { kernel, regularization, purpose }
+            }
         };
-        let sites = chosen.sites.map(|sites| self.sites(sites, &stored.cloud)).transpose()?;
-        let way = Way::Regressions { reason, sites };
-        let (kernel, regularization) = (None, None);
-        Ok(PlannedFit {
-            owner: self.owner,
-            stored,
-            pointers,
-            kernel,
-            regularization,
-            duplicates,
-            purpose,
-            way,
-            values: None,
-            mean: Mean::Zero,
-        })
+        Ok(PlannedSurface { on, choice })
     }
 
-    /// Why a surface is regressed locally, if it is.
-    fn local_reason(
+    /// Whether a surface is regressed locally, and why where that was not asked for.
+    fn choice_of_surface(
         &self,
-        cloud: &Cloud,
-        chosen: &Chosen,
-        solver: SolverChoice,
+        on: &FittedCloud,
+        options: &FitOptions,
         request: &GeometryRequest,
-        pointers: Pointers,
-    ) -> Result<Option<LocalReason>, Problem> {
-        let (n, d) = (cloud.n_points(), cloud.dimension());
-        let given = [
-            (chosen.kernel.is_some(), pointers.kernel),
-            (chosen.alpha.is_some() || chosen.noise_variances.is_some(), pointers.regularization),
-        ];
-        let given = given.into_iter().find_map(|(is_given, pointer)| is_given.then_some(pointer));
-        if solver == SolverChoice::Local || request.model == SurfaceModel::Local {
-            let pointer = if solver == SolverChoice::Local { "/solver" } else { "/surface" };
+    ) -> Result<Regressed, Problem> {
+        let (n, d) = (on.stored.cloud.n_points(), on.stored.cloud.dimension());
+        let given = options.given_process(on.pointers);
+        if options.solver == SolverChoice::Local || request.model == SurfaceModel::Local {
+            let pointer = if options.solver == SolverChoice::Local { "/solver" } else { "/surface" };
             if !(2..=MAX_LOCAL_DIMENSION).contains(&d) && d >= 2 {
                 let detail = format!(
                     "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {d}"
@@ -153,14 +146,16 @@ impl<'a> Planner<'a> {
                               \"surface\": \"signature\"";
                 return Err(Problem::of_field(Slug::UnsupportedBySolver, pointer, detail));
             }
-            return Ok(Some(LocalReason::Asked));
+            return Ok(Regressed::Locally(None));
         }
-        if solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some() {
-            return Ok(None);
+        if options.solver != SolverChoice::Auto || request.model != SurfaceModel::Auto || given.is_some() {
+            return Ok(Regressed::No);
         }
         let max_dense_points = self.app.config.max_dense_points;
-        let reason = prefers_local(n, d, max_dense_points, request.has_deviations);
-        Ok(reason.map(LocalReason::Auto))
+        Ok(match prefers_local(n, d, max_dense_points, request.has_deviations) {
+            None => Regressed::No,
+            reason => Regressed::Locally(reason),
+        })
     }
 
     /// The nodes of stencils and the fit of the surface under them.
@@ -172,12 +167,12 @@ impl<'a> Planner<'a> {
         mut fit: Fit,
         geometry: Option<Geometry>,
         request: &GeometryRequest,
-    ) -> Result<(Arc<RegisteredCloud>, PlannedFit), Problem> {
-        let pointers = pointers_of(&fit);
-        let nodes = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
+    ) -> Result<(Arc<RegisteredCloud>, PlannedSurface), Problem> {
+        let on = self.fitted_cloud(&mut fit)?;
+        let nodes = on.stored.clone();
         // The nodes need no solver: what is said of them is said of the surface.
-        let (_, surface) = self.fits_over((nodes.clone(), pointers), fit, geometry, request, None)?;
-        Ok((nodes, surface))
+        let SurfaceUnder { on, options, .. } = self.surface_under(&on, FitOptions::of(fit), geometry)?;
+        Ok((nodes, self.plan_surface(on, options, Purpose::Curvatures, request)?))
     }
 
     /// The fits of values and of the surface under them, for an operator on the values: kriged around each query where they are more than are
@@ -188,176 +183,204 @@ impl<'a> Planner<'a> {
     pub fn operator_fits(
         &self,
         mut fit: Fit,
+        given: GivenValues,
         geometry: Option<Geometry>,
         request: &GeometryRequest,
-    ) -> Result<(PlannedFit, PlannedFit), Problem> {
-        let pointers = pointers_of(&fit);
-        let cloud = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let way = self.way_of_values(&fit, &cloud);
-        let (values, surface) = self.fits_over((cloud, pointers), fit, geometry, request, Some(way))?;
-        Ok((values.ok_or_else(Problem::internal)?, surface))
+    ) -> Result<OperatorFits, Problem> {
+        let on = self.fitted_cloud(&mut fit)?;
+        let (solver, options) = (self.solver_of_values(&fit, &on.stored), FitOptions::of(fit));
+        let under = self.surface_under(&on, options.clone(), geometry)?;
+        let (main, values) = self.plan_given_values(on, options, solver, given)?;
+        Ok(OperatorFits { main, values, surface: self.plan_surface_under(under, request)? })
     }
 
-    /// How values are served where either solver has what is asked.
-    fn way_of_values(&self, fit: &Fit, cloud: &RegisteredCloud) -> Way {
+    /// The solver of values where either has what is asked, and why it is the local one where that was not asked for.
+    fn solver_of_values(&self, fit: &Fit, stored: &RegisteredCloud) -> ValuesSolver {
         match fit.solver {
-            SolverChoice::Local => Way::Moving(LocalReason::Asked),
-            SolverChoice::Auto if cloud.cloud.n_points() > self.app.config.max_dense_points => {
-                Way::Moving(LocalReason::Auto(AutoLocal::BeyondDense))
+            SolverChoice::Local => ValuesSolver::asked(SolverKind::Local),
+            SolverChoice::Auto if stored.cloud.n_points() > self.app.config.max_dense_points => {
+                ValuesSolver { kind: SolverKind::Local, reason: Some(AutoLocal::BeyondDense) }
             }
-            SolverChoice::Auto | SolverChoice::Dense => Way::Dense,
+            SolverChoice::Auto | SolverChoice::Dense => ValuesSolver::asked(SolverKind::Dense),
         }
     }
 
-    /// Checks the fits of values and of the surface that they live on; what `geometry` leaves out is as in the request.
+    /// Checks the fits of values, which are not given, and of the surface that they live on; what `geometry` leaves out is as in the
+    /// request.
     ///
     /// # Errors
     /// A [`Problem`] with a pointer to the field.
-    pub fn fits(
+    pub fn matrix_fits(
         &self,
         mut fit: Fit,
         geometry: Option<Geometry>,
         request: &GeometryRequest,
-    ) -> Result<(PlannedFit, PlannedFit), Problem> {
+    ) -> Result<(PlannedValues, PlannedSurface), Problem> {
         if fit.solver == SolverChoice::Local {
             return Err(local_lacks_operators("/solver"));
         }
-        let pointers = pointers_of(&fit);
-        let cloud = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
-        let (values, surface) =
-            self.fits_over((cloud, pointers), fit, geometry, request, Some(Way::Dense))?;
-        Ok((values.ok_or_else(Problem::internal)?, surface))
+        let on = self.fitted_cloud(&mut fit)?;
+        let (solver, options) = (ValuesSolver::asked(SolverKind::Dense), FitOptions::of(fit));
+        let under = self.surface_under(&on, options.clone(), geometry)?;
+        let main = self.plan_values(on, options, solver, Mean::Zero)?;
+        Ok((main, self.plan_surface_under(under, request)?))
     }
 
-    fn fits_over(
+    /// The surface under values or nodes; what `geometry` leaves out is as in the request.
+    fn surface_under(
         &self,
-        (values_cloud, pointers): (Arc<RegisteredCloud>, Pointers),
-        fit: Fit,
+        values: &FittedCloud,
+        options: FitOptions,
         geometry: Option<Geometry>,
-        request: &GeometryRequest,
-        way_of_values: Option<Way>,
-    ) -> Result<(Option<PlannedFit>, PlannedFit), Problem> {
+    ) -> Result<SurfaceUnder, Problem> {
         let geometry = geometry.unwrap_or_default();
-        let surface_pointers = pointers_of_surface(&geometry, pointers);
-        let surface_cloud = match geometry.cloud {
-            None => values_cloud.clone(),
+        let pointers = pointers_of_surface(&geometry, values.pointers);
+        let stored = match geometry.cloud {
+            None => values.stored.clone(),
             Some(cloud) => self.cloud(cloud, "/geometry/cloud")?,
         };
-        let (expected, found) = (values_cloud.cloud.dimension(), surface_cloud.cloud.dimension());
+        let (expected, found) = (values.stored.cloud.dimension(), stored.cloud.dimension());
         if expected != found {
             return Err(Problem::dimension_mismatch("/geometry/cloud", expected, found));
         }
-        let (solver, duplicates) = (geometry.solver.unwrap_or(fit.solver), fit.duplicates);
-        let mut chosen = Chosen::of(fit);
-        let sites = chosen.sites.take();
         let inherits_noise = geometry.alpha.is_none() && geometry.noise_variances.is_none();
-        if inherits_noise && chosen.noise_variances.is_some() && surface_cloud.id != values_cloud.id {
+        if inherits_noise && options.noise_variances.is_some() && stored.id != values.stored.id {
             let detail =
                 "noise_variances belong to the points of cloud; give alpha or noise_variances here as well";
             return Err(Problem::invalid_request("/geometry", detail));
         }
-        // Local regressions take no kernel: that of the values is not meant for them.
-        let is_beyond = surface_cloud.cloud.n_points() > self.app.config.max_dense_points;
+        let has_own_process = geometry.kernel.is_some() || !inherits_noise;
+        let (alpha, noise_variances) = match inherits_noise {
+            true => (options.alpha, options.noise_variances),
+            false => (geometry.alpha, geometry.noise_variances),
+        };
+        let options = FitOptions {
+            kernel: geometry.kernel.or(options.kernel),
+            alpha,
+            noise_variances,
+            solver: geometry.solver.unwrap_or(options.solver),
+            mean: None,
+            sites: options.sites,
+        };
+        let on = FittedCloud { owner: self.owner, stored, pointers, duplicates: values.duplicates };
+        Ok(SurfaceUnder { on, options, has_own_process })
+    }
+
+    /// Plans the surface under values. Local regressions take no kernel: that of the values is not meant for them.
+    fn plan_surface_under(
+        &self,
+        SurfaceUnder { on, options, has_own_process }: SurfaceUnder,
+        request: &GeometryRequest,
+    ) -> Result<PlannedSurface, Problem> {
+        let solver = options.solver;
+        let is_beyond = on.n_points() > self.app.config.max_dense_points;
         let is_local = solver == SolverChoice::Local
             || request.model == SurfaceModel::Local
             || solver == SolverChoice::Auto && is_beyond;
-        let has_own = geometry.kernel.is_some() || !inherits_noise;
-        let surface_chosen = if is_local && !has_own && way_of_values.is_some() {
-            Chosen::default()
-        } else {
-            Chosen {
-                kernel: geometry.kernel.or_else(|| chosen.kernel.clone()),
-                alpha: if inherits_noise { chosen.alpha } else { geometry.alpha },
-                noise_variances: match inherits_noise {
-                    true => chosen.noise_variances.clone(),
-                    false => geometry.noise_variances,
-                },
-                sites,
-                ..Chosen::default()
-            }
+        let options = match is_local && !has_own_process {
+            true => FitOptions { solver, ..FitOptions::default() },
+            false => options,
         };
-        let plan = |way| self.plan(values_cloud, chosen, way, duplicates, Purpose::Values, pointers);
-        let values = way_of_values.map(plan).transpose()?;
-        let asked = (Purpose::Curvatures, request);
-        let surface =
-            self.plan_surface(surface_cloud, surface_chosen, solver, duplicates, asked, surface_pointers)?;
-        Ok((values, surface))
+        self.plan_surface(on, options, Purpose::Curvatures, request)
     }
 
     /// Admits a cloud to the dense solver. This is the one place that holds it to its limit: for solvers that never factorize all
     /// points at once, it is [`Planner::register`] that has.
-    fn check_max_dense_points(&self, stored: &RegisteredCloud, pointers: Pointers) -> Result<(), Problem> {
-        if stored.cloud.n_points() <= self.app.config.max_dense_points {
+    fn check_max_dense_points(&self, on: &FittedCloud) -> Result<(), Problem> {
+        if on.n_points() <= self.app.config.max_dense_points {
             return Ok(());
         }
-        Err(self.beyond_dense(stored, pointers).with_remedy(TRY_LOCAL))
+        Err(self.beyond_dense(on).with_remedy(TRY_LOCAL))
     }
 
     /// 413 for a cloud of too many points to be factorized at once.
-    fn beyond_dense(&self, stored: &RegisteredCloud, pointers: Pointers) -> Problem {
-        let (limit, required) = (self.app.config.max_dense_points, stored.cloud.n_points());
-        too_many_dense_points(limit, required).at(pointers.points)
+    fn beyond_dense(&self, on: &FittedCloud) -> Problem {
+        too_many_dense_points(self.app.config.max_dense_points, on.n_points()).at(on.pointers.points)
     }
 
-    fn plan(
+    fn plan_values(
         &self,
-        stored: Arc<RegisteredCloud>,
-        chosen: Chosen,
-        way: Way,
-        duplicates: DuplicatePolicy,
-        purpose: Purpose,
-        pointers: Pointers,
-    ) -> Result<PlannedFit, Problem> {
-        if way == Way::Dense {
-            self.check_max_dense_points(&stored, pointers)?;
+        on: FittedCloud,
+        options: FitOptions,
+        solver: ValuesSolver,
+        default_mean: Mean,
+    ) -> Result<PlannedValues, Problem> {
+        let ValuesSolver { kind, reason } = solver;
+        if kind == SolverKind::Dense {
+            self.check_max_dense_points(&on)?;
         }
-        let kernel = chosen.kernel.as_ref().map(|kernel| kernel.plan(pointers)).transpose()?;
-        let follows = kernel.is_none() && chosen.values.is_some();
-        let mean = chosen.mean.unwrap_or(if follows { Mean::Constant } else { Mean::Zero });
-        let (values, n_lists) = (chosen.values.clone(), chosen.n_lists);
-        let regularization = chosen.regularization(&stored, pointers)?;
-        let values = values
-            .map(|values| {
-                self.planned_values((values, n_lists), mean, &stored, kernel.as_ref(), &regularization)
-            })
-            .transpose()?;
-        Ok(PlannedFit {
-            owner: self.owner,
-            stored,
-            pointers,
-            kernel,
-            regularization,
-            duplicates,
-            purpose,
-            way,
-            values,
-            mean,
-        })
+        let kernel = options.kernel.as_ref().map(|kernel| kernel.plan(on.pointers)).transpose()?;
+        let mean = options.mean.unwrap_or(default_mean);
+        let regularization = options.regularization(&on)?;
+        let (values, learned) = (None, None);
+        Ok(PlannedValues { on, kernel, regularization, solver: kind, reason, mean, values, learned })
     }
 
-    /// Values of a fit, with what was learned from them if that is known.
-    fn planned_values(
+    /// Plans the fit of values, with what was learned from them if that is known.
+    fn plan_given_values(
         &self,
-        (values, n_lists): (Arc<Vec<f64>>, usize),
-        mean: Mean,
-        stored: &RegisteredCloud,
-        kernel: Option<&PlannedKernel>,
-        regularization: &Option<Regularization>,
-    ) -> Result<Box<PlannedValues>, Problem> {
+        on: FittedCloud,
+        options: FitOptions,
+        solver: ValuesSolver,
+        given: GivenValues,
+    ) -> Result<(PlannedValues, Arc<Values>), Problem> {
+        // A kernel that follows from the values comes with a mean.
+        let default_mean = if options.kernel.is_none() { Mean::Constant } else { Mean::Zero };
+        let mut plan = self.plan_values(on, options, solver, default_mean)?;
+        let GivenValues { list, n_lists } = given;
+        let stored = &plan.on.stored;
         match n_lists {
-            0 => self.check_values_of(&values, &stored.cloud)?,
-            _ if values.len() != n_lists * stored.cloud.n_points() => {
-                return Err(length_mismatch("/values/0", &stored.cloud, values.len() / n_lists));
+            None => self.check_values_of(&list, &stored.cloud)?,
+            Some(n_lists) if list.len() != n_lists * plan.on.n_points() => {
+                return Err(length_mismatch("/values/0", &stored.cloud, list.len() / n_lists));
             }
-            _ => {}
+            Some(_) => {}
         }
-        let named = ValuesKey::with_mean(&values, mean);
+        let key = ValuesKey::with_mean(&list, plan.mean);
         // A length scale that the cloud gives is the same whenever it is asked for.
-        let given = kernel.map(|kernel| match kernel {
+        let kernel = plan.kernel.as_ref().map(|kernel| match kernel {
             PlannedKernel::Given(kernel) => GivenKernel::Whole(kernel),
             &PlannedKernel::OfCloud { family, variance } => GivenKernel::OfCloud(family, variance),
         });
-        let key = (self.owner, stored.id, named.given(given, regularization.as_ref()));
-        Ok(Box::new(PlannedValues { values, key, learned: self.app.learned.get(key) }))
+        let learned_key = (self.owner, stored.id, key.given(kernel, plan.regularization.as_ref()));
+        plan.learned = self.app.learned.get(learned_key);
+        let values = Arc::new(Values { list, n_lists: n_lists.unwrap_or(1), key, learned_key });
+        plan.values = Some(values.clone());
+        Ok((plan, values))
     }
+}
+
+/// The fits of an operator on values.
+pub struct OperatorFits {
+    pub main: PlannedValues,
+    pub values: Arc<Values>,
+    pub surface: PlannedSurface,
+}
+
+/// Whether local regressions know a surface.
+enum Regressed {
+    No,
+    /// With the reason, where that was not asked for.
+    Locally(Option<AutoLocal>),
+}
+
+/// The solver of values, and why it is the local one where that was not asked for.
+#[derive(Clone, Copy)]
+struct ValuesSolver {
+    kind: SolverKind,
+    reason: Option<AutoLocal>,
+}
+
+impl ValuesSolver {
+    fn asked(kind: SolverKind) -> Self {
+        Self { kind, reason: None }
+    }
+}
+
+/// A surface under values or nodes.
+struct SurfaceUnder {
+    on: FittedCloud,
+    options: FitOptions,
+    /// Whether kernel or noise are those of `geometry`, not of the values.
+    has_own_process: bool,
 }

@@ -1,4 +1,4 @@
-//! Bodies as they came: decompressed and parsed.
+//! Request bodies on their way from bytes to typed requests: decompression, then parsing.
 
 use serde::de::DeserializeOwned;
 
@@ -13,30 +13,30 @@ use crate::http::wire::compression::decompress;
 use crate::http::wire::negotiation::{Coding, Format};
 use crate::memory::NUMBERS_PER_BODY;
 
-/// What compression leaves of text and numbers is seldom less than an eighth.
+/// Usual decompression ratio at most: text and numbers seldom compress to less than an eighth.
 const USUAL_RATIO: usize = 8;
 
-/// A request as it came.
+/// A request body as received, possibly compressed.
 pub struct RequestBody {
     format: Format,
     coding: Coding,
     bytes: Vec<u8>,
-    /// Bytes it may have once it is decompressed.
+    /// Largest allowed number of bytes once decompressed.
     limit: usize,
 }
 
 impl RequestBody {
-    /// A body that is there already, which may have so many bytes once it is decompressed.
+    /// Wraps a body that is complete in memory. Decompressed, it may have at most `limit` bytes.
     pub fn new(format: Format, coding: Coding, bytes: Vec<u8>, limit: usize) -> Self {
         Self { format, coding, bytes, limit }
     }
 
-    /// What parsing takes, which is told without the body.
+    /// Returns the parameters that the memory estimate needs, without the body.
     pub fn parsing(&self) -> Parsing {
         Parsing { format: self.format, coding: self.coding, limit: self.limit }
     }
 
-    /// Bytes that it will have when it is unpacked, as nearly always.
+    /// Expected number of bytes once decompressed, seldom exceeded.
     pub fn n_bytes_expected(&self) -> usize {
         match self.coding {
             Coding::Identity => self.bytes.len(),
@@ -44,29 +44,33 @@ impl RequestBody {
         }
     }
 
-    /// Bytes that it holds as it is.
+    /// Bytes of memory that the body occupies now.
     pub fn n_bytes(&self) -> usize {
         self.bytes.capacity()
     }
 
-    /// What parsing costs, in flops.
+    /// Cost of parsing in flops, at most.
     pub fn flops_to_parse(&self) -> f64 {
         FLOPS_PER_PARSED_BYTE * self.n_bytes_plain() as f64
     }
 
-    /// Bytes without compression at most.
+    /// Upper bound of the number of bytes once decompressed.
     fn n_bytes_plain(&self) -> usize {
         match self.coding {
             Coding::Identity => self.bytes.len(),
-            // A few bytes of zstd may unpack to any number.
+            // A few bytes of zstd may decompress to any length.
             Coding::Gzip | Coding::Zstd => self.limit,
         }
     }
 
-    /// Decompresses it, on the pool. `make_room` is told how many bytes there are before they are unpacked.
+    /// Decompresses the body, on the pool. `make_room` receives the decompressed length in bytes before
+    /// memory is allocated.
     ///
     /// # Errors
-    /// Those of `make_room`, 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its coding.
+    /// - The errors of `make_room`.
+    /// - 413 beyond the limits.
+    /// - 504 once nobody waits for the request.
+    /// - 400 for bytes that are not of the announced coding.
     pub fn unpack(
         self,
         context: &ParseContext<'_>,
@@ -77,23 +81,25 @@ impl RequestBody {
     }
 }
 
-/// A request without compression.
+/// A request body without compression.
 pub struct UnpackedBody {
     format: Format,
     bytes: Vec<u8>,
 }
 
 impl UnpackedBody {
-    /// To be parsed as something else later.
+    /// Turns the body back into a request body, to be parsed again later as another type.
     pub fn into_request(self, limit: usize) -> RequestBody {
         RequestBody::new(self.format, Coding::Identity, self.bytes, limit)
     }
 
-    /// Parses it, on the pool.
+    /// Parses the body, on the pool.
     ///
     /// # Errors
-    /// 413 beyond the limits, 504 once nobody waits for it, 400 for what is not of its format, 422 with a pointer for what is, but
-    /// not this request.
+    /// - 413 beyond the limits.
+    /// - 504 once nobody waits for the request.
+    /// - 400 for a body that is not of its format.
+    /// - 422 with a pointer for a well-formed body that is not a `T`.
     pub fn parse<T: DeserializeOwned>(&self, context: &ParseContext<'_>) -> Result<T, Problem> {
         match self.format {
             Format::Json => parse_json(&self.bytes, context),
@@ -104,7 +110,7 @@ impl UnpackedBody {
     }
 }
 
-/// How a body becomes a request, and so how many bytes that takes.
+/// Format, coding and limit of a body, which determine the memory that reading it takes.
 pub struct Parsing {
     format: Format,
     coding: Coding,
@@ -112,33 +118,36 @@ pub struct Parsing {
 }
 
 impl Parsing {
-    /// Bytes that it takes beside the body at most, once it is unpacked to so many: these, and the numbers in it, of which the
-    /// limits leave so many.
+    /// Upper bound of the bytes of memory that reading takes beside the received body.
+    ///
+    /// They are the decompressed body of `n_bytes_plain` bytes, if it was compressed, and the numbers parsed
+    /// from it. The limits of the configuration bound how many numbers there can be.
     pub fn n_bytes(&self, n_bytes_plain: usize, config: &Config) -> usize {
         let unpacked = if self.coding == Coding::Identity { 0 } else { n_bytes_plain };
         let numbers = n_bytes_plain.saturating_mul(self.n_bytes_per_byte());
         unpacked.saturating_add(numbers.min(self.n_bytes_of_numbers(config)))
     }
 
-    /// Bytes of numbers that a byte can stand for.
+    /// Bytes of parsed numbers per byte of body, at most.
     fn n_bytes_per_byte(&self) -> usize {
         match self.format {
-            // A number takes two bytes of JSON at least, its comma included, and four in tensors.
+            // A number takes at least two bytes of JSON, including its comma, and at least four bytes in
+            // tensors.
             Format::Json | Format::Safetensors | Format::Npy => size_of::<f64>() / 2,
-            // Coordinates may have eight bits.
+            // A coordinate may take a single byte.
             Format::Ply => size_of::<f64>(),
         }
     }
 
-    /// Bytes of all numbers that a request of this format may have.
+    /// Upper bound of the bytes of all numbers in a request of this format.
     fn n_bytes_of_numbers(&self, config: &Config) -> usize {
         let n_rows = config.max_points.saturating_add(config.max_queries);
         match self.format {
             Format::Json | Format::Safetensors | Format::Npy => {
                 n_rows.saturating_mul(4 * size_of::<f64>()).saturating_mul(config.max_dimension)
             }
-            // Points and normals in three dimensions. What is beyond the share of a body (`memory.rs`) could never be had: a
-            // body would be asked to come again for ever.
+            // Points and normals in three dimensions. An estimate above a body's share of memory
+            // (`memory.rs`) could never be granted: the client would be told to retry for ever.
             Format::Ply => (6 * size_of::<f64>())
                 .saturating_mul(config.max_points)
                 .min(NUMBERS_PER_BODY.saturating_mul(self.limit)),

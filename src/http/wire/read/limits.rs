@@ -1,5 +1,7 @@
-//! What a request may hold, known while it is parsed: parsing stops where a list is longer than any request may have, so that
-//! no body takes more memory than what is served from it.
+//! Limits of a request that are enforced while it is parsed.
+//!
+//! Parsing stops where a list is longer than any request may have. So no body takes more memory than requests
+//! within the limits need.
 
 use crate::config::Config;
 use crate::http::problem::Problem;
@@ -7,32 +9,33 @@ use crate::http::problem::slug::Slug;
 use gramian_numerics::observer::{Observer, Unobserved};
 use gramian_numerics::patches::MAX_SITES;
 
-/// The name by which a type asks to be read as lists of values, whatever the member is called.
+/// Type name that marks a field as lists of values, whatever the name of its member.
 pub(super) const VALUE_LISTS: &str = "ValueLists";
 
-/// Probabilities of which a posterior may be asked for quantiles: more than any plot of a distribution shows.
+/// Most probabilities for which quantiles of a posterior may be requested: more than any plot of a
+/// distribution shows.
 const MAX_QUANTILES: usize = 1000;
 
-/// What parsing knows beside the bytes.
+/// Limits and observer of one parse.
 #[derive(Clone, Copy)]
 pub struct ParseContext<'a> {
-    /// Points of a cloud, and with them its normals, values and variances.
+    /// Points of a cloud, and so entries of its normals, values and variances.
     pub max_points: usize,
     pub max_queries: usize,
-    /// Coordinates of a point.
+    /// Coordinates per point.
     pub max_dimension: usize,
-    /// Says when nobody waits for the request any more.
+    /// Tells when the request is cancelled because nobody waits for it.
     pub observer: &'a dyn Observer,
 }
 
 impl<'a> ParseContext<'a> {
-    /// The limits of a server, for a request that `observer` watches.
+    /// The limits of the configuration, for a request watched by `observer`.
     pub fn new(config: &Config, observer: &'a dyn Observer) -> Self {
         let &Config { max_points, max_queries, max_dimension, .. } = config;
         Self { max_points, max_queries, max_dimension, observer }
     }
 
-    /// Without limits, unobserved: for bodies that are known.
+    /// No limits and no observer, for trusted bodies.
     pub const UNLIMITED: ParseContext<'static> = ParseContext {
         max_points: usize::MAX,
         max_queries: usize::MAX,
@@ -40,7 +43,7 @@ impl<'a> ParseContext<'a> {
         observer: &Unobserved,
     };
 
-    /// Entries that a list may have.
+    /// Most entries that a list may have.
     pub(super) fn max_entries(&self, list: List) -> usize {
         match list {
             List::Points | List::Numbers | List::ValueLists => self.max_points,
@@ -52,7 +55,7 @@ impl<'a> ParseContext<'a> {
         }
     }
 
-    /// 413 for a list that has more.
+    /// The 413 problem for a list that is too long.
     pub(super) fn too_large(&self, excess: Excess, pointer: &str) -> Problem {
         let Excess { list, length, width } = excess;
         let limit = self.max_entries(list);
@@ -70,26 +73,26 @@ impl<'a> ParseContext<'a> {
     }
 }
 
-/// The lists of a request that hold numbers, by their names; a test holds the names to the document.
+/// Kinds of numeric lists in a request. A test checks the names against the `OpenAPI` document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum List {
-    /// Rows of a cloud.
+    /// Rows of a cloud, or its normals.
     Points,
-    /// Rows where answers are wanted.
+    /// Rows at which answers are wanted.
     Queries,
-    /// Rows where a surface is learned.
+    /// Rows at which local regressions learn a surface.
     Sites,
-    /// One number for each point.
+    /// A list with a number per point.
     Numbers,
-    /// Rows of one number for each point.
+    /// Lists of values, each with a number per point.
     ValueLists,
-    /// Probabilities.
+    /// Probabilities at which quantiles are wanted.
     Quantiles,
-    /// One number for each axis.
+    /// A list with a number per axis.
     LengthScales,
-    /// One row.
+    /// The coordinates of a row.
     Coordinates,
-    /// Words, or no list at all.
+    /// Strings, or not a list at all.
     Other,
 }
 
@@ -106,12 +109,12 @@ impl List {
         }
     }
 
-    /// What a type of this name is that asks to be read as a list of its own.
+    /// The kind of list marked by the name of its type.
     pub(super) fn of_type(name: &str) -> Option<Self> {
         (name == VALUE_LISTS).then_some(Self::ValueLists)
     }
 
-    /// What the entries of this list are.
+    /// The kind of the entries of this list.
     pub(super) fn of_entries(self) -> Self {
         match self {
             Self::Points | Self::Queries | Self::Sites => Self::Coordinates,
@@ -123,24 +126,24 @@ impl List {
     }
 }
 
-/// A list that is too long, or one of its rows.
+/// A list that is too long, or that has a row that is too long.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Excess {
     pub(super) list: List,
     /// Entries of the list.
     pub(super) length: usize,
-    /// Entries of the first row that has too many.
+    /// Entries of the first row that is too long.
     pub(super) width: Option<usize>,
 }
 
-/// 413 for a cloud of too many points.
+/// 413 for a cloud with too many points.
 pub fn too_many_points(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "points", limit, Some(required)).with_remedy(
         "thin the cloud, or cut it into parts that overlap (operators raise the limit by GRAMIAN_MAX_POINTS)",
     )
 }
 
-/// 413 for a cloud of too many points to be factorized at once.
+/// 413 for a cloud with too many points for a dense factorization.
 pub fn too_many_dense_points(limit: usize, required: usize) -> Problem {
     Problem::too_large(Slug::ProblemTooLarge, "points in a dense factorization", limit, Some(required))
         .with_remedy(
@@ -156,7 +159,7 @@ pub fn too_many_queries(limit: usize, required: usize) -> Problem {
     )
 }
 
-/// 413 for points of too many coordinates, with a hint if they are the columns of `n_rows` rows.
+/// 413 for points with too many coordinates, with a hint if the `n_rows` rows look like columns.
 pub fn too_many_coordinates(limit: usize, required: usize, n_rows: usize) -> Problem {
     let remedy = if n_rows <= limit {
         transposed(n_rows, required)
@@ -197,7 +200,7 @@ fn too_many_quantiles(limit: usize, required: usize) -> Problem {
     )
 }
 
-/// What to tell a client whose rows are columns.
+/// The remedy for a client whose rows are columns.
 pub fn transposed(n_rows: usize, n_columns: usize) -> String {
     let rows = if n_rows == 1 { "row" } else { "rows" };
     format!("rows are points: {n_rows} {rows} of {n_columns} coordinates; transpose the array")
@@ -211,7 +214,8 @@ mod tests {
 
     use super::*;
 
-    /// Names of the members that are lists of numbers, and how deep the lists are, in a schema and all that it refers to.
+    /// Collects the names and depths of all members that are lists of numbers, in a schema and all schemas it
+    /// refers to.
     fn lists<'a>(document: &'a Value, schema: &'a Value, found: &mut BTreeSet<(&'a str, usize)>) {
         if let Some(reference) = schema["$ref"].as_str() {
             let schema = document.pointer(&reference[1..]).unwrap();
@@ -259,7 +263,8 @@ mod tests {
             ]
         );
         for (name, depth) in found {
-            // The rows of batches are named by their type: requests of one list have the same name for it.
+            // The rows of a batch of values are recognized by their type, because single value lists have the
+            // same name.
             let list = match (name, depth) {
                 ("values", 2) => List::of_type(VALUE_LISTS),
                 _ => Some(List::named(name)).filter(|list| *list != List::Other),

@@ -1,4 +1,5 @@
-//! How fields of requests are read: absent or given but never null, objects and words as such and nothing else.
+//! Deserializers for members of requests. Members are present or absent but never null. Objects and
+//! enumerations accept only objects and strings.
 
 use std::marker::PhantomData;
 
@@ -7,10 +8,10 @@ use serde::de::{Deserialize, Deserializer, IntoDeserializer, MapAccess, Visitor}
 
 use super::points::Points;
 
-/// For optional fields: absent is `None`, null is refused by the type itself.
+/// Deserializes an optional member: `None` if absent, while the type itself refuses null.
 ///
 /// # Errors
-/// Those of the type.
+/// Returns the errors of the type.
 pub fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
@@ -34,11 +35,12 @@ impl List for Points {
     }
 }
 
-/// [`present`] for lists that nothing but their absence can mean when they are empty: generated clients send `[]` for what their
-/// user left out.
+/// Deserializes an optional list, where an empty list counts as absent.
+///
+/// Meant for lists that make no sense when empty: generated clients send `[]` for what their user left out.
 ///
 /// # Errors
-/// Those of the type.
+/// Returns the errors of the type.
 pub fn present_unless_empty<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     T: Deserialize<'de> + List,
@@ -47,10 +49,11 @@ where
     T::deserialize(deserializer).map(|list| Some(list).filter(|list| !list.is_empty()))
 }
 
-/// For fields that are objects: serde would also take an array of their members in order, which is no part of the contract.
+/// Deserializes an object and nothing else. serde would also accept an array of the members in order, which
+/// is not part of the contract.
 ///
 /// # Errors
-/// Those of the type, and anything that is no object.
+/// Returns the errors of the type, and refuses anything that is not an object.
 pub fn object<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     struct ObjectVisitor<T>(PhantomData<T>);
 
@@ -69,10 +72,10 @@ pub fn object<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -
     deserializer.deserialize_map(ObjectVisitor(PhantomData))
 }
 
-/// [`object`] for optional fields.
+/// [`object`] for optional members.
 ///
 /// # Errors
-/// Those of [`object`].
+/// Returns the errors of [`object`].
 pub fn present_object<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     T: Deserialize<'de>,
@@ -81,8 +84,8 @@ where
     object(deserializer).map(Some)
 }
 
-/// For enumerations: a string and nothing else. serde would take `{"dense": null}` as well, and `serde_json` calls other types
-/// a syntax error.
+/// An enumeration given as a string and nothing else. serde would also accept `{"dense": null}`, and
+/// `serde_json` calls other types a syntax error.
 struct Word<T>(T);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Word<T> {
@@ -105,18 +108,18 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Word<T> {
     }
 }
 
-/// For fields that are enumerations.
+/// Deserializes an enumeration.
 ///
 /// # Errors
-/// For anything but one of their strings.
+/// Refuses anything but one of its strings.
 pub fn word<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     Word::deserialize(deserializer).map(|Word(word)| word)
 }
 
-/// [`word`] for optional fields.
+/// [`word`] for optional members.
 ///
 /// # Errors
-/// Those of [`word`].
+/// Returns the errors of [`word`].
 pub fn present_word<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
@@ -126,7 +129,7 @@ pub fn present_word<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
 /// [`word`] for optional lists.
 ///
 /// # Errors
-/// Those of [`word`], with the position in the list.
+/// Returns the errors of [`word`], with the position in the list.
 pub fn present_words<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<Vec<T>>, D::Error> {

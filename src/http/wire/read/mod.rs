@@ -1,4 +1,5 @@
-//! Bodies in: JSON, safetensors, npy and PLY, read by the same types within the same limits.
+//! Request bodies in JSON, safetensors, npy and PLY. All formats are read into the same types under the same
+//! limits.
 
 pub mod body;
 pub mod limits;

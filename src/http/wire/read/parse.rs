@@ -1,4 +1,4 @@
-//! Bytes into requests: limits, pointers and cancellation the same for every format.
+//! Parsing of bytes into requests, with the same limits, pointers and cancellation for every format.
 
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::error::Category;
@@ -11,14 +11,15 @@ use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use gramian_numerics::error::NumericsError;
 
-/// Lists and objects within each other, as `serde_json` has it.
+/// Deepest nesting of lists and objects, the limit of `serde_json`.
 const MAX_NESTING: usize = 128;
 
 /// Parses JSON into a request.
 ///
 /// # Errors
-/// 413 for a list that is longer than any request may have, 400 `malformed-json` for what is not JSON, 422 `invalid-request`
-/// with a pointer for what is, but not this request.
+/// - 413 for a list that is longer than any request may have.
+/// - 400 `malformed-json` for text that is not JSON.
+/// - 422 `invalid-request` with a pointer for JSON that is not a `T`.
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
     let guard = Guard::new(context);
     if let Some(request) = plain_json::from_slice(bytes, |json| object(guard.around(json))) {
@@ -34,7 +35,7 @@ pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>)
     parsed.map_err(|error| refusal(&error, &guard, context, bytes))
 }
 
-/// The problem of a parse that failed, in a document whose JSON is this text.
+/// Returns the problem of a failed parse. `text` is the JSON of the document.
 pub(super) fn refusal(
     error: &serde_json::Error,
     guard: &Guard<'_>,
@@ -50,12 +51,12 @@ pub(super) fn refusal(
             let detail = format!("lists and objects are nested more than {MAX_NESTING} deep");
             Problem::new(Slug::MalformedJson, detail)
         }
-        // The type error came first, but the rest may not even be JSON.
+        // The type error came first, but the rest of the text may still be malformed JSON.
         Category::Data => match serde_json::from_slice::<IgnoredAny>(text) {
             Err(error) => malformed_json(&error),
             Ok(IgnoredAny) => {
                 let message = error.to_string();
-                // The position in bytes says less than the pointer.
+                // The pointer says more than the position in bytes.
                 let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(text, _)| text);
                 Problem::invalid_request(guard.pointer(), shortened(message))
             }
@@ -63,8 +64,10 @@ pub(super) fn refusal(
     }
 }
 
-/// Whether a text opens more lists and objects within each other than `serde_json` parses, which notes every one of them where
-/// it only passes over a text.
+/// Whether a text nests lists and objects deeper than `serde_json` parses.
+///
+/// Checked before the text is skipped over: while skipping, `serde_json` has no depth limit and records every
+/// open list and object.
 fn nests_too_deep(text: &[u8]) -> bool {
     let (mut depth, mut is_text, mut is_escaped) = (0_usize, false, false);
     for byte in text {
@@ -90,7 +93,7 @@ fn stopped(stop: Stop, guard: &Guard<'_>, context: &ParseContext<'_>) -> Problem
     }
 }
 
-/// 400 for what is not JSON.
+/// 400 for text that is not JSON.
 fn malformed_json(error: &serde_json::Error) -> Problem {
     Problem::new(Slug::MalformedJson, error.to_string())
 }
@@ -175,7 +178,7 @@ mod tests {
             let rows = vec!["[0.25, -1e3 ,\n7]"; n].join(" ,");
             assert_eq!(room(&format!(r#"{{"alpha": 1, "points": [ {rows} ] }}"#)), (3 * n, 3 * n));
         }
-        // Rows of other lengths than the first one, which is refused later on.
+        // Rows whose length differs from that of the first row. Such requests are refused later.
         let (_, capacity) = room(&format!(r#"{{"points": [[1, 2, 3]{}]}}"#, ",[]".repeat(1000)));
         assert!(capacity <= 1006, "{capacity}");
         let (_, capacity) = room(&format!(r#"{{"points": [[]{}]}}"#, ",[1]".repeat(1000)));
@@ -186,7 +189,7 @@ mod tests {
     fn lists_may_be_as_long_as_the_limits_and_no_longer() {
         let context =
             ParseContext { max_points: 3, max_queries: 2, max_dimension: 2, ..ParseContext::UNLIMITED };
-        // A text with an escape goes to the other parser.
+        // A text with an escape is parsed by `serde_json`.
         for alpha in [r#""alpha""#, r#""\u0061lpha""#] {
             let parse = |points: &str| {
                 parse_json::<Request>(format!(r#"{{{alpha}: 1, "points": {points}}}"#).as_bytes(), &context)
@@ -217,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Is left after it was asked a number of times.
+    /// An observer whose client leaves after a number of cancellation checks.
     struct Leaving(AtomicUsize);
 
     impl Observer for Leaving {
@@ -234,7 +237,7 @@ mod tests {
             let text = text.replace("POINTS", &",[0.5, 1]".repeat(100_000));
             for n_asked in [0, 1, 5] {
                 let observer = Leaving(AtomicUsize::new(n_asked));
-                // Also while it only counts.
+                // Cancellation also works while entries are only counted.
                 for max_points in [usize::MAX, 10] {
                     let context = ParseContext { max_points, observer: &observer, ..ParseContext::UNLIMITED };
                     let problem = parse_json::<Request>(text.as_bytes(), &context).unwrap_err();

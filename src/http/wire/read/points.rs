@@ -1,16 +1,17 @@
-//! Lists of points and of values, read into one flat buffer.
+//! Lists of points and lists of values, read into a flat buffer.
 
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
 use super::limits::VALUE_LISTS;
 
-/// Points as they come: one flat buffer, whatever their number, with the first row that differs in length.
+/// Points as received, in a flat buffer. Rows may differ in length, and the first that does is recorded.
 #[derive(Debug, Clone, Default)]
 pub struct Points {
     pub coordinates: Vec<f64>,
     pub dimension: usize,
     pub n_rows: usize,
-    /// Index and length of the first ragged row, behind which nothing is kept.
+    /// Index and length of the first row that differs in length from row 0. From this row on, no coordinates
+    /// are kept.
     pub ragged: Option<(usize, usize)>,
 }
 
@@ -23,7 +24,7 @@ impl<'de> Deserialize<'de> for Points {
     }
 }
 
-/// Lists of one value per point of a cloud each: rows as those of points, of another length.
+/// Lists of values, each with a value per point of a cloud. Stored like points, with a list as a row.
 #[derive(Debug, Clone, Default)]
 pub struct ValueLists(pub Points);
 
@@ -34,7 +35,7 @@ impl<'de> Deserialize<'de> for ValueLists {
     }
 }
 
-/// What is expected, as errors say it.
+/// Builds [`Points`]. The fields describe the expected list and row in errors.
 struct PointsVisitor {
     what: &'static str,
     row: &'static str,
@@ -53,8 +54,8 @@ impl<'de> Visitor<'de> for PointsVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Points, A::Error> {
         let mut points = Points::default();
-        // Room is made at once where the length is known, so that a million points are not copied while their list grows. Every
-        // hint is bounded by the bytes that are there.
+        // If the length is known, memory is reserved at once, so that a million points are not copied while
+        // the buffer grows. Every size hint is bounded by the bytes of the body.
         let n_more = rows.size_hint().unwrap_or(0).saturating_sub(1);
         loop {
             let start = points.coordinates.len();
@@ -75,7 +76,7 @@ impl<'de> Visitor<'de> for PointsVisitor {
     }
 }
 
-/// Appends one row.
+/// Appends the coordinates of a row to the buffer.
 struct Row<'a>(&'a mut Vec<f64>, &'static str);
 
 impl<'de> serde::de::DeserializeSeed<'de> for Row<'_> {

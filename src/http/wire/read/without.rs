@@ -1,4 +1,4 @@
-//! A request with one member more than its type has.
+//! A request with the additional member `operation`.
 
 use std::cell::Cell;
 use std::fmt;
@@ -7,10 +7,10 @@ use std::marker::PhantomData;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 
-/// The name of the member.
+/// Name of the additional member.
 const OPERATION: &str = "operation";
 
-/// A request `T` with a member `operation` beside its own.
+/// A request `T` with an optional member `operation` beside the members of `T`.
 #[derive(Debug)]
 pub struct WithOperation<T> {
     pub operation: Option<String>,
@@ -39,7 +39,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for RequestVisitor<T> {
     }
 }
 
-/// The other members.
+/// The members of the request other than `operation`, which is stored in the cell.
 struct Without<'a, A> {
     map: A,
     operation: &'a Cell<Option<String>>,
@@ -67,10 +67,10 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for Without<'_, A> {
     }
 }
 
-/// A key, which is read where it stands: what is wrong with it is said there.
+/// A seed for a member name. It wraps the seed of the type, so that errors about a name carry its position.
 struct Key<K>(K);
 
-/// What it was; the seed is left for the next one where it was not for this one.
+/// Result of reading a name. `Operation` returns the unused seed, for the next name.
 enum Found<K, V> {
     Operation(K),
     Member(V),

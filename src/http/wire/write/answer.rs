@@ -1,6 +1,6 @@
-//! An answer as named members, whatever it is written as: JSON, safetensors or npy.
+//! An answer as named members, independent of its format: JSON, safetensors or npy.
 //!
-//! Numbers are never copied: binary bodies are the buffers that were computed, and large JSON is written chunk by chunk
+//! Numbers are never copied. Binary bodies are the computed buffers, and large JSON is written chunk by chunk
 //! while it is sent.
 
 use std::collections::HashMap;
@@ -19,16 +19,16 @@ use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::http::wire::negotiation::Format;
 
-/// An answer of named members; the macro `answer!` declares one.
+/// An answer made of named members. The macro `answer!` declares one.
 pub trait Answer {
     /// Takes the members out, in the order of their declaration.
     ///
     /// # Errors
-    /// 422 `invalid-request` if a number is not finite, which JSON cannot say.
+    /// 422 `invalid-request` if a number is not finite, because JSON cannot represent it.
     fn into_parts(self) -> Result<Parts, Problem>;
 }
 
-/// Declares an answer: a schema for the document, and [`Answer`].
+/// Declares an answer: its schema for the `OpenAPI` document and its [`Answer`] implementation.
 macro_rules! answer {
     (
         $(#[$meta:meta])*
@@ -51,12 +51,12 @@ macro_rules! answer {
 }
 pub(crate) use answer;
 
-/// A field of an answer.
+/// A value that can be a member of an answer.
 pub trait Member {
-    /// Adds itself under its name.
+    /// Adds the value under this name.
     ///
     /// # Errors
-    /// Those of [`Answer::into_parts`].
+    /// Returns the errors of [`Answer::into_parts`].
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem>;
 }
 
@@ -101,7 +101,7 @@ impl Member for usize {
     }
 }
 
-/// Absent, not null.
+/// An absent value is left out, not written as null.
 impl<M: Member> Member for Option<M> {
     fn add_to(self, name: &'static str, parts: &mut Parts) -> Result<(), Problem> {
         self.map_or(Ok(()), |member| member.add_to(name, parts))
@@ -114,7 +114,7 @@ fn beyond_float64() -> Problem {
     Problem::new(Slug::InvalidRequest, detail)
 }
 
-/// The members of an answer in order.
+/// The members of an answer, in order.
 #[derive(Default)]
 pub struct Parts(Vec<(&'static str, Part)>);
 
@@ -126,21 +126,21 @@ enum Part {
 }
 
 impl Parts {
-    /// Adds what is written as JSON in every format.
+    /// Adds a member that is JSON in every format.
     ///
     /// # Errors
-    /// 422 `invalid-request` for a number that is not finite: answers follow from numbers of the client, so
-    /// theirs were too large.
+    /// 422 `invalid-request` for a number that is not finite. Answers are computed from numbers of the
+    /// client, so those were too large.
     pub fn add_json(&mut self, name: &'static str, value: &impl Serialize) -> Result<(), Problem> {
         let text = json::to_vec(value).map_err(|_| beyond_float64())?;
         self.0.push((name, Part::Json(text)));
         Ok(())
     }
 
-    /// The body in pieces.
+    /// Returns the body in chunks.
     ///
     /// # Errors
-    /// 500 `internal` if a format is asked for that the answer does not have.
+    /// 500 `internal` for a format that the answer does not have.
     pub fn write(self, format: Format) -> Result<Vec<Chunk>, Problem> {
         match format {
             Format::Json => Ok(self.into_json().finish()),
@@ -150,7 +150,7 @@ impl Parts {
         }
     }
 
-    /// The members as one object.
+    /// Writes the members as one JSON object.
     fn into_json(self) -> ChunkBuilder {
         let mut chunks = ChunkBuilder::default();
         let mut separator = '{';
@@ -159,7 +159,7 @@ impl Parts {
             separator = ',';
             match part {
                 Part::Numbers(array) => chunks.numbers(Arc::new(array)),
-                // Plain integers: the encoder has no objection.
+                // Integers cannot be refused by the encoder.
                 Part::Integers(numbers) => {
                     chunks.text(&json::to_vec(&numbers).unwrap_or_else(|_| b"[]".to_vec()));
                 }
@@ -170,7 +170,8 @@ impl Parts {
         chunks
     }
 
-    /// One tensor per array, float64 or int64; all other members are one JSON object in the metadata entry `response`.
+    /// Writes each array as a float64 or int64 tensor. All other members become a JSON object in the metadata
+    /// entry `response`.
     fn write_safetensors(self) -> Option<Vec<Chunk>> {
         let (arrays, others): (Vec<_>, Vec<_>) =
             self.0.into_iter().partition(|(_, part)| !matches!(part, Part::Json(_)));
@@ -196,7 +197,8 @@ impl Parts {
         Some([Bytes::from(head)].into_iter().chain(bodies).map(Chunk::of).collect())
     }
 
-    /// The one array of the answer: magic, version 1.0, the length of a header, the header, the numbers.
+    /// Writes the first float64 array of the answer: magic, version 1.0, length of the header, header,
+    /// numbers.
     fn write_npy(self) -> Option<Vec<Chunk>> {
         let mut arrays = self.0.into_iter().filter_map(|(_, part)| match part {
             Part::Numbers(array) => Some(array),

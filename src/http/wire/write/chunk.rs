@@ -1,4 +1,4 @@
-//! Pieces of a body: bytes, and numbers that become text when it is their turn.
+//! Chunks of a body: bytes, and numbers that are converted to text only when the chunk is sent.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -7,13 +7,16 @@ use bytes::Bytes;
 
 use super::array::Array;
 
-/// Numbers of a chunk: some 170 kB of JSON and 150 µs of one core, against some 10 µs to hand a job to the pool.
+/// Numbers per chunk.
+///
+/// A chunk makes some 170 kB of JSON and takes 150 µs of one core. Handing a job to the pool takes some 10
+/// µs.
 const NUMBERS_PER_CHUNK: usize = 1 << 13;
 
-/// Bytes of a chunk of a binary body that is compressed.
+/// Bytes per chunk when a binary body is compressed.
 const BYTES_PER_CHUNK: usize = 1 << 18;
 
-/// A piece of a body, written when it is its turn.
+/// A part of a body, converted to bytes on demand.
 #[derive(Debug)]
 pub struct Chunk(Vec<Piece>);
 
@@ -24,12 +27,12 @@ enum Piece {
 }
 
 impl Chunk {
-    /// Bytes as they are.
+    /// A chunk of ready bytes.
     pub fn of(bytes: Bytes) -> Self {
         Self(vec![Piece::Bytes(bytes)])
     }
 
-    /// Appends its bytes.
+    /// Appends the bytes of the chunk.
     pub fn write(&self, out: &mut Vec<u8>) {
         for piece in &self.0 {
             match piece {
@@ -39,7 +42,7 @@ impl Chunk {
         }
     }
 
-    /// Bytes that it holds.
+    /// Bytes of memory held by the chunk.
     pub fn n_bytes(&self) -> usize {
         let of = |piece: &Piece| match piece {
             Piece::Bytes(bytes) => bytes.len(),
@@ -48,14 +51,14 @@ impl Chunk {
         self.0.iter().map(of).sum()
     }
 
-    /// Its bytes.
+    /// Returns the bytes of the chunk.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         self.write(&mut out);
         out
     }
 
-    /// The bytes, if nothing is left to be written.
+    /// Returns the bytes if the chunk has no numbers left to convert.
     pub fn as_bytes(&self) -> Option<Vec<Bytes>> {
         let bytes = |piece: &Piece| match piece {
             Piece::Bytes(bytes) => Some(bytes.clone()),
@@ -113,7 +116,7 @@ impl ChunkBuilder {
     }
 }
 
-/// Cuts large pieces of bytes, so that compressing one is a small job.
+/// Splits large chunks of bytes, so that compressing a chunk is a small job.
 pub fn split_bytes(chunks: Vec<Chunk>) -> Vec<Chunk> {
     let split = |chunk: Chunk| match <[Piece; 1]>::try_from(chunk.0) {
         Ok([Piece::Bytes(bytes)]) => (0..bytes.len().max(1))

@@ -1,9 +1,11 @@
-//! From the parts of an answer to its body: at once if it is small, else in chunks while it is sent.
+//! Encoding of an answer as a body: at once if it is small, otherwise in chunks while it is sent.
 //!
-//! STREAMING. A chunk of numbers becomes text on the compute pool when it is about to be sent, several at a time and in
-//! order. So a matrix never exists as text, a client that reads slowly holds a few chunks beside the numbers themselves, and
-//! no thread waits for it. Each job is a task of its own, since a future that waits in a queue of permits and is not
-//! polled, as those of a stalled client are not, would keep the permit that it is given from everyone else.
+//! STREAMING. A chunk of numbers becomes text on the compute pool shortly before it is sent, several chunks
+//! at a time and in order. So a matrix never exists as text. A client that reads slowly holds a few chunks of
+//! text beside the numbers themselves, and no thread waits for it.
+//!
+//! Each job is a task of its own. Otherwise the stream of a stalled client, which is not polled, could sit in
+//! the queue for a permit, receive one, and keep it from everyone else.
 
 use std::io;
 use std::sync::Arc;
@@ -24,16 +26,17 @@ use crate::http::wire::negotiation::{Coding, Format, Wanted};
 use crate::store::Owner;
 use crate::store::budget::Reservation;
 
-/// Chunks that are encoded at once, side by side; an answer of more is streamed.
+/// Most chunks that are encoded at once, in parallel. Longer answers are streamed.
 const CHUNKS_AT_ONCE: usize = 4;
 
-/// Bytes of chunks that are written but not sent, for each thread: two, with room for the compressor's copy.
+/// Bytes of chunks that are encoded but not sent, per thread: two chunks, with room for the compressor's
+/// copy.
 const BYTES_UNDER_WAY: usize = 1 << 20;
 
-/// Bodies below it are sent as they are: what compression saves of a packet or two is less than its header and its time.
+/// Smallest body that is compressed. Below, compression saves less than its header and time cost.
 const LEAST_COMPRESSED_BYTES: usize = 1 << 10;
 
-/// An answer that only needs to be sent.
+/// An encoded answer, ready to be sent.
 pub struct Encoded {
     format: Format,
     coding: Coding,
@@ -46,10 +49,10 @@ enum Encoding {
 }
 
 impl Encoded {
-    /// Encodes an answer, or what of it is to be encoded before the first byte is sent.
+    /// Encodes an answer, as far as it is encoded before the first byte is sent.
     ///
     /// # Errors
-    /// Those of [`Answer::into_parts`], 500 `internal` if a compressor fails.
+    /// Returns the errors of [`Answer::into_parts`], or 500 `internal` if a compressor fails.
     pub fn of(answer: impl Answer, wanted: Wanted) -> Result<Self, Problem> {
         let Wanted { format, coding } = wanted;
         let chunks = answer.into_parts()?.write(format)?;
@@ -76,12 +79,12 @@ impl Encoded {
         encoded(coding, Encoding::Whole(vec![body.into()]))
     }
 
-    /// Whether encoding goes on while the body is sent.
+    /// Whether encoding continues while the body is sent.
     pub fn is_streamed(&self) -> bool {
         matches!(self.body, Encoding::Chunks(..))
     }
 
-    /// Bytes that its body holds until it is sent; pieces of numbers are held until the last of them is written.
+    /// Bytes held by the body until it is sent. An array is held until its last chunk is written.
     pub fn n_bytes(&self) -> usize {
         match &self.body {
             Encoding::Whole(frames) => frames.iter().map(Bytes::len).sum(),
@@ -89,7 +92,8 @@ impl Encoded {
         }
     }
 
-    /// The response with the headers that describe its body, which holds `memory` until it is sent or given up.
+    /// Returns the response with the headers that describe its body. The body holds `memory` until it is sent
+    /// or dropped.
     pub fn into_response(self, compute: &Arc<Compute>, mut memory: Reservation) -> Response {
         let (owner, n_bytes) = (memory.owner(), self.n_bytes());
         memory.shrink_to(n_bytes.saturating_add(BYTES_UNDER_WAY * compute.n_threads()));
@@ -119,7 +123,7 @@ impl Encoded {
     }
 }
 
-/// A stream that holds something for as long as it is there.
+/// Ties a memory reservation to the lifetime of a stream.
 pub fn holding<S: Stream>(stream: S, held: Reservation) -> impl Stream<Item = S::Item> {
     stream.map(move |item| {
         let _ = &held;
@@ -127,7 +131,7 @@ pub fn holding<S: Stream>(stream: S, held: Reservation) -> impl Stream<Item = S:
     })
 }
 
-/// The bytes of chunks in order, twice as many under way as there are threads.
+/// Streams the bytes of chunks in order. Twice as many chunks as threads are in progress.
 fn written(
     chunks: Vec<Chunk>,
     compute: Arc<Compute>,
@@ -138,7 +142,7 @@ fn written(
     stream::iter(chunks).map(write).buffered(n_under_way)
 }
 
-/// The same, compressed: the compressor moves from job to job.
+/// Compresses a stream. The compressor moves from job to job.
 fn compressed(
     plain: impl Stream<Item = io::Result<Vec<u8>>> + Send,
     compressor: Box<Compressor>,
@@ -165,7 +169,8 @@ fn compressed(
     compressed.try_filter(|bytes| std::future::ready(!bytes.is_empty()))
 }
 
-/// Runs a job as a task of its own: it holds a permit only while it computes, whether or not it is waited for.
+/// Runs a job as a task of its own, so that it holds a permit only while it computes, even when nobody polls
+/// the stream.
 async fn on_pool<T: Send + 'static>(
     compute: Arc<Compute>,
     owner: Owner,
@@ -174,7 +179,7 @@ async fn on_pool<T: Send + 'static>(
     let task = tokio::spawn(async move { compute.run_small(owner, job).await });
     match task.await {
         Ok(Ok(result)) => result,
-        // The answer is under way and can only be broken off.
+        // The head of the answer is already sent, so the body can only be aborted.
         Ok(Err(_)) | Err(_) => Err(io::Error::other("a job of the encoder failed")),
     }
 }

@@ -1,9 +1,9 @@
-//! Whole numbers of an answer: indices, of which sparse matrices have many.
+//! Integer lists of an answer, such as the indices of sparse matrices.
 
 use bytes::Bytes;
 use serde::Serialize;
 
-/// A list of whole numbers: JSON numbers without a point, or an I64 tensor.
+/// A list of integers: JSON numbers without a point, or an I64 tensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Integers(Vec<i64>);
@@ -21,7 +21,7 @@ impl Integers {
         self.0.is_empty()
     }
 
-    /// The numbers as little-endian int64.
+    /// Returns the numbers as little-endian int64.
     pub fn into_bytes(mut self) -> Bytes {
         if cfg!(target_endian = "big") {
             self.0.iter_mut().for_each(|x| *x = x.to_le());
@@ -30,7 +30,7 @@ impl Integers {
     }
 }
 
-/// The memory of a list, as bytes.
+/// Owns integers and exposes their bytes.
 struct Raw(Vec<i64>);
 
 impl AsRef<[u8]> for Raw {

@@ -1,8 +1,8 @@
 //! JSON of answers, in which every number is finite.
 //!
-//! serde_json writes null for NaN and for infinity, which breaks a client whose schema has a number there.
-//! Answers are therefore written by a formatter that refuses null altogether. [`Nullable`] writes the nulls
-//! that the document has.
+//! serde_json writes null for NaN and infinity, which breaks clients whose schema has a number there. Answers
+//! are therefore written by a formatter that refuses null altogether. [`Nullable`] writes the nulls that the
+//! `OpenAPI` document allows.
 
 use std::io;
 
@@ -14,15 +14,14 @@ use serde_json::value::RawValue;
 
 use crate::http::problem::Problem;
 
-/// Refusal of a value that has a null: a number that is not finite, or an optional member that is not left
-/// out.
+/// The value contains a null: a number that is not finite, or an optional member that is not left out.
 #[derive(Debug)]
 pub struct HasNull;
 
-/// JSON text of a value.
+/// Returns the JSON text of a value.
 ///
 /// # Errors
-/// [`HasNull`] where serde_json would write null, but for [`Nullable`].
+/// [`HasNull`] where serde_json would write null, except for [`Nullable`].
 pub fn to_vec(value: &impl Serialize) -> Result<Vec<u8>, HasNull> {
     let mut text = Vec::with_capacity(128);
     let mut serializer = serde_json::Serializer::with_formatter(&mut text, WithoutNull);
@@ -32,7 +31,7 @@ pub fn to_vec(value: &impl Serialize) -> Result<Vec<u8>, HasNull> {
     }
 }
 
-/// Compact JSON without null.
+/// A formatter for compact JSON that refuses null.
 struct WithoutNull;
 
 impl Formatter for WithoutNull {
@@ -41,7 +40,7 @@ impl Formatter for WithoutNull {
     }
 }
 
-/// An entry that the document has as a number or null.
+/// A member that is a number or null in the `OpenAPI` document.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nullable(pub Option<f64>);
 
@@ -49,7 +48,7 @@ impl Serialize for Nullable {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0 {
             Some(number) => serializer.serialize_f64(number),
-            // Raw text passes by the formatter.
+            // Raw text bypasses the formatter.
             None => {
                 serde_json::from_str::<&RawValue>("null").map_err(S::Error::custom)?.serialize(serializer)
             }
@@ -57,8 +56,10 @@ impl Serialize for Nullable {
     }
 }
 
-/// An answer in JSON whose numbers the server made. One that is not finite is a bug, and the answer 500; what
-/// follows from numbers of the client is an [`super::answer::Answer`], which refuses the request.
+/// A JSON answer whose numbers come from the server itself.
+///
+/// A number that is not finite is a bug, answered with 500. Answers computed from numbers of the client are
+/// [`super::answer::Answer`]s, which refuse the request instead.
 pub struct Json<T>(pub T);
 
 impl<T: Serialize> IntoResponse for Json<T> {
@@ -105,7 +106,7 @@ mod tests {
             assert!(to_vec(&sample(1.0, Some(1.0), Some(bad))).is_err());
             assert!(to_vec(&bad).is_err() && to_vec(&(bad as f32)).is_err());
         }
-        // An optional member is left out, or it is a Nullable.
+        // An optional member is left out or is a Nullable.
         assert!(to_vec(&sample(1.0, None, None)).is_err());
         assert!(to_vec(&json!({"deep": [{"null": null}]})).is_err());
     }

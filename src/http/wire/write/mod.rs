@@ -1,4 +1,4 @@
-//! Bodies out: named members, as JSON, safetensors or npy, at once or while they are sent.
+//! Bodies of answers: named members, written as JSON, safetensors or npy, at once or while they are sent.
 
 pub mod answer;
 pub mod array;

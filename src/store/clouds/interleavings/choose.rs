@@ -1,8 +1,8 @@
-//! How a run goes on where there are several ways: at random, or each way in turn.
+//! Choice of the next step in a run: at random, or every alternative in turn.
 
 use super::random::Random;
 
-/// Where a run goes on, of several ways.
+/// A source of choices between `n` alternatives.
 pub trait Choose {
     fn below(&mut self, n: usize) -> usize;
 }
@@ -13,7 +13,8 @@ impl Choose for Random {
     }
 }
 
-/// All ways, one after the other: choices and of how many, the last of which changes first.
+/// An enumeration of all sequences of choices. A digit is a choice with the number of its alternatives. The
+/// last digit changes first.
 #[derive(Default)]
 pub struct Odometer {
     digits: Vec<(usize, usize)>,
@@ -33,7 +34,7 @@ impl Choose for Odometer {
 }
 
 impl Odometer {
-    /// Turns to the next way; says whether there is one.
+    /// Advances to the next sequence. Returns whether there is one.
     pub fn turn(&mut self) -> bool {
         self.at = 0;
         while let Some((digit, n)) = self.digits.pop() {

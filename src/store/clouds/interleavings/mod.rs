@@ -1,12 +1,12 @@
-//! Interleavings of requests for one cloud, against what may be said of it: every one of a few requests, and
-//! random ones of many.
+//! Tests of interleaved requests for one cloud against its guarantees: all interleavings of a few requests,
+//! and random interleavings of many.
 //!
-//! WHAT IS TRUE MEANWHILE. After an acknowledged POST, and without a DELETE since, the cloud is found and
-//! listed. After an acknowledged DELETE, and without a POST since, it is not. Each DELETE that finds the
-//! cloud there has a POST of its own that created it.
+//! DURING A RUN. After an acknowledged POST, and without a DELETE since, the cloud is found and listed. After
+//! an acknowledged DELETE, and without a POST since, it is not. Each DELETE that finds the cloud has a POST
+//! of its own that created it.
 //!
-//! WHAT IS TRUE AT REST. Each process finds the cloud and lists it once exactly if its object is in the
-//! store, and nothing else is left there.
+//! AT REST. Each process finds the cloud and lists it once exactly if its object is in the store. Nothing
+//! else is left in the store.
 
 mod choose;
 #[path = "../../../../numerics/tests/common/random.rs"]
@@ -27,7 +27,7 @@ use requests::{Answer, Process, Request};
 use stepped::{Gate, Stepped};
 use tokio::task::JoinHandle;
 
-/// A store, its processes, and what each request came to.
+/// A store, its processes, and the outcome of each request.
 struct World {
     gate: Arc<Gate>,
     store: Stepped,
@@ -37,7 +37,7 @@ struct World {
     now: usize,
 }
 
-/// A request, the steps between which it was under way, and its answer.
+/// A request, the steps at which it began and ended, and its answer.
 #[derive(Debug, Clone)]
 struct Event {
     request: Request,
@@ -52,11 +52,11 @@ struct Event {
 struct Setting {
     n_processes: usize,
     tells_absence: bool,
-    /// Bytes of memory for clouds: with none, each request asks the store.
+    /// Bytes of memory for clouds. At 0, each request asks the store.
     n_bytes: usize,
 }
 
-/// The cloud that everybody posts and deletes.
+/// The cloud that all requests post and delete.
 fn cloud() -> Cloud {
     Cloud::new(vec![0.0, 1.0, 2.0], 1).unwrap()
 }
@@ -65,7 +65,8 @@ fn id() -> CloudId {
     CloudId::of(&cloud(), None)
 }
 
-/// As many as a chain of tasks that wake each other within a process.
+/// Yields without progress before a run counts as settled: as many as the longest chain of tasks that wake
+/// each other within a process.
 const HOPS: usize = 8;
 
 impl World {
@@ -79,7 +80,7 @@ impl World {
         Self { gate, store, processes, under_way: Vec::new(), history: Vec::new(), now: 0 }
     }
 
-    /// Does one request without stopping.
+    /// Runs one request without stops.
     async fn at_once(&mut self, request: Request, process: usize) -> Answer {
         self.gate.set_open(true);
         self.begin(request, process);
@@ -95,7 +96,7 @@ impl World {
         self.history.push(event);
     }
 
-    /// Runs what can go on until all calls of the store stand still.
+    /// Runs all tasks until every call of the store is parked.
     async fn settle(&mut self) {
         let mut n_idle = 0;
         let mut n_moves = self.gate.n_moves();
@@ -116,8 +117,8 @@ impl World {
         }
     }
 
-    /// Begins some requests when the choice says so, and lets one call after the other go on until all are
-    /// answered.
+    /// Begins the requests when the choice says so, and releases one parked call after the other until all
+    /// are answered.
     async fn run(&mut self, choose: &mut impl Choose, requests: &[(Request, usize)], most_at_once: usize) {
         let mut rest = requests.iter();
         while !self.under_way.is_empty() || rest.len() > 0 {
@@ -165,7 +166,7 @@ impl World {
         self.history.iter().filter(|event| event.request == request).cloned().collect()
     }
 
-    /// What is true when nothing is under way, once each process has offered what the store did not take.
+    /// Checks the guarantees at rest, after each process has offered its pending clouds again.
     async fn check_at_rest(&mut self, tells_absence: bool) {
         self.gate.set_broken(false);
         for process in 0..self.processes.len() {
@@ -199,8 +200,8 @@ impl World {
     }
 }
 
-/// Every interleaving of some requests, from a store that has the cloud and from one that does not; says how
-/// many there were.
+/// Runs every interleaving of some requests, once on an empty store and once on a store with the cloud.
+/// Returns their number.
 async fn exhaust(setting: Setting, requests: &[(Request, usize)]) -> usize {
     let mut n_ways = 0;
     for is_there in [false, true] {
@@ -243,7 +244,8 @@ async fn every_interleaving_of_two_requests_leaves_one_truth() {
     assert!(n_ways > 1000, "{n_ways}");
 }
 
-/// Random requests at random moments, of `n_processes` processes; what the store takes may fail now and then.
+/// Runs random requests of `n_processes` processes at random moments. With `may_fail`, the store refuses
+/// writes now and then.
 async fn random_runs(setting: Setting, seeds: std::ops::Range<u64>, may_fail: bool) {
     let mut n_there = 0;
     for seed in seeds {

@@ -1,4 +1,4 @@
-//! Requests as handlers make them of a process, without memory and compute threads to wait for.
+//! Requests to a process as handlers make them, without waits for memory or compute threads.
 
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -21,15 +21,15 @@ pub enum Request {
     Get,
     List,
     Sweep,
-    /// Offers what the store did not take again, as the service does every few seconds.
+    /// Offers pending clouds to the store again, as the service does every few seconds.
     Offer,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
-    /// Whether the cloud was new.
+    /// Carries whether the cloud was new.
     Posted(bool),
-    /// Whether it was there.
+    /// Carries whether the cloud existed.
     Deleted(bool),
     Found(bool),
     Listed(Vec<CloudId>),
@@ -52,7 +52,7 @@ async fn encoded(cloud: Arc<RegisteredCloud>) -> Result<Vec<Bytes>, String> {
 }
 
 impl Request {
-    /// One of ten, of which those that change something are the more frequent.
+    /// Returns the request for `n` of 0 to 9. Requests that change something are more frequent.
     pub fn some(n: usize) -> Self {
         match n {
             0..4 => Self::Post,
@@ -128,7 +128,7 @@ impl Process {
 }
 
 impl Stepped {
-    /// The names of all objects, without a stop.
+    /// Names of all objects, found without a stop.
     pub async fn names(&self) -> Vec<String> {
         let found: Vec<_> = self.objects().list(None).try_collect().await.unwrap();
         found.into_iter().map(|object| object.location.to_string()).collect()

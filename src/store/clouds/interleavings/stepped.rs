@@ -1,5 +1,5 @@
-//! A store in memory whose calls stop twice, before they take effect and before they are answered, until a
-//! schedule lets them go on.
+//! A store in memory whose calls stop twice: before they take effect and before they are answered. A schedule
+//! lets them go on.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -16,17 +16,17 @@ use object_store::{
 };
 use tokio::sync::oneshot;
 
-/// Calls that stand still, and how the store behaves.
+/// The parked calls, and the behaviour of the store.
 #[derive(Debug, Default)]
 pub struct Gate {
     parked: Mutex<Vec<oneshot::Sender<()>>>,
-    /// How often a call stopped or went on.
+    /// Number of times that a call stopped or went on.
     n_moves: AtomicUsize,
-    /// Whether calls go through without stopping.
+    /// Whether calls pass without a stop.
     is_open: AtomicBool,
     /// Whether calls that change something fail.
     is_broken: AtomicBool,
-    /// Whether deleting says what was not there, as a directory does and a bucket does not.
+    /// Whether a deletion reports a missing object. A directory does, a bucket does not.
     tells_absence: AtomicBool,
 }
 
@@ -45,10 +45,10 @@ impl Gate {
         self.n_moves.load(Ordering::Relaxed)
     }
 
-    /// Lets one call go on.
+    /// Lets one parked call go on.
     pub fn release(&self, at: usize) {
         let sender = self.parked().remove(at);
-        // A call that was dropped needs no answer.
+        // A dropped call needs no answer.
         sender.send(()).ok();
         self.n_moves.fetch_add(1, Ordering::Relaxed);
     }

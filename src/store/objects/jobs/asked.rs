@@ -1,4 +1,4 @@
-//! What was asked.
+//! Requests of jobs.
 
 use bytes::Bytes;
 use futures_util::stream::BoxStream;
@@ -9,14 +9,14 @@ use super::super::room::Room;
 use super::super::{Damaged, Objects, OwnerName, Unavailable};
 use super::{JobId, REQUEST, line_of};
 
-/// What was asked: a request without what is secret in it.
+/// The request of a job, without its secrets.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobRequest {
     pub path: String,
     pub headers: Vec<(String, String)>,
 }
 
-/// What was asked, and its body as it is read.
+/// A request in the store, with its body as a stream.
 pub struct FoundRequest {
     pub request: JobRequest,
     pub n_body_bytes: u64,
@@ -45,7 +45,7 @@ impl Objects {
         self.mark_open(owner, id).await
     }
 
-    /// What was asked, if it is there, and as it was written as far as its first line.
+    /// Opens the request of a job, if it exists. The inner error tells why its first line cannot be read.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -63,7 +63,7 @@ impl Objects {
         Ok(found.map(|found| found.and_then(read)))
     }
 
-    /// Counts a request that is not what was written: its job fails.
+    /// Counts and logs a damaged request, whose job then fails.
     pub fn report_job(&self, owner: &OwnerName, id: JobId) {
         let name = self.job(owner, id, REQUEST);
         self.report(&name, Damaged("its bytes are not those that were written"));

@@ -1,6 +1,6 @@
 //! Claims of jobs to the `Idempotency-Key` of their requests.
 //!
-//! A claim is the object `<owner>/claims/<hash of the key>/<generation>`, which names a job. Making it is
+//! A claim is the object `<owner>/claims/<hash of the key>/<generation>`, which names a job. Creating it is
 //! exclusive, so one of several equal requests claims the key. A job is written before it claims its key. So
 //! a claim to an unknown job is left over from a deleted one, and the next generation replaces it. The object
 //! `key-<hash of the key>-<generation>` of a job names its claim, which is removed with the job.
@@ -21,7 +21,7 @@ use super::{JobId, JobObjects, line_of};
 const FOLDER: &str = "claims";
 const KEY: &str = "key-";
 
-/// The hash of a key, which serves as part of a name.
+/// Hash of an idempotency key, used as part of object names.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct KeyHash(String);
 
@@ -31,7 +31,7 @@ impl KeyHash {
     }
 }
 
-/// The name of a claim.
+/// Name of a claim.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ClaimName {
     pub key: KeyHash,
@@ -39,7 +39,7 @@ pub struct ClaimName {
 }
 
 impl ClaimName {
-    /// Reads the name of a claim from that of an object of its job.
+    /// Parses the name of a claim from the name of an object of its job.
     pub(super) fn parse(part: &str) -> Option<Self> {
         let (key, generation) = part.strip_prefix(KEY)?.split_once('-')?;
         Some(Self { key: KeyHash(key.to_owned()), generation: generation.parse().ok()? })
@@ -50,7 +50,7 @@ impl ClaimName {
     }
 }
 
-/// The job of a key, and the fingerprint of the request that began it.
+/// The job that claims a key, and the fingerprint of the request that began it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Claim {
     job: String,
@@ -62,14 +62,14 @@ impl Claim {
         Self { job: job.to_string(), fingerprint }
     }
 
-    /// The id of the job, if it is well-formed.
+    /// Returns the id of the job, if it is well-formed.
     pub fn job(&self) -> Option<JobId> {
         JobId::parse(&self.job)
     }
 }
 
 impl Objects {
-    /// The last claim to a key with its generation. The claim is `None` if it cannot be read.
+    /// Finds the last claim to a key, with its generation. The claim is `None` if it cannot be read.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -100,7 +100,7 @@ impl Objects {
         self.create(&self.claim(owner, name), sealed(line_of(claim))).await
     }
 
-    /// Removes a claim if it is that of this job.
+    /// Removes a claim if it belongs to this job.
     pub(super) async fn drop_claim(
         &self,
         owner: &OwnerName,

@@ -1,4 +1,4 @@
-//! Who is at a job.
+//! Leases: which process works on a job.
 
 use object_store::ObjectStoreExt;
 use serde::{Deserialize, Serialize};
@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::super::{Objects, OwnerName, Unavailable, Verb};
 use super::{JobId, line_of};
 
-/// Who is at a job, and how far.
+/// Lease of a process on a job, with its progress.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Lease {
-    /// Attempts before that ended with their process, and not because it was told to end.
+    /// Earlier attempts that ended with their process although it was not told to end.
     pub n_crashes: u32,
-    /// It was left in order: anybody may go on at once.
+    /// Whether the process gave the job up in order. Any process may then continue at once.
     pub is_released: bool,
     pub stage: Option<String>,
     pub fraction: f64,
@@ -20,7 +20,7 @@ pub struct Lease {
 }
 
 impl Objects {
-    /// Makes the lease of an attempt; says whether this process has it.
+    /// Creates the lease of an attempt. Returns whether this process has it.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -34,7 +34,7 @@ impl Objects {
         self.create(&self.lease(owner, id, attempt), line_of(lease).into()).await
     }
 
-    /// Writes a lease again: its process is alive, and this far.
+    /// Writes a lease again, which shows that its process is alive, and its progress.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -48,7 +48,7 @@ impl Objects {
         self.put(&self.lease(owner, id, attempt), line_of(lease).into()).await
     }
 
-    /// The lease of an attempt; one that cannot be read is that of nobody.
+    /// Reads the lease of an attempt. An unreadable lease is returned as the default one.
     ///
     /// # Errors
     /// [`Unavailable`].

@@ -1,20 +1,25 @@
-//! Jobs as objects: what was asked, who is at it, and what came of it.
+//! Jobs as objects: request, leases, answers and result.
 //!
-//! NAMES. `<owner>/jobs/<id>/request` is what was asked; `lease-<attempt>` says who is at it, and is written again while they are;
-//! `answer-<attempt>` is what an attempt came to, and `result` which of them is that of the job. A job without a result whose last lease is not
-//! written any more is anybody's: who makes the next lease has it. Making a lease is exclusive, so one attempt has one process; so is making the
-//! result, so that a job ends once, whoever was only asleep.
+//! NAMES. `<owner>/jobs/<id>/request` is the request. `lease-<attempt>` tells which process works on the job,
+//! and is rewritten while it does. `answer-<attempt>` is the answer of an attempt. `result` tells which
+//! answer is that of the job.
+//!
+//! EXCLUSIVE WRITES. A job is free if it has no result and its last lease is no longer rewritten. The process
+//! that creates the next lease has it. Creating a lease is exclusive, so one attempt belongs to one process.
+//! Creating the result is exclusive too. So a job ends once, even if a process that seemed dead was only
+//! asleep.
 //!
 //! OPEN JOBS have a mark, the empty object `<owner>/open/<id>`, so that they are found without a list of all
-//! jobs. The mark is written behind the request and removed behind the result. So a job that has ended may
+//! jobs. The mark is written after the request and removed after the result. So a job that has ended may
 //! still have one, which the next round removes.
 //!
-//! DELETION begins with the object `deleted`. Making it is exclusive, so one of several who delete a job at
-//! once does it. From then on the job is unknown, whatever is left of it.
+//! DELETION begins with the object `deleted`. Creating it is exclusive, so one of several concurrent
+//! deletions deletes the job. From then on the job is unknown, whatever is left of it.
 //!
-//! KEYS of requests that may be repeated are under `<owner>/claims/`, see claims.rs.
+//! IDEMPOTENCY KEYS of requests are under `<owner>/claims/` (claims.rs).
 //!
-//! OBJECTS are a line of JSON, a body if they have one, and the BLAKE3 of both (pieces.rs), but for leases, which are a line.
+//! OBJECTS are a line of JSON, a body if they have one, and the BLAKE3 of both (pieces.rs). Leases are a line
+//! alone.
 
 mod asked;
 mod claims;
@@ -45,23 +50,23 @@ const DELETED: &str = "deleted";
 const LEASE: &str = "lease-";
 const ANSWER: &str = "answer-";
 
-/// The name of a job: a UUID of version 7, which tells when it was made.
+/// Name of a job: a UUID of version 7, which tells when it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JobId(Uuid);
 
 impl JobId {
-    /// A name that no other job has.
+    /// Creates a name that no other job has.
     pub fn new() -> Self {
         Self(Uuid::now_v7())
     }
 
-    /// As it is written: 32 digits, hexadecimal, with four hyphens.
+    /// Parses 32 hexadecimal digits with four hyphens, exactly as a name is written.
     pub fn parse(text: &str) -> Option<Self> {
         let id = Uuid::parse_str(text).ok()?;
         (id.get_version_num() == 7 && id.hyphenated().to_string() == text).then_some(Self(id))
     }
 
-    /// When it was made.
+    /// Time at which the name was made.
     pub fn created_at(self) -> SystemTime {
         let (seconds, nanoseconds) = self.0.get_timestamp().map_or((0, 0), |time| time.to_unix());
         SystemTime::UNIX_EPOCH + Duration::new(seconds, nanoseconds)
@@ -80,16 +85,16 @@ impl std::fmt::Display for JobId {
     }
 }
 
-/// What there is of a job.
+/// Summary of the objects of a job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobObjects {
     pub id: JobId,
     pub has_request: bool,
     /// Whether its deletion has begun.
     is_deleted: bool,
-    /// When there was a result.
+    /// Time of the result, if there is one.
     pub ended_at: Option<SystemTime>,
-    /// The last attempt, and when its lease was written.
+    /// The last attempt, and the time at which its lease was written.
     pub lease: Option<(u32, SystemTime)>,
     /// The claim to the `Idempotency-Key` of its request.
     claim: Option<ClaimName>,
@@ -97,24 +102,24 @@ pub struct JobObjects {
 }
 
 impl JobObjects {
-    /// Whether the job exists: it was written, and is not being deleted.
+    /// Returns whether the job exists: it was written, and is not being deleted.
     pub fn is_known(&self) -> bool {
         self.has_request && !self.is_deleted
     }
 
-    /// Whether the job exists and has not ended.
+    /// Returns whether the job exists and has not ended.
     pub fn is_open(&self) -> bool {
         self.is_known() && self.ended_at.is_none()
     }
 
-    /// Whether this attempt is the last one, of a job that is still to be done.
+    /// Returns whether the job is open and has no attempt later than `attempt`.
     pub fn is_that_of(&self, attempt: u32) -> bool {
         self.is_open() && self.lease.is_none_or(|(last, _)| last <= attempt)
     }
 }
 
 impl Objects {
-    /// What there is of one job, if anything.
+    /// Finds the objects of one job, if there are any.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -123,8 +128,8 @@ impl Objects {
         Ok(collected(found).pop())
     }
 
-    /// What there is of all jobs of an owner. The list is as long as there are jobs, so it is asked for
-    /// rarely.
+    /// Finds the objects of all jobs of an owner. The list is as long as there are jobs, so it is rarely
+    /// requested.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -132,7 +137,7 @@ impl Objects {
         Ok(collected(self.objects_in(owner, &[FOLDER]).await?))
     }
 
-    /// Jobs of an owner that are marked as open. Some may have ended or be gone.
+    /// Lists the jobs of an owner that are marked as open. Some may have ended or be gone.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -187,8 +192,8 @@ impl Objects {
         Ok(job.has_request)
     }
 
-    /// Forgets jobs of owners that nobody `knows` any more, a key of theirs having been taken away, once they
-    /// ended longer than `kept` ago, or nobody has worked on them for `longest`.
+    /// Deletes jobs of owners that `knows` rejects, because their API key was removed. A job is deleted
+    /// `kept` after its end, or after `longest` without work on it.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -228,13 +233,13 @@ impl Objects {
 }
 
 fn line_of(head: &impl Serialize) -> Bytes {
-    // Types of this file, which can be written.
+    // All callers pass types of this module, which always serialize.
     let mut line = serde_json::to_vec(head).unwrap_or_default();
     line.push(b'\n');
     line.into()
 }
 
-/// Objects by their jobs.
+/// Groups objects by job.
 fn collected(found: Vec<ObjectMeta>) -> Vec<JobObjects> {
     let mut jobs = std::collections::BTreeMap::new();
     for object in found {

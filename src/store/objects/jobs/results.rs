@@ -1,4 +1,4 @@
-//! What came of a job.
+//! Results of jobs.
 
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -14,7 +14,7 @@ use super::super::room::Room;
 use super::super::{Damaged, Objects, OwnerName, Unavailable, Verb};
 use super::{JobId, RESULT, line_of};
 
-/// What came of it. The headers are those of the answer.
+/// Head of the result of a job. The headers are those of the answer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobResult {
     pub outcome: Outcome,
@@ -22,7 +22,7 @@ pub struct JobResult {
     pub headers: Vec<(String, String)>,
 }
 
-/// How a job ended.
+/// Outcome of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -31,14 +31,14 @@ pub enum Outcome {
     Cancelled,
 }
 
-/// A result as it is written: where its body is, if it has one.
+/// A result as it is written. Its body is in the answer of `attempt`, if it has one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Published {
     head: JobResult,
     attempt: Option<u32>,
 }
 
-/// The result of a job, and its body as it is read.
+/// The result of a job, with its body as a stream.
 pub struct FoundResult {
     pub head: JobResult,
     pub ended_at: SystemTime,
@@ -54,9 +54,11 @@ pub struct Answer<S> {
 }
 
 impl Objects {
-    /// Writes the answer of an attempt within its room, and makes it the result of the job, unless the job
-    /// has one or is unknown. Returns whether it is the result. Nothing is published before all of it is
-    /// written.
+    /// Writes the answer of an attempt within its room, and publishes it as the result of the job. Returns
+    /// whether it is the result.
+    ///
+    /// An answer is not published if the job has a result already or is unknown. Nothing is published before
+    /// all of it is written.
     ///
     /// # Errors
     /// [`Unavailable`], also if the body breaks off or exceeds its room.
@@ -106,8 +108,8 @@ impl Objects {
         Ok(true)
     }
 
-    /// The result of a job that is known and has ended. A result that is not what was written is dropped and
-    /// reported, and the job is open again.
+    /// Opens the result of a known job that has ended. A damaged result is deleted and reported, and the job
+    /// is open again.
     ///
     /// # Errors
     /// [`Unavailable`].
@@ -154,7 +156,7 @@ impl Objects {
         Ok(None)
     }
 
-    /// A body that lets go of its result if it is not what was written.
+    /// Wraps a body so that its result is deleted if the body turns out damaged.
     fn reporting(
         self: Arc<Self>,
         owner: OwnerName,
@@ -175,7 +177,7 @@ impl Objects {
         body.boxed()
     }
 
-    /// Lets go of a result that is not what was written.
+    /// Deletes a damaged result and opens its job again.
     async fn drop_result(&self, owner: &OwnerName, id: JobId, damaged: Damaged) {
         let name = self.job(owner, id, RESULT);
         self.report(&name, damaged);

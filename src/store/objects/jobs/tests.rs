@@ -99,7 +99,7 @@ async fn a_job_ends_once() {
     assert!(!put(&objects, cancelled, 0, body(&[b"late"])).await.unwrap());
     let found = objects.get_result(&owner(), cancelled).await.unwrap().unwrap();
     assert_eq!((found.head.outcome, found.n_body_bytes), (Outcome::Cancelled, 0));
-    // Nor does one come back that was forgotten.
+    // A late result does not bring back a deleted job either.
     for id in [id, cancelled] {
         assert!(objects.delete_job(&owner(), id).await.unwrap());
         assert!(!objects.delete_job(&owner(), id).await.unwrap());
@@ -198,7 +198,7 @@ async fn jobs_of_owners_that_are_gone_go_with_their_time() {
     assert_eq!(sweep(true, 86400).await, [ended, open]);
     assert_eq!(sweep(false, 30).await, [ended, open]);
     assert_eq!(sweep(false, 90).await, [open]);
-    // Somebody is at it.
+    // Creating a lease counts as work on the job.
     assert!(objects.claim_job(&owner(), open, 0, &super::Lease::default()).await.unwrap());
     assert_eq!(sweep(false, 500).await, [open]);
     assert_eq!(sweep(false, 700).await, []);
@@ -217,7 +217,7 @@ async fn of_all_who_delete_a_job_at_once_one_does() {
         assert_eq!(deleting.await.into_iter().filter(|&is_deleted| is_deleted).count(), 1);
         assert!(objects.get_result(&owner(), id).await.unwrap().is_none());
     }
-    // Whoever deletes a job may end meanwhile: it is unknown, and what is left is no damage.
+    // A process that deletes a job may end halfway: the job is unknown, and its left-overs are no damage.
     let id = asked(&objects, b"body").await;
     assert!(put(&objects, id, 0, body(&[b"text"])).await.unwrap());
     objects.put(&objects.job(&owner(), id, DELETED), PutPayload::default()).await.unwrap();
@@ -240,12 +240,12 @@ async fn a_key_is_that_of_one_job_and_goes_with_it() {
     assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
     assert!(objects.claim_key(&name, &generation(0), &claim_of(first)).await.unwrap());
     assert!(!objects.claim_key(&name, &generation(0), &claim_of(late)).await.unwrap());
-    // Whoever is late takes nothing with it.
+    // Deleting the late job does not remove the claim of the first one.
     assert!(objects.delete_job(&name, late).await.unwrap());
     assert_eq!(objects.find_claim(&name, &key).await.unwrap(), Some((0, Some(claim_of(first)))));
     assert!(objects.delete_job(&name, first).await.unwrap());
     assert_eq!(objects.find_claim(&name, &key).await.unwrap(), None);
-    // The claim of a job that is gone is followed by another; one that nobody has goes after an hour.
+    // The claim of a deleted job is followed by another. A claim that no job has is removed after an hour.
     let id = asked(&objects, b"").await;
     assert!(objects.claim_key(&name, &generation(7), &claim_of(id)).await.unwrap());
     let left = objects.claim(&name, &generation(6));
@@ -280,14 +280,14 @@ async fn what_is_read_in_memory_is_there_once_and_paid_for_until_it_is_read() {
     });
     let pieces = futures_util::future::join_all(reading).await;
     let places = |pieces: &[Bytes]| pieces.iter().map(|piece| piece.as_ptr()).collect::<Vec<_>>();
-    // But for the byte that is held back until the hash is right.
+    // The last byte is excepted: it is held back until the hash is checked.
     let n = pieces[0].len() - 1;
     assert!(pieces.iter().all(|other| places(&other[..n]) == places(&pieces[0][..n])), "they are copies");
     assert!(objects.delete_job(&owner(), id).await.unwrap());
     assert_eq!(budget.n_held(), held, "they are held still");
     drop(pieces);
     assert_eq!(budget.n_held(), 0);
-    // What has no room is not there.
+    // An answer beyond its room is not published.
     let mut room = Room::of(&Budget::new(3 * N_BYTES, 1), Owner(0), 0).unwrap();
     let id = asked(&objects, b"").await;
     let answer = Answer { attempt: 0, head: head(), body: futures_util::stream::iter([piece(), piece()]) };

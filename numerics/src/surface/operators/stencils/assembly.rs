@@ -1,4 +1,4 @@
-//! The rows of an operator, one after the other: which weights each of them takes.
+//! Assembly of the sparse rows of an operator, and the choice of weights for each row.
 
 use rayon::prelude::*;
 
@@ -16,18 +16,18 @@ use crate::points::cloud::Cloud;
 use crate::points::monomials::{MAX_STENCIL_DEGREE, NODES_PER_MONOMIAL, n_monomials, n_stencil_nodes};
 use crate::points::neighbours::{Neighbour, Neighbours};
 
-/// Degree of the polynomials that r⁵ asks for: it is conditionally positive definite of order 3 (Wendland
-/// 2005, sec. 8.3).
+/// Least degree of the polynomials: r⁵ is conditionally positive definite of order 3 (Wendland 2005, sec.
+/// 8.3).
 const LEAST_DEGREE: usize = 2;
 
-/// Dominance of the diagonal in a stable row, at least. Eigenvalues with positive real part were seen to come
+/// Least dominance of the diagonal in a stable row. Eigenvalues with positive real part were seen to come
 /// from rows below 0.1 (docs/numerics.md).
 const DOMINANT: f64 = 0.2;
 
 /// Graded discs: the nodes to choose from, as a multiple of those of a row, and the ratio of [`Grading`].
 const GRADED: [(usize, f64); 2] = [(4, 0.35), (16, 0.5)];
 
-/// What rows are for.
+/// The use that rows are made for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rows {
     /// Products with values: weights of the nearest nodes are the most accurate.
@@ -47,6 +47,8 @@ pub(super) struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
+    /// Computes the weights at all queries.
+    ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
     pub(super) fn stencils(&self, observer: &dyn Observer) -> Result<Stencils, NumericsError> {
@@ -68,7 +70,10 @@ impl Assembly<'_> {
         Ok(Stencils { matrix, resolutions, kinds })
     }
 
-    /// Empty where there is no other node on the query's sheet, and for a null query that is not stepped in time.
+    /// Computes the row of a query.
+    ///
+    /// It is empty where no other node is on the query's sheet, and for a null query that is not stepped in
+    /// time.
     fn row(&self, query: usize, found: &mut Vec<Neighbour>) -> Row {
         let x = self.queries.point(query);
         if self.geometry.is_null()[query] {
@@ -79,8 +84,9 @@ impl Assembly<'_> {
         forms.map(|forms| forms.into_row(&site, self.operator)).unwrap_or_default()
     }
 
-    /// Positive weights at a node without a normal, over the plane nearest to the nodes around it. An empty row would
-    /// keep the value there forever.
+    /// Computes positive weights at a node without a normal, over the plane nearest to the nodes around it.
+    ///
+    /// An empty row would keep the value at the node forever.
     fn row_without_normal(&self, x: &[f64], found: &mut Vec<Neighbour>) -> Option<Row> {
         let count = n_stencil_nodes(self.nodes.dimension());
         self.neighbours.nearest_positions_into(x, count, found);
@@ -93,8 +99,9 @@ impl Assembly<'_> {
         Some(positive_forms(vec![disc])?.into_row(&site, self.operator))
     }
 
-    /// The first acceptable weights: on the nearest nodes, on graded ones, or without splines. `found` is a
-    /// buffer.
+    /// Computes the first acceptable weights: on the nearest nodes, on graded ones, or without splines.
+    ///
+    /// `found` is a buffer.
     fn forms(&self, site: &Site<'_>, found: &mut Vec<Neighbour>) -> Option<Forms> {
         let count = n_stencil_nodes(self.nodes.dimension());
         self.neighbours.nearest_positions_into(site.x, count + 1, found);
@@ -114,13 +121,14 @@ impl Assembly<'_> {
         if self.has_diagonal(&nearest) { positive_forms(graded) } else { Some(self.least_norm(nearest)) }
     }
 
-    /// Whether a negative diagonal matters.
+    /// Returns whether a negative diagonal matters.
     fn has_diagonal(&self, disc: &Disc) -> bool {
         disc.is_at_node && self.rows == Rows::Stable
     }
 
-    /// Weights by splines with the highest degree that the nodes determine. Returns the disc where there are
-    /// none, or where the diagonal does not dominate but should.
+    /// Computes weights by splines with the highest degree that the nodes determine.
+    ///
+    /// Returns the disc where there are none, or where the diagonal should dominate but does not.
     fn splines(&self, disc: Disc, kind: RowKind) -> Result<Forms, Disc> {
         let has_nodes = |&degree: &usize| {
             disc.n_nodes() as f64 >= (NODES_PER_MONOMIAL - 0.5) * n_monomials(disc.k, degree) as f64
@@ -139,7 +147,7 @@ impl Assembly<'_> {
     }
 }
 
-/// Normal of the plane through x with the least squared distances to the nodes.
+/// Computes the normal of the plane through x with the least squared distances to the nodes.
 fn plane_normal(nodes: &Cloud, x: &[f64], found: &[Neighbour]) -> Option<Small> {
     let d = x.len();
     let reach = found.last()?.squared_distance.sqrt();
@@ -157,8 +165,9 @@ fn plane_normal(nodes: &Cloud, x: &[f64], found: &[Neighbour]) -> Option<Small> 
     Some(Small::from_slice(&vectors[..d]))
 }
 
-/// Positive weights on the narrowest disc that has exact ones, else on the narrowest. `None` if there is no
-/// other node.
+/// Computes positive weights on the narrowest disc that has exact ones, else on the narrowest disc.
+///
+/// `None` if there is no other node.
 fn positive_forms(mut discs: Vec<Disc>) -> Option<Forms> {
     let found: Option<Vec<_>> = discs.iter().map(positive::weights).collect();
     let found = found?;

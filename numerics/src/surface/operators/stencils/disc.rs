@@ -26,7 +26,8 @@ impl<'a> Site<'a> {
         Self { x, normal, axes: tangent_basis(normal), curvature }
     }
 
-    /// Coordinates of a node in the tangent plane, unit L, or `None` if the node is on another sheet.
+    /// Returns the coordinates of a node in the tangent plane, unit L, or `None` if the node is on another
+    /// sheet.
     fn project(&self, node: &[f64], squared_distance: f64) -> Option<Small> {
         let arm: Small = node.iter().zip(self.x).map(|(p, x)| p - x).collect();
         let local: Small = self.axes.chunks_exact(arm.len()).map(|axis| dot(axis, &arm)).collect();
@@ -44,28 +45,30 @@ pub(super) struct Disc {
     pub(super) k: usize,
     /// Distance of the farthest node within the tangent plane, unit L.
     pub(super) radius: f64,
-    /// Whether the query is the first node.
+    /// True if the query is the first node.
     pub(super) is_at_node: bool,
 }
 
 impl Disc {
-    /// The `count` nearest nodes on the query's sheet, without those that are as far as the next one: then
-    /// the order of the points does not decide between ties. `found` is sorted by distance and has `count +
-    /// 1` entries. `None` if all nodes are at the query.
+    /// Selects the `count` nearest nodes on the query's sheet, without those that are as far as the next one.
+    /// So the order of the points does not decide between ties.
+    ///
+    /// `found` is sorted by distance and has `count + 1` entries. `None` if all nodes are at the query.
     pub(super) fn nearest(nodes: &Cloud, site: &Site<'_>, found: &[Neighbour], count: usize) -> Option<Self> {
         let tied = match found.get(count) {
             Some(next) => next.squared_distance * (1.0 - TIED),
             None => f64::INFINITY,
         };
         let n_nearer = found.partition_point(|node| node.squared_distance < tied);
-        // On a sphere around the query all nodes are ties.
+        // If all nodes lie on a sphere around the query, all of them are ties.
         let kept = if n_nearer > count / 2 { n_nearer } else { count };
         Self::of(nodes, site, &found[..kept.min(found.len())], |_, _| true)
     }
 
-    /// Nodes whose mutual distances grow with the distance r from the query: nearest first, each node that
-    /// has no chosen one within `ratio · r`. Such a disc reaches across a jump of the density, where all of
-    /// the nearest nodes lie on one side.
+    /// Selects nodes whose mutual distances grow with the distance r from the query.
+    ///
+    /// Nearest first, each node is taken that has no chosen one within `ratio · r`. Such a disc reaches
+    /// across a jump of the density, where all of the nearest nodes lie on one side.
     pub(super) fn graded(
         nodes: &Cloud,
         site: &Site<'_>,
@@ -82,7 +85,8 @@ impl Disc {
         })
     }
 
-    /// The nodes that `accepts` takes, given the coordinates of those before them and their own.
+    /// Selects the nodes for which `accepts` is true, given the coordinates of the chosen nodes and of the
+    /// node itself.
     fn of(
         nodes: &Cloud,
         site: &Site<'_>,
@@ -116,12 +120,12 @@ impl Disc {
     }
 }
 
-/// How a graded disc is chosen.
+/// Options of a graded disc.
 #[derive(Clone, Copy)]
 pub(super) struct Grading {
-    /// Distance of a node from nearer ones at least, over its distance from the query.
+    /// Least distance of a node from nearer ones, over its distance from the query.
     pub(super) ratio: f64,
-    /// Nodes at most.
+    /// Largest number of nodes.
     pub(super) count: usize,
 }
 

@@ -14,7 +14,7 @@ const DEGREE: usize = 2;
 /// Share of the trace of PᵀP below which a combination of monomials counts as not determined.
 const INDETERMINATE: f64 = 1e-8;
 
-/// Weights over the scaled coordinates, `[n]` for the Laplacian, `[k, n]` for the gradient.
+/// Computes weights over the scaled coordinates, `[n]` for the Laplacian, `[k, n]` for the gradient.
 ///
 /// `w = P(PᵀP + εI)⁻¹Lp`, P the monomials up to degree 2 less their means. Constants vanish, and polynomials
 /// of degree 2 are reproduced as far as the nodes determine them. Derivatives along directions without nodes

@@ -40,13 +40,13 @@ use assembly::{Assembly, Rows};
 pub use row::RowKind;
 pub use sparse::SparseMatrix;
 
-/// The weights at all queries, how they came about, and which of them are to be trusted.
+/// Weights at all queries, with their origin and how far they can be trusted.
 #[derive(Debug)]
 pub struct Stencils {
     pub matrix: SparseMatrix,
-    /// Whether the nodes resolve the surface around each query, `[m]`.
+    /// Resolution of the surface by the nodes around each query, `[m]`.
     pub resolutions: Vec<Resolution>,
-    /// How the weights of each row came about, `[m]`.
+    /// Origin of the weights of each row, `[m]`.
     pub kinds: Vec<RowKind>,
 }
 
@@ -57,11 +57,12 @@ impl Stencils {
     }
 }
 
-/// The Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit 1/L².
+/// Computes the Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit
+/// 1/L².
 ///
-/// Over the nodes themselves no eigenvalue has a positive real part beyond rounding. Rows of nodes at a rim are
-/// those of a boundary that nothing flows through, and are flagged. Rows are empty for null queries that are not
-/// nodes, and in a cloud of one position.
+/// Over the nodes themselves no eigenvalue has a positive real part beyond rounding. Rows of nodes at a rim
+/// are those of a boundary that nothing flows through, and are flagged. Rows are empty for null queries that
+/// are not nodes, and in a cloud of one position.
 ///
 /// # Errors
 /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
@@ -76,11 +77,12 @@ pub fn laplace_beltrami_stencils(
     Assembly { geometry, nodes, neighbours, queries, operator, rows }.stencils(observer)
 }
 
-/// The components of the surface gradient at the queries of the geometry, `[d, m, n]`, unit 1/L. Rows of null
-/// queries are empty.
+/// Computes the components of the surface gradient at the queries of the geometry, `[d, m, n]`, unit 1/L.
+///
+/// Rows of null queries are empty.
 ///
 /// # Errors
-/// Those of [`laplace_beltrami_stencils`].
+/// Returns the errors of [`laplace_beltrami_stencils`].
 pub fn surface_gradient_stencils(
     geometry: &Geometry,
     nodes: &Cloud,

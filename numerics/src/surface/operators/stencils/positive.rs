@@ -1,10 +1,11 @@
-//! Weights of the Laplacian at a node, none of them negative beside the diagonal (positive stencils: Seibold
+//! Weights of the Laplacian at a node, none of them negative except the diagonal (positive stencils: Seibold
 //! 2008).
 //!
-//! Rows of this kind alone make a matrix without eigenvalues of positive real part (Gershgorin). Weights `w_j
-//! = v_j/|t_j|²` with v_j ≥ 0 are exact for polynomials of degree 2 if `Σ w_j t_j = 0` and `Σ w_j t_j t_jᵀ =
-//! 2I`. Where nodes do not surround the query, at a rim for example, no such weights exist. Then the weights
-//! with the least squared error of these moments act like a boundary that nothing flows through.
+//! Rows of this kind alone make a matrix without eigenvalues of positive real part (Gershgorin). Weights
+//! `w_j = v_j/|t_j|²` with v_j ≥ 0 are exact for polynomials of degree 2 if `Σ w_j t_j = 0` and
+//! `Σ w_j t_j t_jᵀ = 2I`. Where nodes do not surround the query, at a rim for example, no such weights exist.
+//! Then the weights with the least squared error of these moments act like a boundary that nothing flows
+//! through.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -15,25 +16,25 @@ use crate::machine::vector::{dot, norm};
 /// Penalty of `|t_j|² v_j²`. It makes the weights unique and prefers near nodes.
 const PREFERENCE: f64 = 1e-5;
 
-/// Error of a moment up to which weights count as exact. The penalty alone causes less.
+/// Largest error of a moment at which weights count as exact. The penalty alone causes less.
 const INEXACT: f64 = 1e-3;
 
-/// Slope of the objective along another weight, relative to the largest at 0, from which that weight becomes
-/// positive.
+/// Slope of the objective along a weight that is 0, relative to the largest at the start, above which the
+/// weight becomes positive.
 const NEGLIGIBLE: f64 = 1e-14;
 
 /// Distance over the radius of the disc up to which a node counts as the query itself.
 const COINCIDENT: f64 = 1e-8;
 
-/// Positive weights.
+/// Positive weights of the Laplacian on a disc.
 pub(super) struct Positive {
     /// Weights over the scaled coordinates, `[n]`. Their sum is 0.
     pub(super) weights: Vec<f64>,
-    /// Whether they are exact for polynomials of degree 2.
+    /// True if the weights are exact for polynomials of degree 2.
     pub(super) is_exact: bool,
 }
 
-/// Positive weights on a disc whose first node is the query. `None` without another node.
+/// Computes positive weights on a disc whose first node is the query. `None` without another node.
 pub(super) fn weights(disc: &Disc) -> Option<Positive> {
     let others: Vec<usize> =
         (0..disc.n_nodes()).filter(|&node| norm(disc.point(node)) > COINCIDENT).collect();
@@ -61,8 +62,8 @@ pub(super) fn weights(disc: &Disc) -> Option<Positive> {
     Some(Positive { weights, is_exact })
 }
 
-/// `t/|t|²` and the entries of `t tᵀ/|t|²`. Mixed entries are multiplied by √2, so that squared errors do not
-/// depend on the axes.
+/// Returns `t/|t|²` and the entries of `t tᵀ/|t|²`. Mixed entries are multiplied by √2, so that squared
+/// errors do not depend on the axes.
 fn moments(t: &[f64]) -> Vec<f64> {
     let squared = norm(t).powi(2);
     let second = |(a, b): (usize, usize)| if a == b { t[a] * t[a] } else { 2f64.sqrt() * t[a] * t[b] };
@@ -70,19 +71,19 @@ fn moments(t: &[f64]) -> Vec<f64> {
     t.iter().copied().chain(seconds).map(|moment| moment / squared).collect()
 }
 
-/// Moments of the Laplacian in the order of [`moments`].
+/// Returns the moments of the Laplacian, in the order of [`moments`].
 fn target(k: usize) -> Vec<f64> {
     let seconds = (0..k).flat_map(|a| (0..=a).map(move |b| if a == b { 2.0 } else { 0.0 }));
     std::iter::repeat_n(0.0, k).chain(seconds).collect()
 }
 
-/// The v ≥ 0 with the least `½vᵀGv − hᵀv` for a positive definite G, by active sets (Lawson and Hanson 1974,
-/// ch. 23).
+/// Finds the v ≥ 0 with the least `½vᵀGv − hᵀv` for a positive definite G, by active sets (Lawson and Hanson
+/// 1974, ch. 23).
 fn nonnegative_minimum(matrix: &Mat<f64>, right: &[f64]) -> Vec<f64> {
     let n = right.len();
     let (mut v, mut is_free) = (vec![0.0; n], vec![false; n]);
     let least = NEGLIGIBLE * right.iter().fold(0.0, |a: f64, h| a.max(h.abs()));
-    // The objective decreases from set to set, so that none comes twice. The bound holds rounding in check.
+    // The objective decreases from set to set, so that no set comes twice. The bound guards against rounding.
     for _ in 0..3 * n {
         let slope = |i: usize| right[i] - (0..n).map(|j| matrix[(i, j)] * v[j]).sum::<f64>();
         let slopes = (0..n).filter(|&i| !is_free[i]).map(|i| (slope(i), i));
@@ -94,8 +95,8 @@ fn nonnegative_minimum(matrix: &Mat<f64>, right: &[f64]) -> Vec<f64> {
     v
 }
 
-/// Moves v to the minimum over its free entries. On the way there an entry may reach 0: then v stops, that
-/// entry is free no more, and the answer is false.
+/// Moves v to the minimum over its free entries and returns true. If an entry reaches 0 on the way, v stops
+/// there, that entry is no longer free, and the answer is false.
 fn is_minimal_over_free(matrix: &Mat<f64>, right: &[f64], v: &mut [f64], is_free: &mut [bool]) -> bool {
     let free: Vec<usize> = (0..v.len()).filter(|&i| is_free[i]).collect();
     let system = Mat::from_fn(free.len(), free.len(), |i, j| matrix[(free[i], free[j])]);

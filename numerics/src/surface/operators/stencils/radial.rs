@@ -3,10 +3,11 @@
 //! Without smoothing these are the weights of RBF-FD (Flyer, Fornberg, Bayona and Barnett 2016). Nodes near
 //! each other then get large weights of both signs, and the diagonal of a random cloud is positive in one row
 //! of fifty. Smoothing splines add a penalty μ of squared weights, so that nodes near each other share their
-//! weight. For μ → ∞ the weights are those of moving least squares. The penalty of the query's own node is
-//! μ/n, after Liang and Zhao (2013), who give it n times the weight of another node: this makes the diagonal
-//! dominate. On random spheres errors are 1.4 times those of RBF-FD, and 7 times for moving least squares
-//! (docs/numerics.md).
+//! weight. For μ → ∞ the weights are those of moving least squares.
+//!
+//! The penalty of the query's own node is μ/n, which makes the diagonal dominate. It is after Liang and Zhao
+//! (2013), who give it n times the weight of another node. On random spheres errors are 1.4 times those of
+//! RBF-FD, and 7 times for moving least squares (docs/numerics.md).
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -16,17 +17,19 @@ use super::disc::Disc;
 use crate::machine::vector::dot;
 use crate::points::monomials::exponents;
 
-/// Sum of the magnitudes of weights over scaled coordinates, in units of `n^{order/k}` of regular nodes, from
-/// which they multiply what the nodes have of noise: regular nodes have about 2 around a point, and ten times
-/// that at a rim.
+/// Largest sum of the magnitudes of weights over scaled coordinates, in units of `n^{order/k}` of regular
+/// nodes. Beyond it the weights multiply the noise of the nodes. Regular nodes have about 2 around a point,
+/// and ten times that at a rim.
 const UNSTABLE: f64 = 200.0;
 
-/// Error of the weights for a polynomial, over the sum of their magnitudes, from which the nodes do not
-/// determine them.
+/// Largest error of the weights for a polynomial, over the sum of their magnitudes. Beyond it the nodes do
+/// not determine the weights.
 const INDETERMINATE: f64 = 1e-9;
 
-/// Penalty μ of squared weights of the Laplacian at a node, over the scaled coordinates. On a curve the nodes
-/// of a row are nearer each other in units of the radius, and the splines between them smaller.
+/// Returns the penalty μ of squared weights of the Laplacian at a node, over the scaled coordinates.
+///
+/// On a curve the nodes of a row are nearer to each other in units of the radius, so the splines between them
+/// are smaller.
 fn smoothing(k: usize) -> f64 {
     if k == 1 { 1e-4 } else { 0.01 }
 }
@@ -35,12 +38,12 @@ fn smoothing(k: usize) -> f64 {
 /// near duplicates.
 const SLIGHT: f64 = 1e-5;
 
-/// Weights of the derivatives at 0 for values at the scaled coordinates: `[n]` for the Laplacian, `[k, n]`
-/// for the gradient.
+/// Computes weights of the derivatives at 0 for values at the scaled coordinates: `[n]` for the Laplacian,
+/// `[k, n]` for the gradient.
 ///
 /// Solves `[Φ − D P; Pᵀ 0] [w; λ] = [Lφ; Lp]`, D the penalties. `None` where the nodes do not determine
-/// polynomials of this degree (on a few lines of nodes, for example), or only by weights that would multiply
-/// noise.
+/// polynomials of this degree, for example on a few lines of nodes. `None` also where the weights would
+/// multiply noise.
 pub(super) fn weights(disc: &Disc, degree: usize, operator: Operator) -> Option<Vec<f64>> {
     let (n, k) = (disc.n_nodes(), disc.k);
     let exponents = exponents(k, degree);
@@ -64,7 +67,7 @@ pub(super) fn weights(disc: &Disc, degree: usize, operator: Operator) -> Option<
     (0..n_forms).all(are_right).then_some(weights)
 }
 
-/// `[Φ − D P; Pᵀ 0]`
+/// Returns the matrix `[Φ − D P; Pᵀ 0]`.
 fn matrix(disc: &Disc, exponents: &[Vec<usize>], operator: Operator) -> Mat<f64> {
     let n = disc.n_nodes();
     let size = n + exponents.len();
@@ -84,7 +87,7 @@ fn matrix(disc: &Disc, exponents: &[Vec<usize>], operator: Operator) -> Mat<f64>
     matrix
 }
 
-/// Penalty of the squared weight of a node.
+/// Returns the penalty of the squared weight of a node.
 fn penalty(disc: &Disc, node: usize, operator: Operator) -> f64 {
     match operator {
         Operator::LaplaceBeltrami if disc.is_at_node && node == 0 => {
@@ -95,7 +98,7 @@ fn penalty(disc: &Disc, node: usize, operator: Operator) -> f64 {
     }
 }
 
-/// `[Lφ; Lp]`, a column for each derivative.
+/// Returns the right-hand sides `[Lφ; Lp]`, a column for each derivative.
 fn right_side(disc: &Disc, exponents: &[Vec<usize>], operator: Operator) -> Mat<f64> {
     let (n, k) = (disc.n_nodes(), disc.k);
     let n_forms = if operator == Operator::LaplaceBeltrami { 1 } else { k };
@@ -121,7 +124,7 @@ pub(super) fn monomial(point: &[f64], powers: &[usize]) -> f64 {
     point.iter().zip(powers).map(|(t, &power)| t.powi(power as i32)).product()
 }
 
-/// A derivative of a monomial at 0: the Laplacian, or the one along the axis `form`.
+/// Returns a derivative of a monomial at 0: the Laplacian, or the derivative along the axis `form`.
 pub(super) fn derivative_at_zero(powers: &[usize], form: usize, operator: Operator) -> f64 {
     let total: usize = powers.iter().sum();
     match operator {

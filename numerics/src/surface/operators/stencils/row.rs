@@ -1,11 +1,11 @@
-//! One row: its weights, and how they came about.
+//! A row of the sparse matrix: its weights and their origin.
 
 use super::super::super::degeneracy::Resolution;
 use super::super::Operator;
 use super::super::resolution::resolution;
 use super::disc::{Disc, Site};
 
-/// How the weights of a row came about.
+/// Origin of the weights of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RowKind {
     /// Smoothed polyharmonic splines on the nearest nodes.
@@ -13,11 +13,11 @@ pub enum RowKind {
     /// Smoothed polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones
     /// lie on one side.
     Graded,
-    /// Weights without negative ones beside the diagonal.
+    /// Weights of which none is negative except the diagonal.
     Positive,
     /// Least squares of the least norm, where the nodes do not determine derivatives.
     LeastNorm,
-    /// None: there is no other node, or the query has no normal and is not stepped in time.
+    /// No weights: there is no other node, or the query has no normal and is not stepped in time.
     #[default]
     Empty,
 }
@@ -40,8 +40,8 @@ pub(super) struct Forms {
 }
 
 impl Forms {
-    /// `−w_0/Σ|w_j|`, j ≠ 0: 1 for a row without negative weights beside the diagonal, at most 0 for a wrong
-    /// diagonal.
+    /// Returns `−w_0/Σ|w_j|`, j ≠ 0. It is 1 for a row without negative weights beside the diagonal, and at
+    /// most 0 for a diagonal of the wrong sign.
     pub(super) fn dominance(&self) -> f64 {
         let others: f64 = self.weights[1..].iter().map(|weight| weight.abs()).sum();
         -self.weights[0] / others
@@ -54,7 +54,7 @@ impl Forms {
             RowKind::Nearest | RowKind::Graded => {
                 resolution(&forms, &disc.coordinates, disc.k, site.curvature * radius, operator)
             }
-            // Of first order at best.
+            // First order at best.
             RowKind::Positive | RowKind::LeastNorm | RowKind::Empty => Resolution::Unresolved,
         };
         let weights = match operator {
@@ -77,7 +77,7 @@ impl Row {
         Self { columns, weights, ..self }
     }
 
-    /// Without the entries that are 0, for one component.
+    /// Drops the entries that are 0, for one component.
     fn without_zeros(self) -> Self {
         let entries = self.columns.iter().zip(&self.weights).filter(|&(_, &weight)| weight != 0.0);
         let (columns, weights) = entries.map(|(&column, &weight)| (column, weight)).unzip();
@@ -85,7 +85,8 @@ impl Row {
     }
 }
 
-/// Weights of the derivatives along the axes, `[k, n]`, as those of the components in space, `[d, n]`.
+/// Converts weights of the derivatives along the axes, `[k, n]`, to weights of the components in space,
+/// `[d, n]`.
 fn in_space(forms: &[f64], axes: &[f64], radius: f64, d: usize) -> Vec<f64> {
     let (k, n) = (d - 1, forms.len() / (d - 1));
     let component = |c: usize| {

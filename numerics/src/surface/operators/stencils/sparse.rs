@@ -4,17 +4,20 @@ use rayon::prelude::*;
 
 use super::row::Row;
 
-/// A sparse matrix by rows, one list of numbers per component: entry `at` of row i, `indptr[i] ≤ at <
-/// indptr[i + 1]`, is in column `indices[at]`.
+/// A sparse matrix by rows (CSR), with one list of numbers per component.
+///
+/// Entry `at` of row i, `indptr[i] ≤ at < indptr[i + 1]`, is in column `indices[at]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseMatrix {
-    /// Numbers per entry: 1, or d for a gradient. Not to be told from `data` where all rows are empty.
+    /// Numbers per entry: 1, or d for a gradient. The length of `data` does not show it where all rows are
+    /// empty.
     pub n_components: usize,
-    /// `[m + 1]`
+    /// Start of each row in `indices`, `[m + 1]`.
     pub indptr: Vec<i64>,
-    /// Ascending within a row.
+    /// Columns of the entries, ascending within a row.
     pub indices: Vec<i64>,
-    /// `[components, entries]`: 1/L² for the Laplace–Beltrami operator, 1/L for the surface gradient.
+    /// Numbers, `[components, entries]`: 1/L² for the Laplace–Beltrami operator, 1/L for the surface
+    /// gradient.
     pub data: Vec<f64>,
 }
 
@@ -38,7 +41,7 @@ impl SparseMatrix {
         Self { n_components, indptr, indices, data }
     }
 
-    /// The products with values at the nodes, `[components, m]`.
+    /// Returns the products with values at the nodes, `[components, m]`.
     pub fn apply(&self, values: &[f64]) -> Vec<f64> {
         let (m, n_entries) = (self.indptr.len() - 1, self.indices.len());
         let of_row = |component: usize, row: usize| {

@@ -1,4 +1,4 @@
-//! The spectrum of the square matrix, and what it costs in accuracy.
+//! Tests of the spectrum of the square matrix, and of the accuracy that stability costs.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -7,10 +7,10 @@ use super::tests::{Operators, operators};
 use super::*;
 use crate::testing::Random;
 
-/// Points of each cloud: eigenvalues of as many take a second or two.
+/// Points of each cloud. Eigenvalues of as many take a second or two.
 const N: usize = 500;
 
-/// n points of a density on the unit sphere that is a sixteenth below the equator.
+/// Samples n points of the unit sphere. The density below the equator is a sixteenth of that above.
 fn two_densities(n: usize, random: &mut Random) -> Cloud {
     let mut points = Vec::with_capacity(3 * n);
     while points.len() < 3 * n {
@@ -51,7 +51,7 @@ fn random_circle(n: usize, random: &mut Random) -> Cloud {
     Cloud::new((0..n).flat_map(|_| point(random.angle())).collect(), 2).unwrap()
 }
 
-/// A half: at its rim no consistent row has a negative diagonal.
+/// Samples half a sphere. At its rim no consistent row has a negative diagonal.
 fn half_sphere(n: usize, random: &mut Random) -> Cloud {
     let point = |random: &mut Random| {
         let [x, y, z] = random.on_sphere();
@@ -60,7 +60,7 @@ fn half_sphere(n: usize, random: &mut Random) -> Cloud {
     Cloud::new((0..n).flat_map(|_| point(random)).collect(), 3).unwrap()
 }
 
-/// Every point of a sphere twice, the second a little beside.
+/// Samples every point of a sphere twice, the second one slightly beside the first.
 fn near_duplicates(n: usize, random: &mut Random) -> Cloud {
     let once = random_sphere(n / 2, random);
     let beside: Vec<f64> = once.coordinates().iter().map(|x| x + 1e-5 * random.normal()).collect();
@@ -94,8 +94,8 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |a, b| a.max(b.abs()))
 }
 
-/// The largest max norm on the way through so many steps `u ← (I − τA)⁻¹u`, over that of the random values at
-/// the start.
+/// Returns the largest max norm during so many steps `u ← (I − τA)⁻¹u`, over that of the random values at the
+/// start.
 fn growth(matrix: &Mat<f64>, step: f64, n_steps: usize) -> f64 {
     let n = matrix.nrows();
     let identity = |i: usize, j: usize| f64::from(u8::from(i == j));
@@ -139,9 +139,9 @@ fn a_thousand_steps_of_backward_euler_do_not_grow() {
 
 #[test]
 fn stable_rows_are_nearly_as_accurate_as_interpolation() {
-    // xyz is a harmonic of degree 3: Δ = −12. Medians of the errors of interpolating splines (RBF-FD without
-    // smoothing, nodes within a tenth of a spacing left out), which leave eigenvalues with positive real
-    // part.
+    // xyz is a harmonic of degree 3: Δ = −12. The numbers are medians of the errors of interpolating splines:
+    // RBF-FD without smoothing, nodes within a tenth of a spacing left out. These leave eigenvalues with
+    // positive real part.
     let interpolated =
         [("sphere", [8.95e-5, 8.30e-5, 8.54e-5]), ("two densities", [2.98e-5, 3.00e-5, 2.95e-5])];
     for (name, before) in interpolated {

@@ -64,13 +64,13 @@ fn harmonics_of_the_circle_are_eigenfunctions() {
     let cloud = circle(200);
     let Operators { stable, gradient } = operators(&cloud);
     let values: Vec<f64> = cloud.points().map(|x| x[0] * x[0] - x[1] * x[1]).collect();
-    // cos 2θ: Δ = −4, of fourth order in a spacing of 0.03.
+    // cos 2θ: Δ = −4. The error is of fourth order in a spacing of 0.03.
     for (found, value) in stable.matrix.apply(&values).iter().zip(&values) {
         assert!((found + 4.0 * value).abs() < 1e-4, "{found} for {value}");
     }
     let found = gradient.matrix.apply(&values);
     for (i, x) in cloud.points().enumerate() {
-        // −2 sin 2θ along (−y, x).
+        // The gradient is −2 sin 2θ along (−y, x).
         let along = -4.0 * x[0] * x[1];
         assert!((found[i] + along * x[1]).abs() < 1e-5 && (found[200 + i] - along * x[0]).abs() < 1e-5);
     }
@@ -78,7 +78,7 @@ fn harmonics_of_the_circle_are_eigenfunctions() {
 
 #[test]
 fn stretched_grids_and_near_duplicates_have_right_rows() {
-    // A plane, spacing 1 by a: Δ|x|² = 4, ∇x = (1, 0, 0).
+    // A plane with spacings 1 and a: Δ|x|² = 4, ∇x = (1, 0, 0).
     for a in [1.0, 1.5, 2.0] {
         let points = (0..900).flat_map(|i| [f64::from(i % 30), a * f64::from(i / 30), 0.0]).collect();
         let cloud = Cloud::new(points, 3).unwrap();
@@ -93,7 +93,7 @@ fn stretched_grids_and_near_duplicates_have_right_rows() {
             let is_empty = gradient.resolutions[i] == Resolution::Empty;
             assert!(is_empty || (slopes[i] - 1.0).abs() < 1e-6, "{a} {i}: {}", slopes[i]);
         }
-        // A few where the regression has too few lines of points for a normal.
+        // A few rows are empty, where the regression has too few lines of points for a normal.
         let n_empty = gradient.n_rows(RowKind::Empty);
         assert!(n_empty < 100 && (a > 1.0 || n_empty == 0), "{a}: {n_empty}");
         assert_eq!(stable.n_rows(RowKind::Empty), 0, "{a}");
@@ -101,7 +101,7 @@ fn stretched_grids_and_near_duplicates_have_right_rows() {
         let n_resolved = stable.resolutions.iter().filter(|&&found| found == Resolution::Resolved).count();
         assert!(n_resolved >= 26 * 26, "{a}: {n_resolved}");
     }
-    // Every point of a sphere twice, the second a little beside: Δx = −2x.
+    // Every point of a sphere twice, the second one slightly beside the first: Δx = −2x.
     let sphere = fibonacci_sphere(1000);
     for jitter in [1e-3, 1e-5] {
         let mut random = Random(5);
@@ -113,7 +113,7 @@ fn stretched_grids_and_near_duplicates_have_right_rows() {
         let found = laplacian.matrix.apply(&values);
         let is_resolved = |i: usize| laplacian.resolutions[i] == Resolution::Resolved;
         for i in (0..2000).filter(|&i| is_resolved(i)) {
-            // The jitter over the square of the spacing, 0.1, at most.
+            // At most the jitter over the square of the spacing, 0.1.
             assert!((found[i] + 2.0 * values[i]).abs() < 0.15, "{jitter} {i}: {} {}", found[i], values[i]);
         }
         assert!((0..2000).filter(|&i| is_resolved(i)).count() > 1900, "{jitter}");
@@ -139,7 +139,7 @@ fn constants_vanish_and_the_operator_converges_on_the_sphere() {
         (differences.sum::<f64>() / squares.sum::<f64>()).sqrt()
     };
     let (coarse, fine) = (error(1000), error(8000));
-    // Third order in the spacing, which shrinks by √8: at least a tenth. At 4,000 points the rows of the equator are
-    // symmetric, and their errors add up.
+    // The error is of third order in the spacing, which shrinks by √8, so it falls to a tenth at most. At
+    // 4,000 points the rows of the equator are symmetric, and their errors add up.
     assert!(coarse < 0.05 && fine < 0.1 * coarse, "{coarse:e} and {fine:e}");
 }

@@ -1,10 +1,11 @@
-//! The offset model: a signed distance through two more layers of points, where the signature function has no gradient.
+//! The offset model: a signed distance from two more layers of points, for places where the signature
+//! function has no gradient.
 //!
-//! The signature function cannot tell the sides of a surface whose mean curvature vanishes locally (a plane, a saddle with
-//! a = b). Two layers X ± δν with the data ±δ break that symmetry (Carr et al. 2001, for radial basis functions): the
-//! interpolant of 0, +δ, −δ is a signed distance near the surface, |∇F| ≈ 1, and has normals and curvatures by the same
-//! formulas. It is fitted to the nearest points only, in units of their distance, so that it costs the same for every query
-//! and does not depend on the kernel of the request.
+//! The signature function cannot tell the sides of a surface whose mean curvature vanishes locally (a plane,
+//! a saddle with a = b). Two layers X ± δν with the data ±δ break that symmetry (Carr et al. 2001, for radial
+//! basis functions). The interpolant of 0, +δ, −δ is a signed distance near the surface, |∇F| ≈ 1. Normals
+//! and curvatures follow from it by the same formulas. It is fitted to the nearest points only, in units of
+//! their distance. So it costs the same for every query and does not depend on the kernel of the request.
 
 use std::sync::Arc;
 
@@ -23,25 +24,27 @@ use crate::sums::regularization::Regularization;
 /// Neighbours per coefficient of a quadric in a patch: 42 for surfaces in space.
 const NEIGHBOURS_PER_COEFFICIENT: usize = 7;
 
-/// ℓ of the Gauss kernel against the radius of the patch.
+/// Length scale ℓ of the Gauss kernel over the radius of the patch.
 const LENGTH_SCALE: f64 = 3.0;
 
-/// δ against the mean spacing of the patch.
+/// Offset δ over the mean spacing of the patch.
 const OFFSET_SPACINGS: f64 = 0.5;
 
-/// α against k₀: the layers are ill-conditioned by design. The others are for patches that bend so much, or so little beyond
-/// the rounding of their coordinates, that float64 has no interpolant for the first.
+/// Values of α over k₀: the layers are ill-conditioned by design. The second and third are for patches for
+/// which float64 has no interpolant with the first. These bend very much, or very little beyond the rounding
+/// of their coordinates.
 const ALPHAS: [f64; 3] = [1e-12, 1e-9, 1e-6];
 
-/// Heights over the radius of the patch that are rounding.
+/// Height over the radius of the patch below which it is rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Points of a patch.
+/// Returns the number of points of a patch.
 pub(crate) fn n_patch_points(dimension: usize) -> usize {
     NEIGHBOURS_PER_COEFFICIENT * n_coefficients(dimension)
 }
 
-/// ∇F and D²F at a query, of a signed distance F: positive on the side that the normals point to.
+/// Gradient ∇F and Hessian D²F at a query, F a signed distance that is positive on the side that the normals
+/// point to.
 #[derive(Debug, Clone)]
 pub(crate) struct OffsetJet {
     /// `[d]`, unitless.
@@ -50,10 +53,12 @@ pub(crate) struct OffsetJet {
     pub hessian: Small,
 }
 
-/// F at x, from a patch around x and one unit normal per point of the patch, `[k, d]`, consistently oriented.
+/// Computes the jet at x of F, fitted to a patch around x.
+///
+/// `normals` are one unit normal per point of the patch, `[k, d]`, consistently oriented.
 ///
 /// # Errors
-/// Those of the fit; [`NumericsError::Cancelled`] never.
+/// Returns the errors of the fit, and never [`NumericsError::Cancelled`].
 pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, NumericsError> {
     let d = patch.dimension();
     let delta = OFFSET_SPACINGS * mean_spacing(patch);
@@ -66,8 +71,8 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
             data.push(side);
         }
     }
-    // The distance from the tangent plane is most of F: the kernel is left with what the surface bends, which on a plane is
-    // rounding.
+    // The distance from the tangent plane is most of F. The kernel is left with the bend of the surface,
+    // which on a plane is rounding.
     for (x, y) in nodes.chunks_exact(d).zip(&mut data) {
         *y -= up * x[d - 1];
         if y.abs() < ROUNDING {
@@ -90,7 +95,7 @@ pub(crate) fn offset_jet(patch: &Patch, normals: &[f64]) -> Result<OffsetJet, Nu
     Ok(OffsetJet { gradient: patch.in_space(&gradient), hessian: rotated(patch, &jets.hessian(0)) })
 }
 
-/// `QᵀHQ/radius`: a Hessian in the frame and scale of the patch as one in space.
+/// Returns `QᵀHQ/radius`: a Hessian in the frame and scale of the patch, turned into one in space.
 fn rotated(patch: &Patch, hessian: &[f64]) -> Small {
     let d = patch.dimension();
     // H is symmetric: rotate its rows, transpose, rotate again.
@@ -99,7 +104,8 @@ fn rotated(patch: &Patch, hessian: &[f64]) -> Small {
     (0..d).flat_map(|c| patch.in_space(&column(c))).map(|h| h / patch.radius).collect()
 }
 
-/// Spacing of k points spread over a ball of radius 1 in d − 1 dimensions: each has `1/k` of its volume, some 1.8^{d−1}.
+/// Returns the spacing of k points spread over a ball of radius 1 in d − 1 dimensions. Each has `1/k` of the
+/// volume of the ball, which is some 1.8^{d−1}.
 fn mean_spacing(patch: &Patch) -> f64 {
     let k = patch.n_points() as f64;
     1.8 * k.powf(-1.0 / (patch.dimension() as f64 - 1.0))
@@ -111,7 +117,7 @@ mod tests {
     use crate::machine::vector::norm;
     use crate::surface::curvature::principal_curvatures;
 
-    /// The offset model at the origin, from a grid of graph points with their exact upward normals.
+    /// Returns the offset model at the origin, from a grid of graph points with their exact upward normals.
     fn model(height: impl Fn(f64, f64) -> f64, slope: impl Fn(f64, f64) -> [f64; 2]) -> OffsetJet {
         let at = |i: usize| ((i % 7) as f64 / 3.0 - 1.0, (i / 7) as f64 / 3.0 - 1.0);
         let points: Vec<f64> = (0..49).map(at).flat_map(|(x, y)| [x, y, height(x, y)]).collect();
@@ -141,7 +147,7 @@ mod tests {
         let (a, b) = (0.5, 0.5);
         let jet = model(|x, y| 0.5 * (a * x * x - b * y * y), |x, y| [a * x, -b * y]);
         let (curvatures, _) = principal_curvatures(&jet.gradient, &jet.hessian, 1.0);
-        // For the upward normal −D² of the height: −a and b.
+        // The upward normal has the curvatures of −D² of the height: −a and b.
         assert!((curvatures[0] + a).abs() < 1e-3 && (curvatures[1] - b).abs() < 1e-3, "{curvatures:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The offset model at a query of a surface: which points it is fitted to, and whether its answer can be believed.
+//! The offset model at a query of a surface: the points that it is fitted to, and a check of its answer.
 
 mod layers;
 
@@ -15,16 +15,17 @@ const REACH_SPACINGS: f64 = 2.0;
 /// Cosine to the normal of the nearest point above which a point belongs to the same side of the same sheet.
 const SAME_SHEET: f64 = 0.4;
 
-/// Points per coefficient of a quadric that a patch needs at least.
+/// Least number of points of a patch per coefficient of a quadric.
 const MIN_PER_COEFFICIENT: usize = 2;
 
-/// A signed distance has |∇F| = 1; so far from it the patch was not fitted.
+/// Gradient norms |∇F| at which an answer is believed. A signed distance has 1. Outside this range the fit
+/// has failed.
 const GRADIENT_NORMS: std::ops::Range<f64> = 0.5..2.0;
 
-/// Gradient and Hessian of the offset model at x, the gradient pointing outward.
+/// Computes gradient and Hessian of the offset model at x. The gradient points outward.
 ///
-/// `None` where the cloud does not support it: x far from all points, too few points on one sheet around it, or an
-/// interpolant that is no distance.
+/// `None` where the cloud does not support it. Then x is far from all points, too few points are on one sheet
+/// around it, or the interpolant is no distance.
 pub(crate) fn offset_jet_at(surface: &SignatureSurface, x: &[f64]) -> Option<OffsetJet> {
     let (cloud, d) = (surface.cloud(), surface.cloud().dimension());
     let nearest = surface.sampling().neighbours().nearest_positions(x, n_patch_points(d));

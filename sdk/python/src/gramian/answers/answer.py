@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..describe import described
+from ..arguments.describe import described
 
 
 class Answer:

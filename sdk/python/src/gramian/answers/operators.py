@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from ..fit import OperatorFit, operator_fit_used
+from ..arguments.fit import OperatorFit, operator_fit_used
+from .sparse import csr_matrices
 from ..rest.models import Degenerate, Diagnostics
-from ..sparse import csr_matrices
-from ..tensors import Array, Members
+from ..wire.tensors import Array, Members
 from .answer import Answer
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..fit import ValuesFit, selected_fit, values_fit_used
+from ..arguments.fit import ValuesFit, selected_fit, values_fit_used
 from ..rest.models import Diagnostics, FamilyScore, KernelUsed
-from ..tensors import Array, Members
+from ..wire.tensors import Array, Members
 from .answer import Answer
 
 

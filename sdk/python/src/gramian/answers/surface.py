@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..fit import Fit, fit_used
+from ..arguments.fit import Fit, fit_used
 from ..rest.models import Degenerate, Diagnostics, SurfaceUsed
-from ..tensors import Array, Members
+from ..wire.tensors import Array, Members
 from .answer import Answer
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from ..fit import ValuesFit, values_fit_used
+from ..arguments.fit import ValuesFit, values_fit_used
 from ..rest.models import Diagnostics
-from ..tensors import Array, Members
+from ..wire.tensors import Array, Members
 from .answer import Answer
 
 

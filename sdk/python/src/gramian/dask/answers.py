@@ -13,8 +13,8 @@ import dask.array as da
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..arrays import read
-from ..tensors import Array
+from ..arguments.arrays import read
+from ..wire.tensors import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..answers import Interpolation
+from ..arguments.fit import Kernel, ValuesFit
 from ..client import Client
-from ..fit import Kernel, ValuesFit
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
-from ..tensors import Array
+from ..wire.tensors import Array
 from .parts import Part, Reach, join
 from .replicas import Replicas
 from .requests import Rows

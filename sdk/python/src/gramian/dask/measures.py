@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 
 Truths = npt.NDArray[np.bool_]

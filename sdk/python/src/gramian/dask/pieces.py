@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .measures import Measures, Truths, means, sums
 from .plan import REGRESSED

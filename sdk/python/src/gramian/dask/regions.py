@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .measures import SPACING_NEIGHBOURS, Measures, sums
 from .thinning import distinct

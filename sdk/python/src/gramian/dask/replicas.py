@@ -13,7 +13,7 @@ from typing import TypeVar
 import httpx
 
 from ..client import Client
-from ..problems import Overloaded, Problem
+from ..wire.problems import Overloaded, Problem
 
 T = TypeVar("T")
 

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 from ..answers import Curvatures, Normals
 from ..client import Client
 from ..rest.models import Degenerate
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .replicas import Replicas
 from .settling import Settled

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 import dask.array as da
 import numpy.typing as npt
 
+from ..arguments.keywords import suggest_names
 from ..client import DEFAULT_URL
-from ..keywords import suggest_names
 from . import graph
 from .replicas import Replicas
 from .tiles import Tiles

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arguments.fit import Fit, Kernel
 from ..client import Client
 from ..cloud import Cloud
-from ..fit import Fit, Kernel
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .parts import Part
 from .regions import Regions

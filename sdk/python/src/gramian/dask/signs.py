@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .measures import Measures, Truths, sums
 from .pieces import Pieces

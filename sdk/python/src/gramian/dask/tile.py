@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..tensors import Array
+from ..wire.tensors import Array
 from .cut import Ints
 from .parts import Part, join
 

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
-from ..fit import KernelLike, Mean, Number, ValuesFit
-from ..keywords import suggest_names
-from ..tensors import Array
+from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
+from ..arguments.keywords import suggest_names
+from ..wire.tensors import Array
 from . import answers, graph, kriging, parts, requests
 from .gathering import gathered
 from .plan import Plan

@@ -6,7 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::{Work, arrays, checked_order, has_deviations, numbers_per_query, price_of_deviations};
+use super::{Work, arrays, checked_order, deviations_per_query, has_deviations, numbers_per_query};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{Diagnostics, Fit, MeanChoice, ValuesInclude, request};
 use crate::http::openapi::responses::ComputeProblems;
@@ -15,14 +15,16 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::plan::Cost;
 use crate::http::serve::planner::{DenseOnly, Planner, value_lists};
-use crate::http::serve::values::EachAt;
+use crate::http::serve::values::mean_coefficients;
 use crate::http::state::app::App;
 use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::store::Owner;
-use gramian_numerics::solver::choose::{Asked, many_price, work_price};
+use gramian_numerics::model::EachAt;
+use gramian_numerics::model::price::{Sizes, function_price};
+use gramian_numerics::solver::choose::many_price;
 
 request! {
     /// Many lists of values at the points of a cloud, and where the functions through them are wanted.
@@ -108,25 +110,26 @@ impl Operation for InterpolationBatchRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;
-        let (values, k) = value_lists(std::mem::take(&mut self.values))?;
-        let fit = Fit { values: Some(values.clone()), n_lists: k, mean: self.mean, ..self.take_fit() };
+        let given = value_lists(std::mem::take(&mut self.values))?;
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let has_deviations = has_deviations(self.include);
         let of_batch = DenseOnly { name: "batches", pointer: "/solver" };
-        let mut main = planner.values_fit(fit, Some(of_batch))?;
-        let queries = planner.queries(self.queries, &mut [&mut main])?;
-        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let per_query = numbers_per_query(d, derivatives);
-        let mut work = work_price(Asked::Function { order: usize::from(derivatives) }, n, m, d)
+        let (mut main, values) = planner.values_fit(fit, given, Some(of_batch))?;
+        let queries = planner.queries(self.queries, &mut main.on)?;
+        let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
+        let (per_query, k) = (numbers_per_query(d, derivatives), values.n_lists);
+        let n_deviations = if has_deviations { deviations_per_query(d, derivatives) } else { 0 };
+        let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
+        let work = function_price(main.solver, usize::from(derivatives), n_deviations, sizes)
             .and(many_price(n, m, k, per_query - 1));
-        if has_deviations {
-            work = work.and(price_of_deviations(n, m, d, derivatives));
-        }
         let of_means = k.checked_mul(1 + d);
         let n_numbers = k
             .checked_add(usize::from(has_deviations))
             .and_then(|lists| lists.checked_mul(m)?.checked_mul(per_query)?.checked_add(of_means?));
-        let cost = Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: values.len() + m * d };
-        Ok(Plan { main, surface: None, work: Work { values, queries, derivatives, has_deviations }, cost })
+        let cost =
+            Cost { work, n_numbers: planner.check_answer(n_numbers)?, n_held: values.list.len() + m * d };
+        let work = Work { values, queries, derivatives, has_deviations };
+        Ok(Plan { main: main.into(), surface: None, work, cost })
     }
 
     fn compute(
@@ -134,7 +137,9 @@ impl Operation for InterpolationBatchRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<InterpolationBatchResponse, Problem> {
-        let EachAt { jets, mut diagnostics, deviations, batch, .. } = fits.each_at(work.asked(), observer)?;
+        let (found, mut diagnostics) = fits.each_at(&work.values, work.asked(), observer)?;
+        let mean_coefficients = mean_coefficients(&found.batch);
+        let EachAt { jets, deviations, batch, .. } = found;
         let clamped = deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
         diagnostics.warn_of_clamping(clamped);
         let Work { queries, derivatives, .. } = work;
@@ -148,7 +153,7 @@ impl Operation for InterpolationBatchRequest {
             value_deviations,
             gradient_deviations,
             hessian_deviations,
-            mean_coefficients: EachAt::mean_coefficients(&batch),
+            mean_coefficients,
             diagnostics,
         })
     }

@@ -14,9 +14,8 @@ use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
-use crate::http::serve::plan::Cost;
-use crate::http::serve::planner::Planner;
-use crate::http::serve::values::{ValuesAt, ValuesRequest};
+use crate::http::serve::plan::{Cost, Values};
+use crate::http::serve::planner::{GivenValues, Planner};
 use crate::http::state::app::App;
 use crate::http::wire::read::members::{present, present_word, present_words};
 use crate::http::wire::read::points::Points;
@@ -25,8 +24,9 @@ use crate::http::wire::write::array::Array;
 use crate::store::Owner;
 pub use batch::*;
 use gramian_numerics::function::deviations::JetDeviations;
+use gramian_numerics::model::price::{Sizes, function_price};
+use gramian_numerics::model::{JetRequest, ValuesAt};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::choose::{Asked, Price, deviations_price, work_price};
 use gramian_numerics::sums::jets::JetOrder;
 
 request! {
@@ -105,16 +105,15 @@ pub async fn compute_interpolation(
 
 /// A checked request.
 pub struct Work {
-    values: Arc<Vec<f64>>,
+    values: Arc<Values>,
     queries: Arc<Cloud>,
     derivatives: u8,
     has_deviations: bool,
 }
 
 impl Work {
-    fn asked(&self) -> ValuesRequest<'_> {
-        ValuesRequest {
-            values: &self.values,
+    fn asked(&self) -> JetRequest<'_> {
+        JetRequest {
             queries: &self.queries,
             order: order_of(self.derivatives),
             has_variances: false,
@@ -131,32 +130,27 @@ impl Operation for InterpolationRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
         let derivatives = checked_order(self.derivatives)?;
-        let values = Arc::new(std::mem::take(&mut self.values));
-        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let given = GivenValues::one(std::mem::take(&mut self.values));
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let has_deviations = has_deviations(self.include);
-        let mut main = planner.values_fit(fit, None)?;
-        let queries = planner.queries(self.queries, &mut [&mut main])?;
-        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let function = Asked::Function { order: usize::from(derivatives) };
-        let work = match (main.is_moving(), has_deviations) {
-            (true, false) => work_price(Asked::Moving { n_deviations: 0 }, n, m, d),
-            (true, true) => {
-                work_price(Asked::Moving { n_deviations: deviations_per_query(d, derivatives) }, n, m, d)
-            }
-            (false, false) => work_price(function, n, m, d),
-            (false, true) => work_price(function, n, m, d).and(price_of_deviations(n, m, d, derivatives)),
-        };
+        let (mut main, values) = planner.values_fit(fit, given, None)?;
+        let queries = planner.queries(self.queries, &mut main.on)?;
+        let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
+        let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
+        let n_deviations = if has_deviations { deviations_per_query(d, derivatives) } else { 0 };
         let n_lists = if has_deviations { 2 } else { 1 };
         let cost = Cost {
-            work,
+            work: function_price(main.solver, usize::from(derivatives), n_deviations, sizes),
             n_numbers: planner.check_answer(m.checked_mul(n_lists * numbers_per_query(d, derivatives)))?,
             n_held: n + m * d,
         };
-        Ok(Plan { main, surface: None, work: Work { values, queries, derivatives, has_deviations }, cost })
+        let work = Work { values, queries, derivatives, has_deviations };
+        Ok(Plan { main: main.into(), surface: None, work, cost })
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<InterpolationResponse, Problem> {
-        let ValuesAt { jets, mut diagnostics, deviations, .. } = fits.values_at(work.asked(), observer)?;
+        let (found, mut diagnostics) = fits.values_at(&work.values, work.asked(), observer)?;
+        let ValuesAt { jets, deviations, .. } = found;
         let clamped = deviations.as_ref().map_or(&[][..], |deviations| &deviations.clamped);
         diagnostics.warn_of_clamping(clamped);
         let (m, d) = (jets.n_queries(), jets.dimension());
@@ -194,10 +188,6 @@ fn numbers_per_query(d: usize, derivatives: u8) -> usize {
 }
 
 /// Entries of a Hessian that are equal are counted once.
-fn price_of_deviations(n: usize, m: usize, d: usize, derivatives: u8) -> Price {
-    deviations_price(n, m.saturating_mul(deviations_per_query(d, derivatives)), d)
-}
-
 fn deviations_per_query(d: usize, derivatives: u8) -> usize {
     [1, 1 + d, 1 + d + d * (d + 1) / 2][usize::from(derivatives)]
 }

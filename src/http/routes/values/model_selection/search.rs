@@ -10,12 +10,14 @@ use crate::http::compute::JobObserver;
 use crate::http::fields::{KernelFamily, KernelUsed};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
-use crate::http::serve::plan::FitModel;
+use crate::http::serve::plan::Values;
 use crate::http::serve::planner::check_seed;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::json::Nullable;
 use gramian_numerics::error::NumericsError;
+use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
+use gramian_numerics::model::Report;
 use gramian_numerics::selection::{
     Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Parameter, Selected, Selection, Variation,
     alpha_path, alpha_path_price, default_alphas, expected_evaluations, leave_one_out_price,
@@ -52,7 +54,7 @@ pub struct Search {
 
 /// A checked request.
 pub struct Work {
-    pub(super) values: Arc<Vec<f64>>,
+    pub(super) values: Arc<Values>,
     pub(super) search: Search,
 }
 
@@ -238,17 +240,19 @@ impl Work {
     pub(super) fn run(self, fits: &Fits, observer: &JobObserver) -> Result<ModelSelectionResponse, Problem> {
         let Self { values, search } = self;
         let plan = &fits.main.plan;
-        let FitModel::Dense { kernel, regularization } = &plan.model else { return Err(Problem::internal()) };
-        let interpolant = fits.interpolant(&values, observer)?;
-        let diagnostics = fits.main.diagnostics(&interpolant.solution, plan.stored.cloud.n_points())?;
-        let start = scaled(kernel, regularization, plan.scale).map_err(|error| match plan.is_learned {
+        let Interpolant { solver, solution } = fits.interpolant(&values, observer)?;
+        let scale = plan.process.scale;
+        let report = Report::of_function(&solver, &solution, scale);
+        let diagnostics = fits.main.diagnostics(&report, plan.stored.cloud.n_points());
+        let start = scaled(solver.kernel(), solver.regularization(), scale);
+        let start = start.map_err(|error| match plan.process.is_learned {
             true => Problem::invalid_request("/values", BEYOND_KERNELS),
             false => plan.refused(error),
         })?;
         let variations = search.variations(&start);
         let vary: Vec<Variation> = variations.iter().map(|(_, variation)| *variation).collect();
-        let merged = fits.main.merged(&values);
-        let (cloud, mean) = (&*plan.fitted, plan.mean);
+        let merged = plan.merged(&values.list);
+        let (cloud, mean) = (&*plan.fitted, plan.process.mean);
         let selection = Selection {
             cloud,
             values: &merged,

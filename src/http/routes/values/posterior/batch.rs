@@ -126,11 +126,11 @@ impl Operation for PosteriorBatchRequest {
     const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let (values, n_lists) = value_lists(std::mem::take(&mut self.values))?;
-        let fit = Fit { values: Some(values.clone()), n_lists, mean: self.mean, ..self.take_fit() };
+        let given = value_lists(std::mem::take(&mut self.values))?;
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let Self { include, samples, quantiles, threshold, queries, .. } = self;
         let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
-        Work::plan(planner, fit, values, queries, asked)
+        Work::plan(planner, fit, given, queries, asked)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorBatchResponse, Problem> {

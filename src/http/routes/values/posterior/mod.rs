@@ -17,7 +17,7 @@ use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
-use crate::http::serve::planner::Planner;
+use crate::http::serve::planner::{GivenValues, Planner};
 use crate::http::state::app::App;
 use crate::http::wire::read::members::{
     present, present_object, present_unless_empty, present_word, present_words,
@@ -161,11 +161,11 @@ impl Operation for PosteriorRequest {
     const HAS_SURFACE: bool = false;
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<Work>, Problem> {
-        let values = Arc::new(std::mem::take(&mut self.values));
-        let fit = Fit { values: Some(values.clone()), mean: self.mean, ..self.take_fit() };
+        let given = GivenValues::one(std::mem::take(&mut self.values));
+        let fit = Fit { mean: self.mean, ..self.take_fit() };
         let Self { include, samples, quantiles, threshold, queries, .. } = self;
         let asked = Asked { include: include.unwrap_or_default(), samples, quantiles, threshold };
-        Work::plan(planner, fit, values, queries, asked)
+        Work::plan(planner, fit, given, queries, asked)
     }
 
     fn compute(work: Work, fits: &Fits, observer: &JobObserver) -> Result<PosteriorResponse, Problem> {

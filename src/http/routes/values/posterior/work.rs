@@ -8,9 +8,9 @@ use crate::http::fields::{Diagnostics, Fit};
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::Plan;
-use crate::http::serve::plan::{Cost, PlannedFit};
-use crate::http::serve::planner::{DenseOnly, Planner, check_seed};
-use crate::http::serve::values::{EachAt, ValuesAt, ValuesRequest};
+use crate::http::serve::plan::{Cost, PlannedValues, Values};
+use crate::http::serve::planner::{DenseOnly, GivenValues, Planner, check_seed};
+use crate::http::serve::values::mean_coefficients;
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
 use gramian_numerics::error::NumericsError;
@@ -22,10 +22,9 @@ use gramian_numerics::function::posterior::{
 };
 use gramian_numerics::function::samples::Root;
 use gramian_numerics::machine::normal::{cumulative, quantile};
+use gramian_numerics::model::price::{PosteriorAsked, Sizes, posterior_price};
+use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::choose::{
-    Asked as AskedOfSolver, Price, deviations_price, many_price, samples_price, work_price,
-};
 use gramian_numerics::sums::jets::JetOrder;
 
 /// What is wanted beside the means.
@@ -96,7 +95,7 @@ impl Asked {
     }
 
     /// A new observation's noise is only known if it is the same everywhere.
-    fn check_noise(&self, plan: &PlannedFit) -> Result<(), Problem> {
+    fn check_noise(&self, plan: &PlannedValues) -> Result<(), Problem> {
         let asked = if self.wants(Q::ObservationVariance) {
             ("observation_variance", "/include")
         } else if self.threshold.is_some() {
@@ -120,26 +119,23 @@ impl Asked {
         of_lists.checked_add(m.checked_mul(of_pairs + 2 + d)?)?.checked_add(k * (2 + d))
     }
 
-    fn price(&self, n: usize, m: usize, d: usize, k: usize) -> Price {
-        let (variances, covariance) = (self.needs_variances(), self.needs_covariance());
-        let mut price = work_price(AskedOfSolver::Posterior { variances, covariance }, n, m, d);
-        if k > 1 {
-            price = price.and(many_price(n, m, k, if self.wants(Q::Gradients) { d } else { 0 }));
+    /// What is asked of the process, for k lists of values in d dimensions.
+    fn of_process(&self, d: usize, n_lists: usize) -> PosteriorAsked {
+        PosteriorAsked {
+            has_variances: self.needs_variances(),
+            has_covariance: self.needs_covariance(),
+            n_lists,
+            n_derivatives: if self.wants(Q::Gradients) { d } else { 0 },
+            n_deviations: self.n_deviations(d),
+            n_samples: self.n_samples(),
         }
-        if self.wants(Q::GradientVariances) {
-            price = price.and(deviations_price(n, m.saturating_mul(self.n_deviations(d)), d));
-        }
-        if self.samples.is_some() {
-            price = price.and(samples_price(m, self.n_samples().saturating_mul(k)));
-        }
-        price
     }
 }
 
 /// A checked request.
 pub struct Work {
     /// `[k, n]`
-    values: Arc<Vec<f64>>,
+    values: Arc<Values>,
     queries: Arc<Cloud>,
     asked: Asked,
 }
@@ -152,31 +148,28 @@ impl Work {
     pub fn plan(
         planner: &Planner<'_>,
         fit: Fit,
-        values: Arc<Vec<f64>>,
+        given: GivenValues,
         queries: Option<Points>,
         asked: Asked,
     ) -> Result<Plan<Self>, Problem> {
         asked.check()?;
-        let (k, of_batch) = (fit.n_lists.max(1), DenseOnly { name: "batches", pointer: "/solver" });
-        let is_batch = fit.n_lists > 0;
-        let dense_only = asked.dense_only().or(is_batch.then_some(of_batch));
-        let mut main = planner.values_fit(fit, dense_only)?;
-        let queries = planner.queries(queries, &mut [&mut main])?;
+        let of_batch = DenseOnly { name: "batches", pointer: "/solver" };
+        let dense_only = asked.dense_only().or(given.n_lists.map(|_| of_batch));
+        let (mut main, values) = planner.values_fit(fit, given, dense_only)?;
+        let queries = planner.queries(queries, &mut main.on)?;
         asked.check_noise(&main)?;
-        let (n, m, d) = (main.n_points(), queries.n_points(), queries.dimension());
-        let work = match main.is_moving() {
-            true => work_price(AskedOfSolver::Moving { n_deviations: asked.n_deviations(d) }, n, m, d),
-            false => asked.price(n, m, d, k),
+        let (m, d) = (queries.n_points(), queries.dimension());
+        let sizes = Sizes { n_points: main.on.n_points(), n_queries: m, dimension: d };
+        let cost = Cost {
+            work: posterior_price(main.solver, asked.of_process(d, values.n_lists), sizes),
+            n_numbers: planner.check_answer(asked.n_numbers(values.n_lists, m, d))?,
+            n_held: values.list.len() + m * d,
         };
-        let n_numbers = planner.check_answer(asked.n_numbers(k, m, d))?;
-        let n_held = values.len() + m * d;
-        let work = (Cost { work, n_numbers, n_held }, Self { values, queries, asked });
-        Ok(Plan { main, surface: None, work: work.1, cost: work.0 })
+        Ok(Plan { main: main.into(), surface: None, work: Self { values, queries, asked }, cost })
     }
 
-    fn request(&self) -> ValuesRequest<'_> {
-        ValuesRequest {
-            values: &self.values,
+    fn request(&self) -> JetRequest<'_> {
+        JetRequest {
             queries: &self.queries,
             order: if self.asked.wants(Q::Gradients) { JetOrder::Gradient } else { JetOrder::Value },
             has_variances: self.asked.needs_variances(),
@@ -222,8 +215,8 @@ impl Found {
     /// What the numerics refuses as a [`Problem`].
     pub fn one(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
         let request = work.request();
-        let ValuesAt { jets, variances, deviations, diagnostics, interpolant } =
-            fits.values_at(request, observer)?;
+        let (found, diagnostics) = fits.values_at(&work.values, request, observer)?;
+        let ValuesAt { jets, variances, deviations, interpolant, .. } = found;
         let gradients = if request.order == JetOrder::Value { Vec::new() } else { jets.gradients() };
         let jets = BatchJets { values: jets.values(), gradients, hessians: Vec::new() };
         let functions = interpolant.into_iter().collect();
@@ -237,17 +230,17 @@ impl Found {
     /// # Errors
     /// What the numerics refuses as a [`Problem`].
     pub fn each(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
-        let EachAt { jets, variances, deviations, diagnostics, batch } =
-            fits.each_at(work.request(), observer)?;
+        let (found, diagnostics) = fits.each_at(&work.values, work.request(), observer)?;
+        let EachAt { jets, variances, deviations, batch, .. } = found;
         let leading = vec![batch.solutions.len()];
-        let mean_coefficients = EachAt::mean_coefficients(&batch);
+        let mean_coefficients = mean_coefficients(&batch);
         let functions = batch.interpolants().collect();
         let means = Means { jets, variances, deviations, diagnostics, functions, mean_coefficients, leading };
         Self::of(&work, means, fits, observer)
     }
 
     fn of(work: &Work, means: Means, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
-        let (asked, queries, scale) = (&work.asked, &*work.queries, fits.main.plan.scale);
+        let (asked, queries, scale) = (&work.asked, &*work.queries, fits.main.plan.process.scale);
         let (m, d) = (queries.n_points(), queries.dimension());
         let Means { jets, variances, deviations, mut diagnostics, functions, mean_coefficients, leading } =
             means;

@@ -1,20 +1,23 @@
-//! The entries of a list under guard: counted, and kept as far as there may be so many.
+//! Guarded list entries: counted to the end, but kept only up to the limit.
 
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 
 use super::{Guard, Seed, Stop, shortened};
 use crate::http::wire::read::limits::{Excess, List};
 
-/// Entries that a list is granted at a time, so that most of them cost nothing but a decrement.
+/// Entries that a list is granted at a time. Within a grant, counting an entry is a single decrement.
 const ENTRIES_PER_GRANT: usize = 64;
 
-/// The entries of a list: as many as it may have, all of them counted. Bare ones are numbers without a guard.
+/// The entries of a list, all counted, of which at most `max_length` are kept.
+///
+/// With `IS_BARE`, entries are plain numbers and are deserialized without a guard of their own.
 pub(super) struct Entries<'g, A, const IS_BARE: bool> {
     inner: A,
     guard: &'g Guard<'g>,
     list: List,
     max_length: usize,
-    /// Entries that may have come when the grant is used up, and what is left of it.
+    /// Entries that will have been read when the current grant is used up.
+    /// Entries left of the current grant.
     n_granted: usize,
     n_left: usize,
 }
@@ -22,14 +25,15 @@ pub(super) struct Entries<'g, A, const IS_BARE: bool> {
 impl<'de, 'g, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'g, A, IS_BARE> {
     pub(super) fn new(inner: A, guard: &'g Guard<'g>, list: List) -> Self {
         let max_length = guard.context.max_entries(list);
-        // A row is granted its first coordinates with itself. Of a tensor it knows its length, and may be too long from the start.
+        // A row gets its first grant when it is created. A row of a tensor knows its length, and may be too
+        // long from the start.
         let fits = known_length(&inner, guard).is_none_or(|length| length <= max_length);
         let is_granted = list == List::Coordinates && fits;
         let n_granted = if is_granted { max_length.min(ENTRIES_PER_GRANT) } else { 0 };
         Self { inner, guard, list, max_length, n_granted, n_left: n_granted }
     }
 
-    /// Entries that have come.
+    /// Number of entries read so far.
     fn length(&self) -> usize {
         self.n_granted - self.n_left
     }
@@ -65,7 +69,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> SeqAccess<'de> for Entries<'_,
         }
     }
 
-    /// Of no more entries than will be kept: room is made for as many.
+    /// Capped at the limit: callers reserve memory for this many entries.
     fn size_hint(&self) -> Option<usize> {
         self.inner.size_hint().map(|length| length.min(self.max_length))
     }
@@ -75,7 +79,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
     fn is_granted_more(&mut self) -> Result<bool, A::Error> {
         self.guard.tick()?;
         let n_free = self.max_length - self.n_granted;
-        // Tensors know their length beforehand.
+        // Lists in tensors know their length beforehand.
         if known_length(&self.inner, self.guard).is_some_and(|n_rest| n_rest > n_free) {
             return Ok(false);
         }
@@ -84,7 +88,10 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
         Ok(self.n_left > 0)
     }
 
-    /// Counts what is left without keeping it. Behind a row of too many entries, their number is told.
+    /// Counts the remaining entries without keeping them.
+    ///
+    /// `width` is the length of the entry just read, if that was a row with too many coordinates. The error
+    /// then reports the number of rows as well.
     #[cold]
     fn end<T>(&mut self, width: Option<usize>) -> Result<Option<T>, A::Error> {
         let mut length = self.length();
@@ -104,7 +111,7 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
         if length <= self.max_length && width.is_none() {
             return Ok(None);
         }
-        // A row ends here for the point that it is, and the list of points goes on to be counted.
+        // A row that is too long ends here. Its list goes on, so that all points are counted.
         if self.list == List::Coordinates {
             self.guard.too_wide.set(Some(length));
             return Ok(None);
@@ -113,12 +120,12 @@ impl<'de, A: SeqAccess<'de>, const IS_BARE: bool> Entries<'_, A, IS_BARE> {
     }
 }
 
-/// Entries that are left, of a list whose length is known for certain: that of a tensor. Plain JSON has but a guess.
+/// Number of entries left, if known for certain, which holds for tensors. Plain JSON only has a guess.
 fn known_length<'de, A: SeqAccess<'de>>(entries: &A, guard: &Guard<'_>) -> Option<usize> {
     if guard.asks_for_any { entries.size_hint() } else { None }
 }
 
-/// A number, or a row of numbers, that is not kept.
+/// A number or a row of numbers that is skipped.
 struct Passed<'g>(&'g Guard<'g>);
 
 impl<'de> DeserializeSeed<'de> for Passed<'_> {
@@ -148,7 +155,7 @@ impl<'de> Visitor<'de> for Passed<'_> {
         Ok(())
     }
 
-    /// What would be repeated to the client.
+    /// Refuses a text. It is shortened because the error repeats it to the client.
     fn visit_str<E: Error>(self, text: &str) -> Result<(), E> {
         Err(E::invalid_type(serde::de::Unexpected::Str(&shortened(text)), &self))
     }

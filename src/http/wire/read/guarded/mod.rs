@@ -1,16 +1,18 @@
-//! A deserializer around another one, which keeps an eye on what passes through it.
+//! A deserializer that wraps another one and guards what passes through it.
 //!
-//! LIMITS. A list of numbers that has more entries than any request may have is counted to its end but not kept, and then
-//! refused with the number that it has. Types that derive `Deserialize` cannot be told limits, so the deserializer has
-//! them: it knows each list by its name. Alternatives were a state of the thread, which nothing would show in the types, and
-//! limits that are checked behind the parser, which took the memory first.
+//! LIMITS. A list of numbers that exceeds its limit is counted to its end but not kept. It is then refused
+//! with its actual length. Types that derive `Deserialize` cannot be told limits, so the deserializer knows
+//! each list by its name. Two alternatives were rejected. Thread-local state would not show in the types.
+//! Checks after parsing would come too late, because the memory is already taken.
 //!
-//! CANCELLATION. Every few thousand entries it asks whether somebody still waits.
+//! CANCELLATION. Every few thousand entries the guard asks the observer whether the request is cancelled.
 //!
-//! PLACES. An error collects the names and positions that it passes on its way out, which cost nothing where there is none.
-//! (`serde_path_to_error` has the same at the price of a second parse, and cannot do the rest.)
+//! PATHS. An error collects member names and list positions on its way out. Requests without errors pay
+//! nothing for this. (`serde_path_to_error` offers the same at the price of a second parse, and cannot do the
+//! rest.)
 //!
-//! TEXT is cut before it is shown to the type: no name or word is as long, but messages repeat what they refuse.
+//! TEXT is shortened before a type sees it, because error messages repeat what they refuse. No valid name or
+//! word is as long as the limit.
 
 mod entries;
 
@@ -24,27 +26,28 @@ use serde::forward_to_deserialize_any;
 use super::limits::{Excess, List, ParseContext};
 use entries::Entries;
 
-/// Grants between two looks at whether somebody waits: some 100 µs of points.
+/// Grants between two cancellation checks: some 100 µs of points.
 const GRANTS_PER_CHECK: u32 = 16;
 
-/// Characters of a text that types see and clients are repeated. Nothing legal is as long.
+/// Longest text, in characters, that types see and that errors repeat to clients. No valid text is as long.
 const MAX_SHOWN_CHARACTERS: usize = 200;
 
-/// Why parsing was stopped, whatever else there is to say about the request.
+/// Reason for stopping a parse. It takes precedence over any other error of the request.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Stop {
     Cancelled,
     TooLarge(Excess),
 }
 
-/// What one parse has met.
+/// State shared by all guarded parts of one parse.
 pub(super) struct Guard<'c> {
     context: &'c ParseContext<'c>,
     grants_until_check: Cell<u32>,
     stop: Cell<Option<Stop>>,
-    /// Entries of the row that was just read, if too many.
+    /// Length of the row that was just read, if it has too many entries.
     too_wide: Cell<Option<usize>>,
-    /// Where the error came from, the innermost segment first.
+    /// Path of the error, innermost segment first.
+    /// Whether the inner deserializer is only asked for `any`, see [`Guard::asking_for_any`].
     path: RefCell<Vec<String>>,
     asks_for_any: bool,
 }
@@ -61,30 +64,33 @@ impl<'c> Guard<'c> {
         }
     }
 
-    /// For deserializers that word their own refusals when they are asked for a type: they would repeat a text of any length.
-    /// They are asked for anything instead.
+    /// Creates a guard that asks the inner deserializer for any type instead of a specific one.
+    ///
+    /// Needed for deserializers that word type errors themselves: their messages would repeat a text of any
+    /// length.
     pub(super) fn asking_for_any(context: &'c ParseContext<'c>) -> Self {
         Self { asks_for_any: true, ..Self::new(context) }
     }
 
-    /// The deserializer of a request, guarded.
+    /// Wraps the deserializer of a request.
     pub(super) fn around<D>(&self, inner: D) -> Guarded<'_, D> {
         Guarded { inner, guard: self, list: List::Other }
     }
 
-    /// Whether the parse was stopped, beside being wrong.
+    /// The reason why the parse was stopped, or `None` if it failed for another reason or not at all.
     pub(super) fn stop(&self) -> Option<Stop> {
         self.stop.get()
     }
 
-    /// Where the error came from: segments behind slashes, `~` as `~0` and `/` as `~1` (RFC 6901).
+    /// JSON Pointer to the error (RFC 6901): a slash before each segment, `~` written as `~0` and `/` as
+    /// `~1`.
     pub(super) fn pointer(&self) -> String {
         let path = self.path.borrow();
         let segments = path.iter().rev().map(|segment| segment.replace('~', "~0").replace('/', "~1"));
         segments.flat_map(|segment| ["/".to_owned(), segment]).collect()
     }
 
-    /// Called before every few entries of a list.
+    /// Checks for cancellation now and then. Called before every grant of a list.
     fn tick<E: Error>(&self) -> Result<(), E> {
         let n_left = self.grants_until_check.get();
         if n_left > 0 {
@@ -112,7 +118,7 @@ impl<'c> Guard<'c> {
 pub(super) struct Guarded<'g, D> {
     inner: D,
     guard: &'g Guard<'g>,
-    /// What it is, if it is a list.
+    /// Kind of list that the value is, if it is a list.
     list: List,
 }
 
@@ -139,7 +145,7 @@ impl<'de, D: Deserializer<'de>> Deserializer<'de> for Guarded<'_, D> {
         self.inner.deserialize_f64(visitor)
     }
 
-    /// Some lists are known by their type.
+    /// Recognizes lists that are known by their type instead of their name.
     fn deserialize_newtype_struct<V: Visitor<'de>>(
         self,
         name: &'static str,
@@ -149,19 +155,19 @@ impl<'de, D: Deserializer<'de>> Deserializer<'de> for Guarded<'_, D> {
         Guarded { list, ..self }.deserialize_any(visitor)
     }
 
-    /// What is passed over needs no guard, only a way through that does not recurse.
+    /// Skips a value without a guard. All that matters is that the inner deserializer does not recurse.
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, D::Error> {
         self.inner.deserialize_ignored_any(visitor)
     }
 
-    // Options and enumerations come by way of `fields`, as the types that they hold and as words.
+    // Options and enumerations arrive through `members.rs`, as the types they hold and as strings.
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf option unit unit_struct
         seq tuple tuple_struct map struct enum identifier
     }
 }
 
-/// The visitor of a type, which sees lists and objects under guard and texts cut.
+/// A visitor that guards lists and objects and shortens texts.
 struct Watched<'g, V> {
     visitor: V,
     guard: &'g Guard<'g>,
@@ -203,7 +209,8 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Watched<'_, V> {
     #[inline]
     fn visit_seq<A: SeqAccess<'de>>(self, entries: A) -> Result<V::Value, A::Error> {
         let Self { visitor, guard, list } = self;
-        // Numbers that the deserializer may be asked for as such need no guard of their own, which is a tenth of the time.
+        // Plain numbers need no guard of their own, unless the deserializer must be asked for `any`. This
+        // saves a tenth of the time.
         if matches!(list, List::Coordinates | List::Numbers) && !guard.asks_for_any {
             visitor.visit_seq(Entries::<_, true>::new(entries, guard, list))
         } else {
@@ -216,7 +223,7 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Watched<'_, V> {
     }
 }
 
-/// A value under guard.
+/// A seed that deserializes its value under guard.
 struct Seed<'g, S> {
     seed: S,
     guard: &'g Guard<'g>,
@@ -233,7 +240,7 @@ impl<'de, S: DeserializeSeed<'de>> DeserializeSeed<'de> for Seed<'_, S> {
     }
 }
 
-/// The members of an object, each known by its name.
+/// The members of an object, each guarded as the list that its name stands for.
 struct Members<'g, 'de, A> {
     inner: A,
     guard: &'g Guard<'g>,
@@ -256,7 +263,7 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for Members<'_, 'de, A> {
     }
 }
 
-/// The name of a member, cut.
+/// A member name, shortened.
 struct Name<'de>(Cow<'de, str>);
 
 impl<'de> Deserialize<'de> for Name<'de> {
@@ -283,7 +290,7 @@ impl<'de> Deserialize<'de> for Name<'de> {
     }
 }
 
-/// Clients may send megabytes where a name or number belongs.
+/// Cuts a text after 200 characters: clients may send megabytes where a name or number belongs.
 pub(super) fn shortened(text: &str) -> Cow<'_, str> {
     match text.char_indices().nth(MAX_SHOWN_CHARACTERS) {
         None => Cow::Borrowed(text),

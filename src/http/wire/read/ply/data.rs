@@ -1,18 +1,18 @@
-//! What follows the header of a PLY file, read record by record: numbers in a row, or lines of text.
+//! The data of a PLY file, read record by record: binary numbers or lines of text.
 
 use super::PlyError;
 use super::header::{Element, Encoding, Header, Kind, Property, Scalar, shown};
 
-/// Where reading stands. A copy reads the same records again.
+/// Read position in the data. A copy reads the same records again.
 #[derive(Clone, Copy)]
 pub(super) struct Cursor<'a> {
     rest: &'a [u8],
     encoding: Encoding,
-    /// Lines of text behind us.
+    /// Lines of the file read so far, including the header.
     n_lines: usize,
 }
 
-/// Why a record cannot be read.
+/// Reason why a record cannot be read.
 enum Broken {
     Ends,
     ListLength(f64),
@@ -24,15 +24,15 @@ impl<'a> Cursor<'a> {
         Self { rest: data, encoding: header.encoding, n_lines: header.n_lines }
     }
 
-    /// Passes over an element.
+    /// Skips all records of an element.
     pub(super) fn skip(&mut self, element: &Element<'_>) -> Result<(), PlyError> {
-        // Without properties there is nothing to pass over, however often.
+        // Without properties the records take no bytes, whatever their number.
         let (n_least, n_records) =
             (self.least_bytes(element), if element.properties.is_empty() { 0 } else { element.count });
         let has_lists = element.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
         self.check_room(element)?;
         if self.encoding != Encoding::Text && !has_lists {
-            // It is known to fit.
+            // `check_room` has made sure that it fits.
             self.rest = self.rest.get(n_least * n_records..).unwrap_or_default();
             return Ok(());
         }
@@ -46,10 +46,11 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// Refuses a count that the body has not the bytes for: nothing is made room for by what a header says alone.
+    /// Refuses a count for which the body has too few bytes. No memory is allocated on the word of a header
+    /// alone.
     pub(super) fn check_room(&self, element: &Element<'_>) -> Result<(), PlyError> {
         let n_least = self.least_bytes(element);
-        // The last line of a text need not end.
+        // The last line of a text needs no line end.
         let n_there = self.rest.len() + usize::from(self.encoding == Encoding::Text);
         match n_there.checked_div(n_least) {
             Some(room) if element.count > room => {
@@ -60,7 +61,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Bytes that a record takes at least: its numbers, and lists without entries; in text a digit and a blank for each.
+    /// Fewest bytes that a record can take, with its lists empty. In text, each property takes a digit and a
+    /// separator.
     fn least_bytes(&self, element: &Element<'_>) -> usize {
         let of_property = |property: &Property<'_>| match (self.encoding, property.kind) {
             (Encoding::Text, _) => 2,
@@ -69,7 +71,7 @@ impl<'a> Cursor<'a> {
         element.properties.iter().map(of_property).sum()
     }
 
-    /// The numbers of one record by their places, those of lists left out.
+    /// Reads a record and passes each number with the index of its property to `take`. Lists are skipped.
     pub(super) fn record(
         &mut self,
         element: &Element<'_>,
@@ -93,7 +95,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A record in binary.
+    /// Reads a binary record.
     fn numbers(
         &mut self,
         properties: &[Property<'_>],
@@ -107,7 +109,8 @@ impl<'a> Cursor<'a> {
                     if length < 0.0 {
                         return Err(Broken::ListLength(length));
                     }
-                    // Of 32 bits at most, so this is exact, and so is the product.
+                    // `length` has 32 bits at most, so the conversion is exact and the product does not
+                    // overflow.
                     let n_bytes = length as usize * entry.width();
                     self.bytes(n_bytes)?;
                 }
@@ -128,7 +131,7 @@ impl<'a> Cursor<'a> {
         scalar.read(bytes, is_big).ok_or(Broken::Ends)
     }
 
-    /// A record in text: a line with a word for every number, and for a list its length and its entries.
+    /// Reads a record in text: a line with a word per number. A list is its length followed by its entries.
     fn words(
         &mut self,
         properties: &[Property<'_>],
@@ -172,7 +175,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// A number as it is written, to float64 whatever its type is.
+/// Parses a decimal number as float64, whatever type the header declares.
 fn number_of(word: &[u8]) -> Result<f64, Broken> {
     fast_float2::parse(word).map_err(|_| no_number(word, "number"))
 }
@@ -182,7 +185,8 @@ fn no_number(word: &[u8], what: &str) -> Broken {
 }
 
 impl Scalar {
-    /// The number of these bytes; `None` if they are not as many as it has. All of them are exact in float64.
+    /// Decodes a binary number. All types convert to float64 exactly. `None` if the number of bytes does not
+    /// fit the type.
     fn read(self, bytes: &[u8], is_big_endian: bool) -> Option<f64> {
         macro_rules! read {
             ($scalar:ty) => {{

@@ -1,12 +1,12 @@
-//! The header of a PLY file: what elements there are, and how their numbers are written.
+//! The header of a PLY file: which elements there are, and how their numbers are encoded.
 
 use super::{MAX_HEADER_BYTES, PlyError};
 
-/// Elements in the order of the file.
+/// A parsed header, with the elements in the order of the file.
 pub(super) struct Header<'a> {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element<'a>>,
-    /// Lines of the header, its last one included.
+    /// Lines of the header, including the last one.
     pub(super) n_lines: usize,
 }
 
@@ -17,7 +17,7 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// So many records with the same properties.
+/// A group of `count` records with the same properties.
 pub(super) struct Element<'a> {
     pub(super) name: &'a str,
     pub(super) count: usize,
@@ -32,14 +32,14 @@ pub(super) struct Property<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Kind {
     Number(Scalar),
-    /// A number of entries, and the entries.
+    /// A list: its length, then its entries.
     List {
         length: Scalar,
         entry: Scalar,
     },
 }
 
-/// The types of PLY, by either of their names.
+/// Scalar types of PLY. Each has two names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scalar {
     Int8,
@@ -53,7 +53,7 @@ pub(super) enum Scalar {
 }
 
 impl<'a> Header<'a> {
-    /// Reads the header, and says what comes behind it.
+    /// Reads the header. Also returns the data that follows it.
     pub(super) fn parse(bytes: &'a [u8]) -> Result<(Self, &'a [u8]), PlyError> {
         let mut lines = Lines { rest: bytes, room: MAX_HEADER_BYTES, n_lines: 0 };
         if lines.next().is_none_or(|line| line != b"ply") {
@@ -62,7 +62,7 @@ impl<'a> Header<'a> {
         let (mut encoding, mut elements) = (None, Vec::new());
         loop {
             let line = lines.next().ok_or(PlyError::EndlessHeader)?;
-            // A comment may be in any script.
+            // Comments are skipped before UTF-8 is checked: they may be in any encoding.
             if [&b"comment"[..], b"obj_info"].iter().any(|word| line.starts_with(word)) {
                 continue;
             }
@@ -79,10 +79,10 @@ impl<'a> Header<'a> {
     }
 }
 
-/// The lines of a header, without what ends them: LF or CR LF.
+/// The lines of a header without their ends, LF or CR LF.
 struct Lines<'a> {
     rest: &'a [u8],
-    /// Bytes that the header may still have.
+    /// Bytes that the header may still take.
     room: usize,
     n_lines: usize,
 }
@@ -96,14 +96,14 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Adds what a line says; whether it is the last one.
+/// Reads a line of the header. Returns whether it is the last one.
 fn read_line<'a>(
     line: &'a [u8],
     encoding: &mut Option<Encoding>,
     elements: &mut Vec<Element<'a>>,
 ) -> Result<bool, String> {
     let text = str::from_utf8(line).map_err(|_| "it is no text".to_owned())?;
-    // Four words are known at most, a list; the rest of a longer line is one more.
+    // The longest known line, a list, has five words. A sixth stands for the rest of a longer line.
     let words: Vec<&str> = text.split_ascii_whitespace().take(6).collect();
     match words[..] {
         ["end_header"] => return Ok(true),
@@ -173,20 +173,20 @@ fn scalar_of(name: &str) -> Result<Scalar, String> {
     })
 }
 
-/// A text that is repeated to the client, cut.
+/// Shortens a text that is repeated to the client.
 pub(super) fn shown(text: &str) -> String {
     text.chars().take(40).collect()
 }
 
 impl Element<'_> {
-    /// The place of a number among the properties.
+    /// The index of a number among the properties.
     pub(super) fn column(&self, name: &str) -> Option<usize> {
         self.properties
             .iter()
             .position(|property| property.name == name && matches!(property.kind, Kind::Number(_)))
     }
 
-    /// Those of three numbers, if all are there.
+    /// The indices of three numbers, if all are present.
     pub(super) fn columns(&self, names: [&str; 3]) -> Option<[usize; 3]> {
         let [x, y, z] = names.map(|name| self.column(name));
         Some([x?, y?, z?])
@@ -194,7 +194,7 @@ impl Element<'_> {
 }
 
 impl Scalar {
-    /// Bytes in binary.
+    /// Bytes of a number in binary.
     pub(super) fn width(self) -> usize {
         match self {
             Self::Int8 | Self::Uint8 => 1,

@@ -1,10 +1,12 @@
-//! Clouds as scanners write them: PLY 1.0, in text or binary of either byte order.
+//! Clouds in PLY 1.0, the format of scanners, in text or binary of either byte order.
 //!
-//! Of a file the vertices are read, x y z as `points` and, where all three are there, nx ny nz as `normals`; other properties
-//! and elements are passed over, and what follows the vertices is not looked at. The numbers come one by one out of the body
-//! into the same types as those of JSON, under the same guard, so that limits, pointers and cancellation are those of every
-//! format, and nothing is kept beside the two flat arrays. The crates that read PLY make a map or a structure of every element
-//! and take memory by the counts of the header, which anybody may write.
+//! Only the vertices are read: x y z as `points` and, if all three are present, nx ny nz as `normals`. Other
+//! properties and elements are skipped. Data after the vertices is ignored.
+//!
+//! Numbers pass one by one from the body into the same types as those of JSON, under the same guard. So
+//! limits, pointers and cancellation are those of every format, and no memory is needed beside the two flat
+//! arrays. Crates that read PLY build a map or struct per vertex, and allocate by the counts of the header,
+//! which the client controls.
 
 mod data;
 mod header;
@@ -25,13 +27,13 @@ use data::Cursor;
 use header::{Element, Header};
 use rows::Rows;
 
-/// Bytes of a header at most, as of the other formats; what scanners write takes some hundreds.
+/// Longest header in bytes, as in the other formats. Headers of scanners take some hundreds of bytes.
 const MAX_HEADER_BYTES: usize = 64 << 10;
 
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 
-/// Why a body is not the PLY that it says it is.
+/// Reason why a body is not valid PLY.
 #[derive(Debug, thiserror::Error)]
 enum PlyError {
     #[error("the body is not PLY: its first line is not \"ply\"")]
@@ -57,11 +59,12 @@ fn malformed(error: PlyError) -> Problem {
         .with_remedy("write the file again, as PLY 1.0 with the counts that it has")
 }
 
-/// Parses the vertices of a file into the fields `points` and `normals`.
+/// Parses the vertices of a file into the members `points` and `normals`.
 ///
 /// # Errors
-/// 400 for what is not PLY, or ends before its vertices do, 413 for too many of them, 422 with a pointer for vertices without
-/// coordinates and numbers that are not finite.
+/// - 400 for a body that is not PLY, or that ends before its vertices do.
+/// - 413 for too many vertices.
+/// - 422 with a pointer for vertices without coordinates, and for numbers that are not finite.
 pub fn parse_ply<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
     let (header, data) = Header::parse(bytes).map_err(malformed)?;
     let (before, vertices) = split_at_vertices(&header)?;
@@ -82,7 +85,7 @@ pub fn parse_ply<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) 
     })
 }
 
-/// The elements before the vertices, and the vertices.
+/// Returns the elements before the vertices, and the vertices.
 fn split_at_vertices<'h, 'a>(
     header: &'h Header<'a>,
 ) -> Result<(&'h [Element<'a>], &'h Element<'a>), Problem> {

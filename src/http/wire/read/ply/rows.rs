@@ -1,4 +1,4 @@
-//! Three numbers of every vertex, read as the list of rows that they stand for.
+//! Three properties of every vertex, deserialized as a list of rows.
 
 use std::cell::Cell;
 
@@ -16,7 +16,7 @@ pub(super) struct Rows<'a> {
     vertices: &'a Element<'a>,
     columns: [usize; 3],
     next: usize,
-    /// Why the file cannot be read, which errors of serde cannot say.
+    /// Receives the reason why the file cannot be read, because errors of serde cannot carry it.
     failure: &'a Cell<Option<PlyError>>,
 }
 
@@ -70,7 +70,7 @@ impl<'de> IntoDeserializer<'de, Error> for Rows<'_> {
     }
 }
 
-/// One row.
+/// A list of three numbers.
 struct Row {
     row: [f64; 3],
     next: usize,
@@ -90,7 +90,7 @@ impl<'de> SeqAccess<'de> for Row {
     }
 }
 
-/// One number, which is refused where serde knows its place.
+/// A number. A value that is not finite is refused here, where the guard can add its path to the error.
 struct Coordinate(f64);
 
 impl<'de> Deserializer<'de> for Coordinate {
@@ -107,7 +107,7 @@ impl<'de> Deserializer<'de> for Coordinate {
     }
 }
 
-/// Both are lists, whatever is asked for.
+/// Implements a deserializer that is always a list, whatever type is requested.
 macro_rules! deserialize_as_list {
     ($name:ty) => {
         impl<'de> Deserializer<'de> for $name {

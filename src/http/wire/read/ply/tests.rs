@@ -1,4 +1,4 @@
-//! What is read of a file, and what is said of one that cannot be.
+//! Tests of reading PLY files and of the refusals of invalid ones.
 
 use serde::Deserialize;
 
@@ -227,7 +227,7 @@ fn what_is_a_file_but_no_cloud_points_to_its_place() {
         let (pointer, detail) = refused_at(&VERTICES, format!("1 2 3\n4 {word} 6\n").as_bytes());
         assert!(pointer == "/points/1/1" && detail.contains("is not finite"), "{word}: {pointer} {detail}");
     }
-    // What is no cloud as points is said where points are.
+    // Errors about points as a cloud are reported later, where the cloud is made.
     let none = ["element vertex 0", VERTICES[1], VERTICES[2], VERTICES[3]];
     assert!(read(&file("ascii", &none, b"")).0.is_empty());
 }

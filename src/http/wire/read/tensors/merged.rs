@@ -1,5 +1,7 @@
-//! JSON with tensors in it, read as one document: the members of an object are those of the text, then those that are tensors
-//! alone. Nothing is kept in between, so that a request takes no more memory than its numbers.
+//! A deserializer that merges tensors into JSON text, so that both are read as one document.
+//!
+//! The members of an object are those of the text, followed by those that only exist as tensors. No
+//! intermediate document is built, so a request takes no more memory than its numbers.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -8,7 +10,7 @@ use serde::forward_to_deserialize_any;
 use super::tensor::Node;
 use crate::http::wire::read::limits::List;
 
-/// A tensor and the names that lead to it, at least one.
+/// A tensor and its path of member names, at least one.
 pub(super) struct Named<'a> {
     pub(super) path: Vec<&'a str>,
     pub(super) node: Node<'a>,
@@ -23,14 +25,14 @@ const BELONGS_IN_A_TENSOR: &str = "numbers belong in tensors: send this list as 
 pub(super) struct Merged<'t, D> {
     text: D,
     tensors: Vec<&'t Named<'t>>,
-    /// Names that led here.
+    /// Length of the path to this value.
     depth: usize,
-    /// Whether entries stand here as a tensor or not at all.
+    /// Whether this value is a numeric list, which must be sent as a tensor unless it is empty.
     is_tensor: bool,
 }
 
 impl<'t, D> Merged<'t, D> {
-    /// The whole document.
+    /// Merges the tensors into a whole document.
     pub(super) fn new(text: D, tensors: &'t [Named<'t>]) -> Self {
         Self { text, tensors: tensors.iter().collect(), depth: 0, is_tensor: false }
     }
@@ -50,7 +52,7 @@ impl<'de, D: Deserializer<'de>> Deserializer<'de> for Merged<'_, D> {
     }
 }
 
-/// [`Merged`] as a seed.
+/// A seed that deserializes its value from a [`Merged`].
 struct Within<'t, S> {
     seed: S,
     tensors: Vec<&'t Named<'t>>,
@@ -67,7 +69,7 @@ impl<'de, S: DeserializeSeed<'de>> DeserializeSeed<'de> for Within<'_, S> {
     }
 }
 
-/// The visitor of a type, which sees the tensors as well.
+/// A visitor that also shows the tensors to the visitor of the type.
 struct Merge<'t, V> {
     visitor: V,
     tensors: Vec<&'t Named<'t>>,
@@ -76,7 +78,8 @@ struct Merge<'t, V> {
 }
 
 impl<V> Merge<'_, V> {
-    /// The visitor, for what is no object: no tensors can belong into it.
+    /// Returns the visitor for a value that is not an object. Fails if there are tensors, because none can
+    /// belong into it.
     fn alone<E: Error>(self) -> Result<V, E> {
         if self.tensors.is_empty() { Ok(self.visitor) } else { Err(E::custom(GIVEN_TWICE)) }
     }
@@ -130,14 +133,14 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Merge<'_, V> {
     }
 }
 
-/// The members of an object.
+/// The members of an object, from the text and from the tensors.
 struct Members<'t, A> {
-    /// `None` behind the last one of the text.
+    /// `None` after the last member of the text.
     text: Option<A>,
-    /// Those whose name has not come yet.
+    /// Tensors whose member has not been reached yet.
     tensors: Vec<&'t Named<'t>>,
     depth: usize,
-    /// Those of the name that came last, and whether a list of that name is a tensor.
+    /// Tensors that belong to the current member, and whether the member is a numeric list.
     of_name: (Vec<&'t Named<'t>>, bool),
 }
 

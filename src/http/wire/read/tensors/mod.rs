@@ -1,5 +1,6 @@
-//! Requests as safetensors or npy: tensors stand where JSON has arrays, and the same types read both, so that every check
-//! and every pointer is the same.
+//! Requests as safetensors or npy, where tensors replace the arrays of JSON.
+//!
+//! The same types read all formats, so every check and every pointer is the same.
 
 mod merged;
 mod npy;
@@ -18,23 +19,28 @@ use merged::{Merged, Named};
 use npy::Npy;
 use tensor::Node;
 
-/// Names in the name of a tensor at most, as in `geometry.cloud.points`; whatever follows is part of the last one.
+/// Most segments of a tensor name, as in `geometry.cloud.points`. The last segment keeps any further dots.
 const MAX_DEPTH: usize = 3;
 
-/// Bytes of a header: names, shapes and the fields that are no lists of numbers, which take a few hundred. A header becomes
-/// maps and texts of several times its size before anything in it is known, so it is bounded by itself; the numbers behind it
-/// are read where they lie.
+/// Longest header in bytes.
+///
+/// A header holds names, shapes and the members that are not numeric lists, which take a few hundred bytes.
+/// Parsing turns a header into maps and strings of several times its size before anything in it is checked,
+/// so it has a limit of its own. The numbers after the header are read in place.
 const MAX_HEADER_BYTES: usize = 64 << 10;
 
-/// Tensors of a request at most. No request has as many names.
+/// Most tensors of a request, more than any request has names for.
 const MAX_TENSORS: usize = 64;
 
-/// Parses tensors named as the arrays, `cloud.points` within objects, with the other fields as JSON text in the metadata
-/// entry `request`.
+/// Parses a safetensors body.
+///
+/// Tensors are named like the arrays of the JSON, with a dot for nested objects (`cloud.points`). All other
+/// members are JSON text in the metadata entry `request`.
 ///
 /// # Errors
-/// 400 for what is not safetensors or not JSON, 413 for a header or a list beyond the limits, 422 with a pointer for what is,
-/// but not this request.
+/// - 400 for a body that is not safetensors, or metadata that is not JSON.
+/// - 413 for a header or a list beyond the limits.
+/// - 422 with a pointer for a well-formed body that is not a `T`.
 pub fn parse_safetensors<T: DeserializeOwned>(
     bytes: &[u8],
     context: &ParseContext<'_>,
@@ -58,7 +64,9 @@ pub fn parse_safetensors<T: DeserializeOwned>(
     parse_merged(text.map_or("{}", String::as_str), &named.collect::<Vec<_>>(), context)
 }
 
-/// The header says its length in the first eight bytes. What is longer than the body is no header.
+/// Checks the length of the header, stated in the first eight bytes.
+///
+/// A length beyond the body is left for the parser to refuse.
 fn check_header(bytes: &[u8]) -> Result<(), Problem> {
     let length = bytes.first_chunk().map(|&length| u64::from_le_bytes(length));
     match length.and_then(|length| usize::try_from(length).ok()) {
@@ -71,10 +79,12 @@ fn check_header(bytes: &[u8]) -> Result<(), Problem> {
     }
 }
 
-/// Parses one array into the field `points`.
+/// Parses an npy array into the member `points`.
 ///
 /// # Errors
-/// 400 for what is not npy, 413 for too many points, 422 with a pointer for what is, but not this request.
+/// - 400 for a body that is not npy.
+/// - 413 for too many points.
+/// - 422 with a pointer for an array that is not a `T`.
 pub fn parse_npy<T: DeserializeOwned>(bytes: &[u8], context: &ParseContext<'_>) -> Result<T, Problem> {
     let array = Npy::parse(bytes, MAX_HEADER_BYTES).and_then(Npy::into_node);
     let node =

@@ -1,14 +1,17 @@
-//! Arrays of `NumPy`: the header, read strictly.
+//! `NumPy` arrays, with a strict parser for their header.
 //!
-//! A crate was tried and left: its parser recurses on the brackets of the client and multiplies shapes unchecked.
+//! A crate was tried and rejected: its parser recurses on brackets sent by the client and multiplies shapes
+//! unchecked.
 
 use super::tensor::{Layout, Node, Tensor};
 
-/// Axes of an array at most, as in `NumPy` itself.
+/// Highest rank of an array, the limit of `NumPy` itself.
 const MAX_RANK: usize = 64;
 
-/// The header of an array of `NumPy`, and its numbers: magic, version, the length of the header, a Python dictionary with
-/// `descr`, `fortran_order` and `shape`, the numbers (NumPy Enhancement Proposal 1).
+/// The header and the numbers of a `NumPy` array (NumPy Enhancement Proposal 1).
+///
+/// The layout is: magic, version, length of the header, a Python dictionary with `descr`, `fortran_order` and
+/// `shape`, then the numbers.
 pub(super) struct Npy<'a> {
     descr: &'a str,
     fortran_order: bool,
@@ -17,7 +20,7 @@ pub(super) struct Npy<'a> {
 }
 
 impl<'a> Npy<'a> {
-    /// `None` if it is none, or the header is longer than that.
+    /// Returns `None` if the bytes are not npy, or if the header exceeds `max_header_bytes`.
     pub(super) fn parse(bytes: &'a [u8], max_header_bytes: usize) -> Option<Self> {
         let (version, rest) = bytes.strip_prefix(b"\x93NUMPY")?.split_at_checked(2)?;
         let (n_header, rest) = match version[0] {
@@ -46,7 +49,7 @@ impl<'a> Npy<'a> {
         Some(Self { descr, fortran_order, shape, data })
     }
 
-    /// `None` if there are not as many bytes as the header says.
+    /// Returns `None` if the number of bytes differs from what the header says.
     pub(super) fn into_node(self) -> Option<Node<'a>> {
         let (width, is_big_endian) = match self.descr {
             "<f8" => (8, false),

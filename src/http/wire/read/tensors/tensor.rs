@@ -1,4 +1,4 @@
-//! One tensor of a request, read as the list or the list of rows that it stands for.
+//! A tensor of a request, deserialized as a list of numbers or a list of rows.
 
 use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use serde::forward_to_deserialize_any;
@@ -7,10 +7,10 @@ use serde_json::Error;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 
-/// A member of a request that is no JSON.
+/// A member of a request that is a tensor.
 pub(super) enum Node<'a> {
     Tensor(Tensor<'a>),
-    /// A tensor that no field takes, and why.
+    /// A tensor that no member accepts, with the reason.
     Refused(String),
 }
 
@@ -45,17 +45,17 @@ impl<'de> Deserializer<'de> for &Node<'_> {
 pub(super) struct Tensor<'a> {
     data: &'a [u8],
     n_rows: usize,
-    /// Numbers of a row; `None` for a list of numbers.
+    /// Numbers per row, or `None` for a list of numbers.
     row: Option<usize>,
     layout: Layout,
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Layout {
-    /// Bytes of a number.
+    /// Bytes per number.
     pub(super) width: usize,
     pub(super) is_big_endian: bool,
-    /// Column by column, as Fortran has it.
+    /// Whether the numbers are stored column by column (Fortran order).
     pub(super) is_transposed: bool,
 }
 
@@ -63,13 +63,13 @@ impl<'a> Tensor<'a> {
     pub(super) fn node(data: &'a [u8], shape: &[usize], layout: Layout) -> Node<'a> {
         match *shape {
             [n_rows] => Node::Tensor(Self { data, n_rows, row: None, layout }),
-            // Rows without numbers could be any number of them.
+            // Rows of length 0 take no bytes, so their number would be unbounded.
             [n_rows, row] if row > 0 => Node::Tensor(Self { data, n_rows, row: Some(row), layout }),
             _ => Node::Refused(format!("the tensor has shape {shape:?}, not [n] or [n, d]")),
         }
     }
 
-    /// A number in the order of rows; one of 32 bits is widened exactly.
+    /// Returns a number by row and column. float32 is widened exactly.
     fn number(&self, row: usize, column: usize) -> Result<f64, Error> {
         let Layout { width, is_big_endian, is_transposed } = self.layout;
         let at =
@@ -143,7 +143,8 @@ impl<'de> Deserializer<'de> for Row<'_, '_> {
     }
 }
 
-/// One number, by row and column. It is read, and refused, where serde knows its place.
+/// A number at a row and column. It is read and refused lazily, where the guard can add its path to the
+/// error.
 struct Entry<'t, 'a>(&'t Tensor<'a>, usize, usize);
 
 impl<'de> Deserializer<'de> for Entry<'_, '_> {

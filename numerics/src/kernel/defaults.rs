@@ -2,8 +2,8 @@
 //!
 //! Everything scales with the cloud: millimetres and kilometres get the same geometry.
 
-use super::error::NumericsError;
-use super::kernel::{Family, Kernel};
+use super::{Family, Kernel};
+use crate::error::NumericsError;
 use crate::points::sampling::Scales;
 
 /// What a fit is for.

@@ -24,8 +24,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
-from .arrays import Sizes, as_array
-from .rest.models import (
+from ..rest.models import (
     Diagnostics,
     DuplicatePolicy,
     FreeParameter,
@@ -41,8 +40,9 @@ from .rest.models import (
     SolverUsed,
     SurfaceChoice,
 )
-from .rest.models import Geometry as GeneratedGeometry
-from .rest.types import Unset
+from ..rest.models import Geometry as GeneratedGeometry
+from ..rest.types import Unset
+from .arrays import Sizes, as_array
 from .scalars import as_number, as_truth, as_whole, as_word, as_words, nearest, unwrapped
 
 Rule: TypeAlias = Callable[[str, object, Sizes], object]

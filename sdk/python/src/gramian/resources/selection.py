@@ -7,11 +7,11 @@ from typing import Literal, Required, TypeAlias, TypedDict
 
 import numpy.typing as npt
 
-from .answers import ModelSelection
-from .fit import Duplicates, Family, KernelLike, Mean, Number, Solver, Whole
-from .keywords import suggest_names
-from .registration import RegisteredCloud
-from .rest.models import FreeParameter, SelectionCriterion, SelectionParameter
+from ..answers import ModelSelection
+from ..arguments.fit import Duplicates, Family, KernelLike, Mean, Number, Solver, Whole
+from ..arguments.keywords import suggest_names
+from ..arguments.registration import RegisteredCloud
+from ..rest.models import FreeParameter, SelectionCriterion, SelectionParameter
 
 Criterion: TypeAlias = (
     SelectionCriterion | Literal["marginal_likelihood", "leave_one_out", "generalized_cross_validation"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .tensors import Members
+from ..wire.tensors import Members
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

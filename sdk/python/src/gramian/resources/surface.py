@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 import numpy.typing as npt
 
-from .answers import Curvatures, Normals
-from .fit import Deviations, Duplicates, KernelLike, Number, Orientation, Solver, Surface
-from .keywords import suggest_names
-from .normalise import GEOMETRIC, with_deviations
-from .registration import RegisteredCloud
+from ..answers import Curvatures, Normals
+from ..arguments.fit import Deviations, Duplicates, KernelLike, Number, Orientation, Solver, Surface
+from ..arguments.keywords import suggest_names
+from ..arguments.normalise import GEOMETRIC, with_deviations
+from ..arguments.registration import RegisteredCloud
 
 
 @suggest_names

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy.typing as npt
 
-from .answers import (
+from ..answers import (
     LaplaceBeltrami,
     LaplaceBeltramiMatrix,
     LaplaceBeltramiSparseMatrix,
@@ -14,11 +14,11 @@ from .answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
-from .fit import Deviations, Duplicates, GeometryLike, KernelLike, Mean, Number, Solver
-from .keywords import suggest_names
-from .normalise import GEOMETRIC, with_deviations
-from .registration import RegisteredCloud
-from .sparse import require_scipy
+from ..arguments.fit import Deviations, Duplicates, GeometryLike, KernelLike, Mean, Number, Solver
+from ..arguments.keywords import suggest_names
+from ..arguments.normalise import GEOMETRIC, with_deviations
+from ..arguments.registration import RegisteredCloud
+from ..answers.sparse import require_scipy
 
 
 @suggest_names

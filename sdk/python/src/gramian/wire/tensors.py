@@ -16,7 +16,7 @@ import httpx
 import numpy as np
 import numpy.typing as npt
 
-from .rest.models import Degenerate, Diagnostics
+from ..rest.models import Degenerate, Diagnostics
 
 save_safetensors: Callable[..., bytes] | None
 try:

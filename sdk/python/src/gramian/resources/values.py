@@ -1,4 +1,4 @@
-"""What can be asked about many lists of values at the points of a cloud."""
+"""What can be asked about values at the points of a cloud."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Iterable, Mapping
 
 import numpy.typing as npt
 
-from .answers import InterpolationBatch, PosteriorBatch
-from .fit import Deviations, Duplicates, KernelLike, Mean, Number, Quantity, Solver, Whole
-from .keywords import suggest_names
-from .normalise import BATCH, GEOMETRIC_BATCH, with_deviations
-from .registration import RegisteredCloud
+from ..answers import Interpolation, Posterior
+from ..arguments.fit import Deviations, Duplicates, KernelLike, Mean, Number, Quantity, Solver, Whole
+from ..arguments.keywords import suggest_names
+from ..arguments.normalise import GEOMETRIC, with_deviations
+from ..arguments.registration import RegisteredCloud
 
 
 @suggest_names
-class BatchesOnCloud(RegisteredCloud):
-    """The part of `Cloud` that concerns many lists of values at its points; V is their unit."""
+class ValuesOfCloud(RegisteredCloud):
+    """The part of `Cloud` that concerns values at its points; V is their unit."""
 
-    def interpolate_batch(
+    def interpolate(
         self,
         values: npt.ArrayLike,
         queries: npt.ArrayLike | None = None,
@@ -31,17 +31,17 @@ class BatchesOnCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
-    ) -> InterpolationBatch:
-        """Fits a function to each of k lists of values, with one factorization for all, and evaluates them.
+    ) -> Interpolation:
+        """Fits `u = Σ λ_j k(·, x_j)` to values, (K + αI)Λ = Y, and evaluates it.
 
-        Each is what `interpolate` makes of its list with the same kernel and noise.
+        At `alpha=0` it takes the values at the points exactly.
 
         Parameters
         ----------
-        values : array_like, `[k, n]`
-            A row for each list, with a value at each point, in their order, unit V.
+        values : array_like, `[n]`
+            At the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where the functions are wanted, a row of coordinates each; the points if absent.
+            Where u is wanted, a row of coordinates each; the points if absent.
         derivatives : 0, 1 or 2, optional
             1 for gradients, 2 for Hessians as well; 0 if absent.
         include : str or several, optional
@@ -50,40 +50,42 @@ class BatchesOnCloud(RegisteredCloud):
             Whether standard deviations are wanted, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from all lists together by their likelihood, with its
-            variance and the noise, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, and repeated in `diagnostics`.
         alpha : float, optional
             Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
             absent, 1e-10 with a kernel given, else learned from the values.
         mean : str, optional
-            What each function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A
-            constant if absent with `kernel`, else zero.
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"`, which is the same here, as if absent.
+            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
+            it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
         Returns
         -------
-        InterpolationBatch
-            `values` at the queries, a row for each list, and `gradients`, `hessians` and deviations where asked for.
+        Interpolation
+            `values` of u at the queries, and `gradients`, `hessians` and deviations where asked for.
 
         Examples
         --------
         >>> angles = np.arange(8) * np.pi / 4
         >>> circle = gramian.Client().cloud(np.column_stack([np.cos(angles), np.sin(angles)]))
-        >>> kernel = gramian.Kernel("gauss", length_scale=2)
-        >>> answer = circle.interpolate_batch([np.cos(angles), np.sin(angles)], [[0.8, 0.6]], kernel=kernel)
-        >>> answer.values.round(2)
-        array([[0.8],
-               [0.6]])
+        >>> answer = circle.interpolate(np.cos(angles), [[0.8, 0.6]], derivatives=1)
+        >>> answer.values.round(3), answer.gradients.shape
+        (array([0.8]), (1, 2))
+        >>> again = circle.interpolate(np.cos(angles), [[0.8, 0.6]], **answer.fit)  # with the kernel chosen
+        >>> np.array_equal(again.values, answer.values)
+        True
         """
         return self._compute(
-            InterpolationBatch.read,
-            "/v1/interpolation/batch",
-            GEOMETRIC_BATCH,
+            Interpolation.read,
+            "/v1/interpolation",
+            GEOMETRIC,
             values=values,
             queries=queries,
             derivatives=derivatives,
@@ -96,7 +98,7 @@ class BatchesOnCloud(RegisteredCloud):
             duplicates=duplicates,
         )
 
-    def posterior_batch(
+    def posterior(
         self,
         values: npt.ArrayLike,
         queries: npt.ArrayLike | None = None,
@@ -111,63 +113,62 @@ class BatchesOnCloud(RegisteredCloud):
         noise_variances: npt.ArrayLike | None = None,
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
-    ) -> PosteriorBatch:
-        """Computes the posteriors of k Gaussian processes with kernel and noise in common, with one factorization.
-
-        Each is what `posterior` makes of its list of values; variances and covariances do not depend on values, so that
-        there is one of them for all.
+    ) -> Posterior:
+        """Computes the posterior of a Gaussian process with the kernel as covariance and noise of variance `alpha`.
 
         Parameters
         ----------
-        values : array_like, `[k, n]`
-            A row for each list, with a value at each point, in their order, unit V.
+        values : array_like, `[n]`
+            At the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where the posteriors are wanted, a row of coordinates each; the points if absent.
+            Where the posterior is wanted, a row of coordinates each; the points if absent.
         include : str or several, optional
-            What is wanted beside the means: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
+            What is wanted beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
             `"gradient_variances"`, `"log_marginal_likelihood"`; nothing if absent.
         samples : int or dict, optional
-            How many functions to draw from each posterior, at all queries together; or `{"count": 10, "seed": 1}`.
+            How many functions to draw from the posterior, at all queries together; or `{"count": 10, "seed": 1}`.
         quantiles : array_like, `[q]`, optional
-            Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted.
+            Probabilities between 0 and 1 of which the quantiles of the latent function are wanted.
         threshold : float, optional
             What a new observation is to exceed, V, for `exceedance_probabilities`.
         kernel : str, dict or Kernel, optional
             A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from all lists together by their likelihood, with its
-            variance and the noise, and repeated in `diagnostics`.
+            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
+            and the noise, and repeated in `diagnostics`.
         alpha : float, optional
             Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
             absent, 1e-10 with a kernel given, else learned from the values.
         mean : str, optional
-            What each function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A
-            constant if absent with `kernel`, else zero.
+            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
+            absent with `kernel`, else zero.
         noise_variances : array_like, `[n]`, optional
             The variance of the noise at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"`, which is the same here, as if absent.
+            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
+            it does if absent.
         duplicates : str, optional
             What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
 
         Returns
         -------
-        PosteriorBatch
-            `means` at the queries, a row for each list, and what `include` asks for.
+        Posterior
+            `means` at the queries, and what `include` asks for.
 
         Examples
         --------
         >>> line = gramian.Client().cloud([[0], [1], [2], [3]])
         >>> kernel = gramian.Kernel("gauss", length_scale=1)
-        >>> lists = [[0, 1, 0, 1], [4, 3, 2, 1]]
-        >>> answer = line.posterior_batch(lists, [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
+        >>> answer = line.posterior([0, 1, 0, 1], [[1], [9]], include="variance", kernel=kernel, alpha=0.01)
         >>> answer.means.round(2) + 0.0, answer.variances.round(2)
-        (array([[0.98, 0.  ],
-               [2.99, 0.  ]]), array([0.01, 1.  ]))
+        (array([0.98, 0.  ]), array([0.01, 1.  ]))
+        >>> answer = line.posterior([0, 1, 0, 1], [[1]], kernel=kernel, alpha=0.01, samples=3, quantiles=[0.05, 0.95])
+        >>> answer.samples.shape, answer.quantiles.round(2)
+        ((3, 1), array([[0.82],
+               [1.15]]))
         """
         return self._compute(
-            PosteriorBatch.read,
-            "/v1/posterior/batch",
-            BATCH,
+            Posterior.read,
+            "/v1/posterior",
             values=values,
             queries=queries,
             include=include,

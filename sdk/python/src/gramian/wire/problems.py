@@ -6,9 +6,9 @@ from typing import TypeVar
 
 import httpx
 
-from .rest import models
-from .rest.models import FieldError
-from .rest.types import Unset
+from ..rest import models
+from ..rest.models import FieldError
+from ..rest.types import Unset
 
 T = TypeVar("T")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from threading import TIMEOUT_MAX
@@ -12,10 +12,7 @@ from typing import Any, TypeVar
 
 import httpx
 
-from . import jobs
-from .jobs import Progress
-from .problems import TRY_LATER, UNREADABLE, problem_of, unreadable
-from .tensors import JSON, SAFETENSORS, Format, Members, decode, encode
+from .problems import TRY_LATER, problem_of
 
 T = TypeVar("T")
 
@@ -113,19 +110,12 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None else value
 
 
-class Connection:
-    """A service at an address, and how arrays travel there. May be shared by threads."""
+class Transport:
+    """A service at an address. May be shared by threads."""
 
-    def __init__(
-        self,
-        http: httpx.Client,
-        format: Format,  # noqa: A002
-        show: Callable[[str], Progress] | None = None,
-    ) -> None:
-        """Takes the HTTP client, whose base URL is the service, the format of arrays, and who is shown jobs."""
+    def __init__(self, http: httpx.Client) -> None:
+        """Takes the HTTP client, whose base URL is the service."""
         self.http = http
-        self.format = format
-        self.show = show
 
     def send(self, method: str, path: str, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.request)
         """Sends a request.
@@ -154,50 +144,10 @@ class Connection:
             return False
         return response.is_success or response.status_code == httpx.codes.NOT_FOUND
 
-    def post(
-        self, path: str, request: Mapping[str, object], accept: str | None = None, cloud_id: str | None = None
-    ) -> httpx.Response:
-        """Posts a JSON document with arrays in it, to the replica that has the cloud if its id is known."""
-        body, media_type = encode(request, self.format)
-        accepted = accept or (JSON if self.format == "json" else SAFETENSORS)
-        headers = {"Content-Type": media_type, "Accept": accepted, **about(cloud_id)}
-        if self.show is None or cloud_id is None:
-            return self.send("POST", path, content=body, headers=headers)
-        return jobs.answer(self, path, body, headers, self.show)
-
-    def read(self, parse: Callable[[Any], T], response: httpx.Response) -> T:
-        """Reads an answer in JSON.
-
-        Raises
-        ------
-        Problem
-            If it is none of this service.
-        """
-        return understood(response, lambda: parse(response.json()))
-
-    def compute(self, path: str, request: Mapping[str, object], read: Callable[[Members], T], cloud_id: str) -> T:
-        """Posts a request about a cloud and reads its answer.
-
-        Raises
-        ------
-        Problem
-            If the request is refused, or the answer none of this service.
-        """
-        response = self.post(path, request, cloud_id=cloud_id)
-        return understood(response, lambda: read(decode(response, request)))
-
 
 def about(cloud_id: str | None) -> dict[str, str]:
     """Returns the headers of a request about a cloud, if its id is known."""
     return {} if cloud_id is None else {CLOUD_HEADER: cloud_id}
-
-
-def understood(response: httpx.Response, read: Callable[[], T]) -> T:
-    """Returns what `read` makes of an answer; what it cannot read is a problem, such as the page of another service."""
-    try:
-        return read()
-    except UNREADABLE as error:
-        raise unreadable(response, error) from error
 
 
 def _advice(error: httpx.TransportError, url: httpx.URL) -> str:

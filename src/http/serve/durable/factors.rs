@@ -5,13 +5,14 @@ use std::sync::atomic::Ordering;
 
 use bytes::Bytes;
 
-use super::plan::FitPlan;
 use crate::http::compute::Admission;
+use crate::http::serve::plan::FitPlan;
 use crate::http::state::app::App;
 use crate::store::objects::factors::{FactorHead, FactorName, FoundFactor};
 use crate::store::objects::pieces::HASH_BYTES;
 use crate::store::objects::{Damaged, Unavailable};
 use crate::store::prepared::PreparedFit;
+use gramian_numerics::model::Model;
 use gramian_numerics::solver::{FactorBuilder, Solver, System};
 
 /// Points from which on a factor is kept: 4 n² bytes are read in less time than n³/3 flops take.
@@ -37,20 +38,17 @@ impl From<Unavailable> for Lost {
     }
 }
 
-/// The solver of a system from the store, if that has it. It never fails: what cannot be read is made again.
-pub async fn restore(
-    app: &Arc<App>,
-    admission: &Admission,
-    plan: &FitPlan,
-    system: &System,
-) -> Option<Solver> {
+/// The model of a fit from the store, if that has its factor. It never fails: what cannot be read is made again.
+pub async fn restore(app: &Arc<App>, admission: &Admission, plan: &FitPlan) -> Option<Model> {
     let durable = app.durable.as_ref()?;
-    if system.n_points() < WORTH_IT || app.config.store_factor_bytes == 0 {
+    if plan.fitted.n_points() < WORTH_IT || app.config.store_factor_bytes == 0 {
         return None;
     }
+    // What is wrong with a system is found again where it is made.
+    let system = plan.recipe.factorized_system(&plan.fitted).ok()??;
     let name = name_of(app, plan);
-    match read(app, admission, &name, system).await {
-        Ok(solver) => solver,
+    match read(app, admission, &name, &system).await {
+        Ok(solver) => solver.map(|solver| Model::System(Arc::new(solver))),
         Err(Lost::Gone) => None,
         Err(Lost::Unavailable(error)) => {
             tracing::warn!(%error, "a factor is made again");
@@ -127,7 +125,7 @@ impl Reading {
 /// Writes a factor to the store, behind the answer, unless it is there, or another one is being written: what is held for that is memory that others
 /// may want.
 pub fn keep(app: &Arc<App>, plan: &FitPlan, stored: &Arc<PreparedFit>) {
-    let Some(solver) = stored.solver() else { return };
+    let Ok(solver) = stored.model().solver() else { return };
     let is_worth_it = cfg!(target_endian = "little")
         && solver.n_points() >= WORTH_IT
         && solver.factor().is_some()
@@ -168,7 +166,7 @@ async fn write(app: &App, name: &FactorName, stored: Arc<PreparedFit>) -> Result
 
 /// A factor as bytes, which are those in memory, not copies.
 fn parts(stored: &Arc<PreparedFit>) -> (Option<FactorHead>, Bytes, Bytes) {
-    let factor = stored.solver().and_then(|solver| Some((solver.n_points(), solver.factor()?)));
+    let factor = stored.model().solver().ok().and_then(|solver| Some((solver.n_points(), solver.factor()?)));
     let head = factor.map(|(n, factor)| FactorHead::new(n, factor.norm1, factor.reciprocal_condition));
     let bytes = |of_weights| Bytes::from_owner(Numbers { stored: stored.clone(), of_weights });
     (head, bytes(true), bytes(false))
@@ -181,7 +179,7 @@ struct Numbers {
 
 impl AsRef<[u8]> for Numbers {
     fn as_ref(&self) -> &[u8] {
-        let factor = self.stored.solver().and_then(|solver| solver.factor());
+        let factor = self.stored.model().solver().ok().and_then(|solver| solver.factor());
         let numbers = factor.map_or(&[][..], |factor| match self.of_weights {
             true => factor.weights_of_one,
             false => factor.numbers,

@@ -1,6 +1,8 @@
 //! Requests and clouds that outlive the process: memory and compute threads for what store/clouds/ does, and
 //! what clients are told of it.
 
+pub mod factors;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, SystemTime};

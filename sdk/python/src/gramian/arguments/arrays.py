@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from .tensors import Array
+from ..wire.tensors import Array
 
 Sizes: TypeAlias = Mapping[str, int]
 """The lengths that are known when a request is made: n of the points, d of their coordinates."""

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .rest.types import Unset
+from ..rest.types import Unset
 
 MAX_SHOWN = 3
 """Longer tuples are shown by their first entries and their length."""

@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, Required, SupportsFloat, TypeAli
 import numpy as np
 import numpy.typing as npt
 
-from .describe import described
-from .keywords import suggest_names
-from .normalise import KERNEL, normalise
-from .rest import models
-from .rest.models import (
+from ..rest import models
+from ..rest.models import (
     Diagnostics,
     DuplicatePolicy,
     GeometryInclude,
@@ -27,8 +24,11 @@ from .rest.models import (
     SolverUsed,
     SurfaceChoice,
 )
-from .rest.types import Unset
-from .tensors import Array
+from ..rest.types import Unset
+from ..wire.tensors import Array
+from .describe import described
+from .keywords import suggest_names
+from .normalise import KERNEL, normalise
 
 if TYPE_CHECKING:
     from .registration import RegisteredCloud

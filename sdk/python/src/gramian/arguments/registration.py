@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NoReturn, TypeVar
 
+from ..rest import models
+from ..wire.connection import Connection
+from ..wire.problems import UnknownCloud
+from ..wire.tensors import JSON, PLY, Array, Members
+from ..wire.transport import about
 from .normalise import REQUEST, Rule, normalise
-from .problems import UnknownCloud
-from .rest import models
-from .tensors import JSON, PLY, Array, Members
-from .transport import Connection, about
 
 T = TypeVar("T")
 

@@ -7,15 +7,13 @@ import json
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Protocol
 
 import httpx
 
+from ..rest.models import Job, JobStatus
 from .problems import TRY_LATER, Problem
-from .rest.models import Job, JobStatus
-
-if TYPE_CHECKING:
-    from .transport import Connection
+from .progress import Progress
+from .transport import Transport
 
 PREFERENCE = {"Prefer": "respond-async"}
 """Asks for a job instead of an answer (RFC 7240). A service that knows no jobs answers as always."""
@@ -35,65 +33,8 @@ PARTING_SECONDS = 5.0
 _AWAY = (*TRY_LATER, httpx.codes.GATEWAY_TIMEOUT)
 
 
-class Progress(Protocol):
-    """Is told how far a job is, until it is closed."""
-
-    def __call__(self, job: Job) -> object:
-        """Takes the job as it is now."""
-
-    def close(self) -> object:
-        """Says that there is no more to tell."""
-
-
-class Bar:
-    """A progress bar of tqdm, in a terminal or a notebook."""
-
-    def __init__(self, name: str) -> None:
-        """Names the computation.
-
-        Raises
-        ------
-        ImportError
-            Without tqdm: the extra `progress` of this package has it.
-        """
-        from tqdm.auto import tqdm
-
-        layout = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
-        self._bar = tqdm(desc=name, total=1.0, bar_format=layout)
-
-    def __call__(self, job: Job) -> None:
-        """Moves on, and says what is being done."""
-        progress = job.progress
-        self._bar.n = max(self._bar.n, progress.fraction)
-        parts = [progress.stage]
-        if isinstance(progress.seconds_left, float):
-            parts.append(f"{progress.seconds_left:.0f} s left")
-        if isinstance(progress.residual, float):
-            parts.append(f"residual {progress.residual:.0e}")
-        self._bar.set_postfix_str(", ".join(parts))
-
-    def close(self) -> None:
-        """Leaves the bar as it is."""
-        self._bar.close()
-
-
-class Told:
-    """A function that is told."""
-
-    def __init__(self, function: Callable[[Job], object]) -> None:
-        """Takes the function."""
-        self._function = function
-
-    def __call__(self, job: Job) -> None:
-        """Tells it."""
-        self._function(job)
-
-    def close(self) -> None:
-        """Has nothing to close."""
-
-
 def answer(
-    connection: Connection,
+    transport: Transport,
     path: str,
     content: bytes,
     headers: dict[str, str],
@@ -113,12 +54,12 @@ def answer(
     """
     # A repetition, after a lost connection or by a proxy, is the same job.
     key = {"Idempotency-Key": str(uuid.uuid4())}
-    response = connection.send("POST", path, content=content, headers=headers | PREFERENCE | key)
+    response = transport.send("POST", path, content=content, headers=headers | PREFERENCE | key)
     if response.status_code != httpx.codes.ACCEPTED:
         return response
     # Proxies send all that is about a job to the replica that has it, which is that of its cloud.
     routed = {name: value for name, value in headers.items() if name == "Gramian-Cloud"}
-    job = _Followed(connection, response.headers["Location"], routed)
+    job = _Followed(transport, response.headers["Location"], routed)
     try:
         progress = show(path.rsplit("/v1/", 1)[-1])
         with contextlib.closing(progress):
@@ -135,9 +76,9 @@ def answer(
 class _Followed:
     """A job of the service that somebody waits for."""
 
-    def __init__(self, connection: Connection, place: str, headers: dict[str, str]) -> None:
+    def __init__(self, transport: Transport, place: str, headers: dict[str, str]) -> None:
         """Takes the path of the job, and what requests about it are to have in their heads."""
-        self._connection = connection
+        self._transport = transport
         self._place = place
         self._headers = headers
         self._is_out_of_reach = False
@@ -162,7 +103,7 @@ class _Followed:
         pause, last = REOPENING_SECONDS, time.monotonic() + AWAY_SECONDS
         while True:
             try:
-                return self._connection.send("GET", self._place + member, headers=self._headers)
+                return self._transport.send("GET", self._place + member, headers=self._headers)
             except (httpx.TransportError, Problem) as error:
                 if not _is_away(error):
                     raise
@@ -185,10 +126,10 @@ class _Followed:
 
     def delete(self) -> bool:
         """Cancels the job, or forgets its result; says whether it is gone."""
-        return self._connection.delete(self._place, self._headers, PARTING_SECONDS)
+        return self._transport.delete(self._place, self._headers, PARTING_SECONDS)
 
     def _note(self) -> str:
-        url = self._connection.http.build_request("GET", self._place).url
+        url = self._transport.http.build_request("GET", self._place).url
         job_id = self._place.rsplit("/", 1)[-1]
         routed = "".join(f", with the header {name}: {value}" for name, value in self._headers.items())
         return (
@@ -198,7 +139,7 @@ class _Followed:
 
     @contextlib.contextmanager
     def _events(self) -> Iterator[httpx.Response]:
-        with self._connection.http.stream("GET", f"{self._place}/events", headers=self._headers) as response:
+        with self._transport.http.stream("GET", f"{self._place}/events", headers=self._headers) as response:
             yield response
 
 

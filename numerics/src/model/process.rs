@@ -1,0 +1,69 @@
+//! The Gaussian process that a model stands for, up to a factor.
+
+use std::ops::RangeInclusive;
+
+use crate::error::NumericsError;
+use crate::kernel::Kernel;
+use crate::kernel::defaults::DEFAULT_ALPHA;
+use crate::selection::Learned;
+use crate::sums::regularization::Regularization;
+
+/// Ratios of noise to variance that lose no digit.
+const RATIOS: RangeInclusive<f64> = 1e-280..=1e280;
+
+/// Kernel and noise of a model, and the factor by which both are scaled afterwards, unit V².
+///
+/// A factor of K + αI depends on the ratio of noise and variance alone. So a process is fitted with variance 1 where that is exact, and
+/// one factorization serves values of any size.
+#[derive(Debug, Clone)]
+pub struct ScaledProcess {
+    pub kernel: Kernel,
+    pub regularization: Regularization,
+    pub scale: f64,
+}
+
+impl ScaledProcess {
+    /// A process with a kernel that is given, and α = 1e-10 where no noise is. Noise per point is never scaled.
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidRegularization`].
+    pub fn of(kernel: Kernel, regularization: Option<Regularization>) -> Result<Self, NumericsError> {
+        let variance = kernel.variance();
+        match given_or(regularization, DEFAULT_ALPHA)? {
+            Regularization::Uniform(alpha) if alpha == 0.0 || RATIOS.contains(&(alpha / variance)) => {
+                let regularization = Regularization::uniform(alpha / variance)?;
+                Ok(Self { kernel: kernel.of_variance_one(), regularization, scale: variance })
+            }
+            regularization => Ok(Self { kernel, regularization, scale: 1.0 }),
+        }
+    }
+
+    /// A process with a kernel that was learned from values, and noise that was learned where none is given.
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::InvalidRegularization`].
+    pub fn learned(learned: &Learned, given: Option<Regularization>) -> Result<Self, NumericsError> {
+        let Learned { family, length_scale, ratio, variance, .. } = *learned;
+        let kernel = |variance| Kernel::new(family, length_scale, variance);
+        match given_or(given, ratio * variance)? {
+            // A variance that is learned may leave what kernels take.
+            Regularization::Uniform(alpha) => {
+                let regularization = Regularization::uniform(alpha / variance)?;
+                Ok(Self { kernel: kernel(1.0)?, regularization, scale: variance })
+            }
+            regularization => Ok(Self { kernel: kernel(variance)?, regularization, scale: 1.0 }),
+        }
+    }
+
+    /// A kernel of variance 1 by a rule, and noise by the same rule where none is given.
+    ///
+    /// # Errors
+    /// [`NumericsError::InvalidRegularization`].
+    pub fn by_rule(kernel: Kernel, alpha: f64, given: Option<Regularization>) -> Result<Self, NumericsError> {
+        Ok(Self { kernel, regularization: given_or(given, alpha)?, scale: 1.0 })
+    }
+}
+
+fn given_or(given: Option<Regularization>, alpha: f64) -> Result<Regularization, NumericsError> {
+    given.map_or_else(|| Regularization::uniform(alpha), Ok)
+}

@@ -1,0 +1,182 @@
+//! Functions through values at queries, from whichever solver there is.
+
+use std::sync::Arc;
+
+use super::{Model, Report};
+use crate::error::{NumericsError, Quantity};
+use crate::function::batch::{Batch, BatchJets};
+use crate::function::deviations::JetDeviations;
+use crate::function::interpolant::Interpolant;
+use crate::function::moving::{Moving, MovingRequest};
+use crate::function::posterior::{Variances, variances_with_mean};
+use crate::observer::Observer;
+use crate::points::cloud::Cloud;
+use crate::solver::Solution;
+use crate::solver::trend::{Mean, Trend};
+use crate::sums::jets::{JetOrder, Jets};
+
+/// Values at the fitted points, with what is known of the process that they come from.
+#[derive(Clone, Copy)]
+pub struct FittedValues<'a> {
+    /// `[n]`, unit V; `[k, n]` where each of k lists has a function of its own.
+    pub values: &'a [f64],
+    pub mean: Mean,
+    /// The mean as learned from the values, for solvers that never see all of them at once.
+    pub trend: Option<&'a Trend>,
+    /// Kernel and noise are so many times those of the model, unit V².
+    pub scale: f64,
+}
+
+/// What is asked at queries.
+#[derive(Clone, Copy)]
+pub struct JetRequest<'a> {
+    /// `[m, d]`, unit L.
+    pub queries: &'a Cloud,
+    pub order: JetOrder,
+    pub has_variances: bool,
+    /// Deviations of value and derivatives that are wanted, up to this order.
+    pub deviations: Option<JetOrder>,
+}
+
+/// A function at queries, and how sure it is.
+pub struct ValuesAt {
+    pub jets: Jets,
+    /// If asked for.
+    pub variances: Option<Variances>,
+    /// If asked for.
+    pub deviations: Option<JetDeviations>,
+    pub report: Report,
+    /// The function, where there is one for all queries.
+    pub interpolant: Option<Interpolant>,
+}
+
+/// k functions at queries, and how sure all of them are.
+pub struct EachAt {
+    pub jets: BatchJets,
+    /// If asked for.
+    pub variances: Option<Variances>,
+    /// If asked for.
+    pub deviations: Option<JetDeviations>,
+    /// Of the solver, with the residual of the worst list and the disagreement of the first that has one.
+    pub report: Report,
+    pub batch: Batch,
+}
+
+impl Model {
+    /// The function with these values at queries; `known` are its weights, if they were solved before.
+    ///
+    /// # Errors
+    /// Those of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of [`Moving::at`]; those of the variances and deviations that
+    /// are asked for; [`NumericsError::Unsupported`] for local regressions.
+    pub fn values_at(
+        &self,
+        fitted: FittedValues<'_>,
+        request: JetRequest<'_>,
+        known: Option<Arc<Solution>>,
+        observer: &dyn Observer,
+    ) -> Result<ValuesAt, NumericsError> {
+        match self {
+            Self::System(_) => {
+                let interpolant = self.interpolant(fitted.values, fitted.mean, known, observer)?;
+                of_one_function(interpolant, fitted.scale, request, observer)
+            }
+            Self::LocalKriging(moving) => around_queries(moving, fitted, request, observer),
+            Self::LocalSurface => Err(self.lacks(Quantity::Values)),
+        }
+    }
+
+    /// The functions with these lists of values `[k, n]`, k at least 1, at queries.
+    ///
+    /// # Errors
+    /// Those of [`Batch::fit`] and [`Batch::at`]; those of the variances and deviations that are asked for;
+    /// [`NumericsError::Unsupported`] where each query has a function of its own.
+    pub fn each_at(
+        &self,
+        fitted: FittedValues<'_>,
+        request: JetRequest<'_>,
+        observer: &dyn Observer,
+    ) -> Result<EachAt, NumericsError> {
+        let batch = Batch::fit(self.solver()?.clone(), fitted.values, fitted.mean, observer)?;
+        let jets = batch.at(request.queries, request.order, observer)?;
+        let report = |interpolant: &Interpolant| {
+            Report::of_function(&interpolant.solver, &interpolant.solution, fitted.scale)
+        };
+        let worse = |a: &Interpolant, b: &Interpolant| {
+            a.solution.relative_residual.total_cmp(&b.solution.relative_residual)
+        };
+        let expected = NumericsError::LengthMismatch { expected: batch.solver.n_points(), found: 0 };
+        let worst = batch.interpolants().max_by(worse).ok_or(expected)?;
+        let (variances, deviations) = uncertainty(&worst, fitted.scale, request, observer)?;
+        // Norm, misfit and mean are those of each list.
+        let report = Report {
+            native_norm_squared: None,
+            misfit: None,
+            trend: None,
+            disagreement: batch.interpolants().find_map(|of| report(&of).disagreement),
+            ..report(&worst)
+        };
+        Ok(EachAt { jets, variances, deviations, report, batch })
+    }
+}
+
+fn of_one_function(
+    interpolant: Interpolant,
+    scale: f64,
+    request: JetRequest<'_>,
+    observer: &dyn Observer,
+) -> Result<ValuesAt, NumericsError> {
+    let jets = interpolant.at(request.queries, request.order, observer)?;
+    let (variances, deviations) = uncertainty(&interpolant, scale, request, observer)?;
+    let report = Report::of_function(&interpolant.solver, &interpolant.solution, scale);
+    Ok(ValuesAt { jets, variances, deviations, report, interpolant: Some(interpolant) })
+}
+
+/// Variances and deviations, as far as they are asked for. All functions with one mean on one cloud have the same.
+fn uncertainty(
+    function: &Interpolant,
+    scale: f64,
+    request: JetRequest<'_>,
+    observer: &dyn Observer,
+) -> Result<(Option<Variances>, Option<JetDeviations>), NumericsError> {
+    let Interpolant { solver, solution } = function;
+    let variances = || {
+        let found = variances_with_mean(solver, solution.trend.as_ref(), request.queries, observer);
+        found.map(|found| found.scaled(scale))
+    };
+    let deviations =
+        |order: JetOrder| JetDeviations::of(function, scale, request.queries, order.degree(), observer);
+    let variances = request.has_variances.then(variances).transpose()?;
+    Ok((variances, request.deviations.map(deviations).transpose()?))
+}
+
+fn around_queries(
+    moving: &Moving,
+    fitted: FittedValues<'_>,
+    asked: JetRequest<'_>,
+    observer: &dyn Observer,
+) -> Result<ValuesAt, NumericsError> {
+    let FittedValues { values, trend, scale, .. } = fitted;
+    // Deviations are those of the derivatives that are found.
+    let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
+    let request = MovingRequest {
+        order,
+        has_variances: asked.has_variances,
+        has_deviations: asked.deviations.is_some(),
+        trend,
+    };
+    let found = moving.at(values, asked.queries, request, observer)?;
+    let report = Report {
+        trend: trend.cloned(),
+        n_neighbours: moving.n_neighbours(),
+        n_dependent: found.n_dependent,
+        unsettled: moving.unsettled(values, asked.queries, trend, observer)?,
+        ..Report::default()
+    };
+    Ok(ValuesAt {
+        jets: found.jets,
+        variances: found.variances.map(|variances| variances.scaled(scale)),
+        deviations: found.deviations.map(|deviations| deviations.scaled(scale)),
+        report,
+        interpolant: None,
+    })
+}

@@ -1,0 +1,1 @@
+"""Arguments of calls: checked, named and made ready to be sent."""

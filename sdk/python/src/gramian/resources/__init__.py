@@ -1,0 +1,1 @@
+"""What a registered cloud is asked: values, surfaces, operators, selection."""

@@ -1,0 +1,1 @@
+"""How requests and answers travel: HTTP, arrays as tensors, jobs, and problems."""

@@ -1,0 +1,136 @@
+//! Diagnostics of an answer, from what its fit is and what the model reports.
+
+use super::fitted::Fitted;
+use super::plan::words;
+use crate::http::fields::{Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, Warning, WarningCode};
+use gramian_numerics::error::SolverKind;
+use gramian_numerics::model::{Regressions, Report};
+use gramian_numerics::solver::trend::Trend;
+use gramian_numerics::solver::{Disagreement, Method, Outlier};
+use gramian_numerics::sums::regularization::Regularization;
+
+/// Below this reciprocal condition fewer than three digits of the weights are sure.
+const ILL_CONDITIONED: f64 = 1e-13;
+
+const TOO_SMALL: &str = "squares of the values leave float64: their variance is taken to be 1e-290, and deviations are too long; scale the values";
+const MISFIT_OF_LEARNED: &str =
+    "deviations there may be too short: look at these values, or give a kernel that is shorter or rougher";
+const MISFIT_OF_GIVEN: &str = "deviations are too short: leave out kernel and alpha, so that they are learned, or raise variance and alpha";
+
+impl Fitted {
+    /// What the answer says of this fit and of what was served from it.
+    pub fn diagnostics(&self, report: &Report, n_queries: usize) -> Diagnostics {
+        let plan = &self.plan;
+        let (cloud, scale) = (&plan.stored.cloud, plan.process.scale);
+        let (kernel, alpha) = self.process_used(report);
+        Diagnostics {
+            cloud_id: plan.stored.id.to_string(),
+            n_points: cloud.n_points(),
+            n_queries,
+            dimension: cloud.dimension(),
+            kernel,
+            alpha,
+            solver: match plan.recipe.solver() {
+                SolverKind::Dense => SolverUsed::Dense,
+                SolverKind::Local => SolverUsed::Local,
+            },
+            solver_reason: plan.reason.map(|reason| words(reason).to_owned()),
+            factorization: match report.method {
+                Some(Method::Cholesky) => FactorizationUsed::Cholesky,
+                Some(Method::PivotedCholesky) => FactorizationUsed::PivotedCholesky,
+                None => FactorizationUsed::Local,
+            },
+            rank: report.rank,
+            reciprocal_condition: report.reciprocal_condition,
+            relative_residual: report.relative_residual,
+            native_norm_squared: report.native_norm_squared.map(|norm| norm / scale),
+            mean_coefficients: report.trend.as_ref().map(Trend::of_coordinates),
+            misfit: report.misfit,
+            noise_deviation: report.regressions.map(|regressions| regressions.noise),
+            n_merged_duplicates: plan.merge.as_ref().map_or(0, |merge| merge.n_merged()),
+            stencils: None,
+            warnings: self.warnings(report, n_queries),
+            geometry: None,
+        }
+    }
+
+    /// Kernel and α of the request or of the values; of local regressions those of the heights.
+    fn process_used(&self, report: &Report) -> (KernelUsed, Option<f64>) {
+        match self.plan.recipe.process() {
+            Some((kernel, regularization)) => {
+                let scale = self.plan.process.scale;
+                let alpha = match regularization {
+                    Regularization::Uniform(alpha) => Some(alpha * scale),
+                    Regularization::PerPoint(_) => None,
+                };
+                (KernelUsed::scaled(kernel, scale), alpha)
+            }
+            None => {
+                let heights = report.regressions.map(|Regressions { kernel, .. }| kernel);
+                let alpha = report.regressions.map(|Regressions { noise, .. }| noise * noise);
+                (KernelUsed::heights(heights.unwrap_or_default()), alpha)
+            }
+        }
+    }
+
+    fn warnings(&self, report: &Report, n_queries: usize) -> Vec<Warning> {
+        let plan = &self.plan;
+        let mut warnings = Vec::new();
+        let mut warn = |code, detail| warnings.push(Warning { code, detail });
+        let is_pivoted = report.method == Some(Method::PivotedCholesky);
+        let reciprocal_condition = report.reciprocal_condition.unwrap_or(1.0);
+        if is_pivoted {
+            let (rank, n) = (report.rank.unwrap_or_default(), plan.fitted.n_points());
+            let detail = format!(
+                "Cholesky fails in float64; least squares on {rank} of {n} points, which span the rest to rounding"
+            );
+            warn(WarningCode::IllConditioned, detail);
+        } else if reciprocal_condition < ILL_CONDITIONED && !plan.process.is_learned {
+            // Where the values decided, the least noise is what float64 bears, and the weights follow it on purpose.
+            let detail = format!("the reciprocal condition is {reciprocal_condition:.1e}");
+            warn(WarningCode::IllConditioned, detail);
+        }
+        if report.is_refined {
+            let residual = report.relative_residual.unwrap_or_default();
+            warn(WarningCode::Refined, format!("refined to a relative residual of {residual:.1e}"));
+        }
+        if let Some(merge) = &plan.merge {
+            let detail = format!("points merged into an earlier one: {}", merge.n_merged());
+            warn(WarningCode::DuplicatesMerged, detail);
+        }
+        if plan.has_least_variance() {
+            warn(WarningCode::VarianceClamped, TOO_SMALL.to_owned());
+        }
+        if report.n_dependent > 0 {
+            let detail = format!(
+                "points that follow from nearer ones to rounding are left out of the {} nearest (queries: {} of {n_queries})",
+                report.n_neighbours, report.n_dependent
+            );
+            warn(WarningCode::IllConditioned, detail);
+        }
+        warnings
+    }
+
+    /// Warns where values contradict kernel and noise: those of a function that was solved, or else those that were
+    /// learned from. Where kernel and noise are given, only answers with deviations have the warning: the values
+    /// alone depend on nothing but the ratio of the two.
+    pub fn warn_of_misfit(
+        &self,
+        diagnostics: &mut Diagnostics,
+        of_solution: Option<Disagreement>,
+        has_deviations: bool,
+    ) {
+        let plan = &self.plan;
+        // Learning sees the points as they were sent, a solver sees them merged.
+        let as_sent = |point: usize| plan.merge.as_ref().map_or(point, |merge| merge.first_point(point));
+        let of_solution = of_solution.map(|found| {
+            let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });
+            Disagreement { outlier, ..found }
+        });
+        let is_learned = plan.process.is_learned;
+        let found = of_solution.or_else(|| plan.disagreement());
+        let Some(found) = found.filter(|_| is_learned || has_deviations) else { return };
+        let remedy = if is_learned { MISFIT_OF_LEARNED } else { MISFIT_OF_GIVEN };
+        diagnostics.warn_of_misfit(found, remedy);
+    }
+}

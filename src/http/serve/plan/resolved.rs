@@ -1,0 +1,159 @@
+//! A fit with everything that its preparation depends on.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::{FittedCloud, Values};
+use crate::http::fields::DuplicatePolicy;
+use crate::http::problem::{Pointers, Problem};
+use crate::http::state::app::FitFailure;
+use crate::store::clouds::RegisteredCloud;
+use crate::store::key::FitKey;
+use gramian_numerics::error::{NotDefinite, NumericsError};
+use gramian_numerics::model::Recipe;
+use gramian_numerics::model::price::CloudSize;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::duplicates::Merge;
+use gramian_numerics::selection::Learned;
+use gramian_numerics::solver::Disagreement;
+use gramian_numerics::solver::choose::{AutoLocal, Choice};
+use gramian_numerics::solver::trend::{Mean, Trend};
+use gramian_numerics::sums::regularization::Regularization;
+
+/// A fit whose inputs are checked and whose cost is known and admitted.
+#[derive(Clone)]
+pub struct FitPlan {
+    pub stored: Arc<RegisteredCloud>,
+    /// The cloud that is factorized: without the merged duplicates.
+    pub fitted: Arc<Cloud>,
+    pub merge: Option<Arc<Merge>>,
+    pub recipe: Recipe,
+    /// Why the solver is local, where that was not asked for.
+    pub reason: Option<AutoLocal>,
+    pub key: FitKey,
+    pub pointers: Pointers,
+    pub process: Process,
+}
+
+/// The process that values are taken to come from, beside the recipe.
+#[derive(Clone)]
+pub struct Process {
+    /// Kernel and noise are so many times those of the recipe, unit V².
+    pub scale: f64,
+    /// Whether the values decided kernel and noise.
+    pub is_learned: bool,
+    pub mean: Mean,
+    pub values: Option<Arc<Values>>,
+    /// Kernel, noise and mean as learned from the values; their mean alone where kernel and noise are given.
+    pub(super) learned: Option<Arc<Learned>>,
+}
+
+impl Default for Process {
+    fn default() -> Self {
+        Self { scale: 1.0, is_learned: false, mean: Mean::Zero, values: None, learned: None }
+    }
+}
+
+impl FitPlan {
+    /// Merges duplicates where that is asked for, and names the fit.
+    pub(super) fn of(
+        on: FittedCloud,
+        recipe: Recipe,
+        reason: Option<AutoLocal>,
+        process: Process,
+    ) -> Result<Self, Problem> {
+        let FittedCloud { owner, stored, pointers, duplicates } = on;
+        let is_singular_at_duplicates = match recipe.process() {
+            None => false,
+            Some((kernel, regularization)) => {
+                let is_checked = kernel.check_dimension(stored.cloud.dimension());
+                is_checked.map_err(|error| Problem::from_numerics(error, pointers))?;
+                *regularization == Regularization::Uniform(0.0)
+            }
+        };
+        let merges = duplicates == DuplicatePolicy::Merge && is_singular_at_duplicates;
+        let merged = if merges { Merge::duplicates_of(&stored.cloud) } else { None };
+        let key = FitKey::of(owner, stored.id, &recipe, merged.is_some());
+        let (fitted, merge) = match merged {
+            None => (stored.cloud.clone(), None),
+            Some((cloud, merge)) => (Arc::new(cloud), Some(Arc::new(merge))),
+        };
+        Ok(Self { stored, fitted, merge, recipe, reason, key, pointers, process })
+    }
+
+    /// Kernel, noise and mean as learned from values that are never seen all at once.
+    fn learned_of_local(&self) -> Option<&Learned> {
+        self.process.learned.as_deref().filter(|_| self.recipe.is_kriged_locally())
+    }
+
+    /// The mean of such values.
+    pub fn trend(&self) -> Option<&Trend> {
+        self.learned_of_local()?.trend.as_ref()
+    }
+
+    /// How values contradict kernel and noise, as far as that was seen when they were learned from: of values
+    /// that a solver sees all at once, it says the rest.
+    pub fn disagreement(&self) -> Option<Disagreement> {
+        let found = self.process.learned.as_ref()?.disagreement?;
+        (self.learned_of_local().is_some() || found.place.is_some()).then_some(found)
+    }
+
+    /// Whether the values are so small that their variance is taken to be greater than it is.
+    pub fn has_least_variance(&self) -> bool {
+        let Process { is_learned, learned, .. } = &self.process;
+        *is_learned && learned.as_ref().is_some_and(|learned| learned.has_least_variance())
+    }
+
+    /// The client's normals at the points that are factorized: means over merged duplicates.
+    pub fn fitted_normals(&self) -> Option<Cow<'_, Cloud>> {
+        let normals = self.stored.normals.as_ref()?;
+        let Some(merge) = &self.merge else { return Some(Cow::Borrowed(normals)) };
+        let d = normals.dimension();
+        let component = |c: usize| normals.points().map(|normal| normal[c]).collect::<Vec<f64>>();
+        let means: Vec<Vec<f64>> = (0..d).map(|c| merge.mean(&component(c))).collect();
+        let interleaved = (0..self.fitted.n_points()).flat_map(|point| means.iter().map(move |m| m[point]));
+        Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
+    }
+
+    /// Values at the points that are factorized: means over merged duplicates, list by list.
+    pub fn merged<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
+        match &self.merge {
+            None => Cow::Borrowed(values),
+            Some(merge) => {
+                let lists = values.chunks_exact(self.stored.cloud.n_points());
+                Cow::Owned(lists.flat_map(|list| merge.mean(list)).collect())
+            }
+        }
+    }
+
+    /// The solver of this fit with what it and the surface take, within so many bytes of memory.
+    pub fn choice(&self, memory: usize) -> Choice {
+        let (n_points, dimension) = (self.fitted.n_points(), self.fitted.dimension());
+        self.recipe.price(CloudSize { n_points, dimension, is_merged: self.merge.is_some() }, memory)
+    }
+
+    /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
+    pub fn refused(&self, mut error: NumericsError) -> Problem {
+        use NumericsError::{KernelNotSmooth, NotPositiveDefinite};
+        if let Some(merge) = &self.merge
+            && let KernelNotSmooth { point, .. }
+            | NotPositiveDefinite { reason: NotDefinite::NeedsCholesky { point }, .. } = &mut error
+        {
+            *point = merge.first_point(*point);
+        }
+        if let NotPositiveDefinite { minimum_alpha, .. } = &mut error {
+            *minimum_alpha *= self.process.scale;
+        }
+        Problem::from_numerics(error, self.pointers)
+    }
+
+    /// Why there is no factorization, with pointers into this request.
+    pub fn failed(&self, failure: FitFailure) -> Problem {
+        match failure {
+            FitFailure::Refused(error) => self.refused(error),
+            FitFailure::Broken(problem) => problem,
+            // Whoever is told so tries again with all of the memory.
+            FitFailure::NeedsAll => Problem::internal(),
+        }
+    }
+}

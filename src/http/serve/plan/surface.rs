@@ -1,0 +1,73 @@
+//! The fit of the surface that a cloud samples.
+
+use std::sync::Arc;
+
+use super::resolved::Process;
+use super::{FitPlan, FittedCloud, Lack};
+use crate::http::fields::kernel::PlannedKernel;
+use crate::http::problem::Problem;
+use gramian_numerics::error::SolverKind;
+use gramian_numerics::kernel::defaults::{Purpose, default_fit};
+use gramian_numerics::model::{Recipe, ScaledProcess};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::solver::choose::AutoLocal;
+use gramian_numerics::sums::regularization::Regularization;
+
+/// A fit of a surface.
+pub struct PlannedSurface {
+    pub on: FittedCloud,
+    pub(in crate::http::serve) choice: SurfaceChoice,
+}
+
+/// By what a surface is known.
+pub enum SurfaceChoice {
+    /// The level of a signature function.
+    Signature { kernel: Option<PlannedKernel>, regularization: Option<Regularization>, purpose: Purpose },
+    /// Local regressions, which learn at sites, if these are given; `reason` says why, where they were not asked for.
+    Regressions { reason: Option<AutoLocal>, sites: Option<Arc<Cloud>> },
+}
+
+impl PlannedSurface {
+    pub fn solver(&self) -> SolverKind {
+        match self.choice {
+            SurfaceChoice::Signature { .. } => SolverKind::Dense,
+            SurfaceChoice::Regressions { .. } => SolverKind::Local,
+        }
+    }
+
+    pub(in crate::http::serve) fn lack(&self) -> Option<Lack> {
+        let SurfaceChoice::Signature { kernel, regularization, .. } = &self.choice else { return None };
+        let is_given = matches!(kernel, Some(PlannedKernel::Given(_)));
+        if !is_given && self.on.stored.scales().is_none() {
+            return Some(Lack::Scales);
+        }
+        let follows = kernel.is_none() && regularization.is_none();
+        (follows && self.on.stored.noise().is_none()).then_some(Lack::Noise)
+    }
+
+    pub(super) fn resolve(self) -> Result<FitPlan, Problem> {
+        let Self { on, choice } = self;
+        let refuse = |error| Problem::from_numerics(error, on.pointers);
+        let (kernel, regularization, purpose) = match choice {
+            SurfaceChoice::Signature { kernel, regularization, purpose } => (kernel, regularization, purpose),
+            SurfaceChoice::Regressions { reason, sites } => {
+                return FitPlan::of(on, Recipe::LocalSurface { sites }, reason, Process::default());
+            }
+        };
+        let scaled = match kernel {
+            Some(kernel) => {
+                let kernel = kernel.resolve(on.stored.scales(), purpose, on.pointers)?;
+                ScaledProcess::of(kernel, regularization).map_err(refuse)?
+            }
+            None => {
+                // With a regularization given, nothing follows from the noise.
+                let noise = || on.stored.noise().unwrap_or_default();
+                let (kernel, alpha) = default_fit(on.scales()?, purpose, noise).map_err(refuse)?;
+                ScaledProcess::by_rule(kernel, alpha, regularization).map_err(refuse)?
+            }
+        };
+        let ScaledProcess { kernel, regularization, scale } = scaled;
+        let recipe = Recipe::of_values(SolverKind::Dense, kernel, regularization);
+        FitPlan::of(on, recipe, None, Process { scale, ..Process::default() })
+    }
+}

@@ -1,0 +1,152 @@
+//! The fit of values at the points of a cloud.
+
+use std::sync::Arc;
+
+use super::resolved::Process;
+use super::{FitPlan, FittedCloud, Lack};
+use crate::http::fields::kernel::PlannedKernel;
+use crate::http::problem::Problem;
+use crate::store::key::ValuesKey;
+use crate::store::learned::LearnedKey;
+use gramian_numerics::error::{NumericsError, SolverKind};
+use gramian_numerics::kernel::Kernel;
+use gramian_numerics::kernel::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
+use gramian_numerics::model::{Recipe, ScaledProcess};
+use gramian_numerics::observer::Observer;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
+use gramian_numerics::solver::choose::AutoLocal;
+use gramian_numerics::solver::trend::Mean;
+use gramian_numerics::sums::regularization::Regularization;
+
+/// Values at the points of the client's cloud, with the key of their weights.
+pub struct Values {
+    /// `[n]`, or `[k, n]` where each of k lists has a function of its own.
+    pub list: Vec<f64>,
+    /// k, 1 for one list.
+    pub n_lists: usize,
+    /// Names the values and the mean of their function.
+    pub key: ValuesKey,
+    /// Names what is learned from them, with what the request gives.
+    pub(in crate::http::serve) learned_key: LearnedKey,
+}
+
+/// A fit of values, or of the operators that values could be given to.
+pub struct PlannedValues {
+    pub on: FittedCloud,
+    pub(in crate::http::serve) kernel: Option<PlannedKernel>,
+    pub(in crate::http::serve) regularization: Option<Regularization>,
+    pub solver: SolverKind,
+    /// Why the solver is local, where that was not asked for.
+    pub(in crate::http::serve) reason: Option<AutoLocal>,
+    pub(in crate::http::serve) mean: Mean,
+    pub(in crate::http::serve) values: Option<Arc<Values>>,
+    pub(in crate::http::serve) learned: Option<Arc<Learned>>,
+}
+
+/// Values to learn from, with what is known beforehand.
+pub struct Learning {
+    cloud: Arc<Cloud>,
+    sampling: Arc<Sampling>,
+    values: Arc<Values>,
+    mean: Mean,
+    kernel: Option<Kernel>,
+    regularization: Option<Regularization>,
+}
+
+impl PlannedValues {
+    /// Length scales of the kernel: 1, or one for each axis.
+    pub fn n_length_scales(&self) -> usize {
+        match &self.kernel {
+            Some(PlannedKernel::Given(kernel)) => kernel.length_scales().map_or(1, <[f64]>::len),
+            _ => 1,
+        }
+    }
+
+    /// Whether the noise is given for each point.
+    pub fn has_noise_variances(&self) -> bool {
+        matches!(self.regularization, Some(Regularization::PerPoint(_)))
+    }
+
+    pub(super) fn lack(&self) -> Option<Lack> {
+        if self.unlearned().is_some() {
+            return Some(Lack::Learned);
+        }
+        let is_given = matches!(self.kernel, Some(PlannedKernel::Given(_)));
+        (!is_given && self.on.stored.scales().is_none()).then_some(Lack::Scales)
+    }
+
+    /// The values, if they decide and were not looked at yet: a kernel that is not given follows from them, and so does a mean for a solver
+    /// that never sees all of them at once.
+    pub(in crate::http::serve) fn unlearned(&self) -> Option<&Arc<Values>> {
+        let has_local_mean = self.mean != Mean::Zero && self.solver == SolverKind::Local;
+        let decides = self.learned.is_none() && (self.kernel.is_none() || has_local_mean);
+        self.values.as_ref().filter(|_| decides)
+    }
+
+    /// What is to be learned from values of this fit.
+    ///
+    /// # Errors
+    /// Those of the kernel that is given.
+    pub(in crate::http::serve) fn learning(
+        &self,
+        values: Arc<Values>,
+        sampling: Arc<Sampling>,
+    ) -> Result<Learning, Problem> {
+        let kernel = self
+            .kernel
+            .as_ref()
+            .map(|kernel| kernel.resolve(Some(sampling.scales()), Purpose::Values, self.on.pointers));
+        Ok(Learning {
+            cloud: self.on.stored.cloud.clone(),
+            kernel: kernel.transpose()?,
+            sampling,
+            values,
+            mean: self.mean,
+            regularization: self.regularization.clone(),
+        })
+    }
+
+    pub(super) fn resolve(self) -> Result<FitPlan, Problem> {
+        let Self { on, solver, reason, mean, values, learned, .. } = self;
+        let refuse = |error| Problem::from_numerics(error, on.pointers);
+        let is_learned = self.kernel.is_none() && learned.is_some();
+        let scaled = match (&self.kernel, &learned) {
+            (Some(kernel), _) => {
+                let kernel = kernel.resolve(on.stored.scales(), Purpose::Values, on.pointers)?;
+                ScaledProcess::of(kernel, self.regularization).map_err(refuse)?
+            }
+            (None, Some(learned)) => ScaledProcess::learned(learned, self.regularization).map_err(refuse)?,
+            (None, None) => {
+                let (kernel, alpha) = default_fit(on.scales()?, Purpose::Values, || 0.0).map_err(refuse)?;
+                ScaledProcess::by_rule(kernel, alpha, self.regularization).map_err(refuse)?
+            }
+        };
+        let ScaledProcess { kernel, regularization, scale } = scaled;
+        let recipe = Recipe::of_values(solver, kernel, regularization);
+        let process = Process { scale, is_learned, mean, values, learned };
+        FitPlan::of(on, recipe, reason, process)
+    }
+}
+
+impl Learning {
+    pub(in crate::http::serve) fn learn(&self, observer: &dyn Observer) -> Result<Learned, NumericsError> {
+        let observed = Observed {
+            cloud: &self.cloud,
+            sampling: &self.sampling,
+            values: &self.values.list,
+            noise: match &self.regularization {
+                None if self.kernel.is_some() => Noise::Uniform(DEFAULT_ALPHA),
+                None => Noise::Unknown,
+                Some(Regularization::Uniform(alpha)) => Noise::Uniform(*alpha),
+                Some(Regularization::PerPoint(variances)) => Noise::PerPoint(variances),
+            },
+            mean: self.mean,
+        };
+        match &self.kernel {
+            None => learn(observed, observer),
+            Some(kernel) => learn_mean(observed, kernel, observer),
+        }
+    }
+}

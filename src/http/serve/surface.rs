@@ -1,0 +1,202 @@
+//! A surface at the queries of a request: flags, arrays and diagnostics of its answers.
+
+use std::sync::Arc;
+
+use super::fitted::Fits;
+use crate::http::compute::JobObserver;
+use crate::http::fields::{
+    Degenerate, DegenerateReason, Diagnostics, StencilsUsed, SurfaceUsed, Warning, WarningCode,
+};
+use crate::http::problem::Problem;
+use crate::http::wire::write::array::Array;
+use gramian_numerics::error::NumericsError;
+use gramian_numerics::function::interpolant::Interpolant;
+use gramian_numerics::kernel::Family;
+use gramian_numerics::model::Report;
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::surface::Surface;
+use gramian_numerics::surface::degeneracy::{Degeneracy, DegeneracyReason};
+use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation};
+use gramian_numerics::surface::served::ServedBy;
+
+/// A surface with its geometry at the queries of a request.
+pub struct SurfaceGeometry {
+    pub surface: Arc<Surface>,
+    pub geometry: Geometry,
+    /// Rows of the sparse operator over it, once there is one.
+    pub stencils: Option<StencilsUsed>,
+    request: GeometryRequest,
+}
+
+/// Standard deviations, one entry per query.
+pub struct DeviationArrays {
+    pub normal: Array,
+    pub principal: Array,
+    pub mean: Array,
+    pub gaussian: Array,
+}
+
+impl Fits {
+    /// The geometry of the surface at queries.
+    ///
+    /// # Errors
+    /// Those of [`Geometry::of`] as a [`Problem`].
+    pub fn geometry(
+        &self,
+        queries: &Cloud,
+        request: &GeometryRequest,
+        observer: &JobObserver,
+    ) -> Result<SurfaceGeometry, Problem> {
+        let fitted = self.surface();
+        let surface = self.made.clone().ok_or_else(Problem::internal)?;
+        let geometry =
+            Geometry::of(&surface, queries, request, observer).map_err(|error| fitted.refused(error))?;
+        Ok(SurfaceGeometry { surface, geometry, stencils: None, request: *request })
+    }
+}
+
+impl SurfaceGeometry {
+    /// The queries without answer or with a flag.
+    pub fn degenerate(&self) -> Vec<Degenerate> {
+        let entry = |d: &Degeneracy| Degenerate {
+            query: d.query,
+            reason: match d.reason {
+                DegeneracyReason::VanishingGradient => DegenerateReason::VanishingGradient,
+                DegeneracyReason::UnaffordableRescue => DegenerateReason::UnaffordableRescue,
+                DegeneracyReason::KernelTooRough => DegenerateReason::KernelTooRough,
+                DegeneracyReason::FarFromCloud => DegenerateReason::FarFromCloud,
+                DegeneracyReason::UnderResolved => DegenerateReason::UnderResolved,
+                DegeneracyReason::AmbiguousSide => DegenerateReason::AmbiguousSide,
+            },
+            gradient_norm: d.gradient_norm,
+        };
+        self.geometry.degenerate().iter().map(entry).collect()
+    }
+
+    /// Flags queries, unless they are flagged already, where what was found of values is doubtful: all of them where nobody can tell.
+    ///
+    /// # Errors
+    /// [`NumericsError::Cancelled`].
+    pub fn flag_uncertain(
+        &self,
+        judged: Result<Vec<usize>, NumericsError>,
+        degenerate: &mut Vec<Degenerate>,
+    ) -> Result<(), NumericsError> {
+        let m = self.geometry.n_queries();
+        let queries = match judged {
+            Err(NumericsError::Cancelled) => return Err(NumericsError::Cancelled),
+            Err(_) => (0..m).collect(),
+            Ok(queries) => queries,
+        };
+        let mut is_flagged = self.geometry.is_null().to_vec();
+        degenerate.iter().for_each(|entry| is_flagged[entry.query] = true);
+        for query in queries {
+            if !std::mem::replace(&mut is_flagged[query], true) {
+                let gradient_norm = self.geometry.gradient_norms()[query];
+                degenerate.push(Degenerate { query, reason: DegenerateReason::Uncertain, gradient_norm });
+            }
+        }
+        degenerate.sort_by_key(|entry| entry.query);
+        Ok(())
+    }
+
+    /// Deviations per query, null where there is no answer, and where those of the surface are not known.
+    pub fn known_per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
+        let is_null: Vec<bool> = match self.geometry.deviations() {
+            None => self.geometry.is_null().to_vec(),
+            Some(known) => {
+                let both = known.is_known.iter().zip(self.geometry.is_null());
+                both.map(|(is_known, is_null)| !is_known || *is_null).collect()
+            }
+        };
+        Array::new(data, shape).with_nulls(0, &is_null)
+    }
+
+    /// Numbers per query, null where there is no answer.
+    pub fn per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
+        Array::new(data, shape).with_nulls(0, self.geometry.is_null())
+    }
+
+    /// The function that serves each query.
+    pub fn surfaces(&self) -> Vec<SurfaceUsed> {
+        let used = |query| match self.geometry.served_by(query) {
+            ServedBy::Signature => SurfaceUsed::Signature,
+            ServedBy::Offset => SurfaceUsed::Offset,
+            ServedBy::Local => SurfaceUsed::Local,
+        };
+        (0..self.geometry.n_queries()).map(used).collect()
+    }
+
+    /// What the answer says of the fit of this surface.
+    pub fn diagnostics(&self, fits: &Fits) -> Diagnostics {
+        let (fitted, m) = (fits.surface(), self.geometry.n_queries());
+        let mut diagnostics = fitted.diagnostics(&Report::of_surface(&self.surface), m);
+        diagnostics.warnings.extend(self.warnings());
+        diagnostics.stencils = self.stencils;
+        diagnostics
+    }
+
+    /// Deviations per query, null where there is no answer or no deviation of it.
+    pub fn deviations(&self) -> Option<DeviationArrays> {
+        let deviations = self.geometry.deviations()?;
+        let (m, k) = (self.geometry.n_queries(), self.geometry.dimension() - 1);
+        let is_null: Vec<bool> = deviations
+            .is_known
+            .iter()
+            .zip(self.geometry.is_null())
+            .map(|(is_known, is_null)| !is_known || *is_null)
+            .collect();
+        let array = |data: &[f64], shape: &[usize]| Array::new(data.to_vec(), shape).with_nulls(0, &is_null);
+        Some(DeviationArrays {
+            normal: array(&deviations.normal, &[m]),
+            principal: array(&deviations.principal, &[m, k]),
+            mean: array(&deviations.mean, &[m]),
+            gaussian: array(&deviations.gaussian, &[m]),
+        })
+    }
+
+    /// What was changed, and what the flags of single queries amount to.
+    fn warnings(&self) -> Vec<Warning> {
+        let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
+        let flagged =
+            |reason| self.geometry.degenerate().iter().filter(|entry| entry.reason == reason).count();
+        let n_offset = (0..m).filter(|&query| self.geometry.served_by(query) == ServedBy::Offset).count();
+        let orientation = self.surface.orientation();
+        let is_laplace = self.surface.signature().is_some_and(is_laplace);
+        let too_rough = if is_laplace { LAPLACE_TOO_ROUGH } else { KERNEL_TOO_ROUGH };
+        let disagrees = if self.request.checks_curvatures { DISAGREES } else { UNCERTAIN };
+        let counted = [
+            (n_offset, WarningCode::OffsetModelUsed, "served by the offset model"),
+            (flagged(DegeneracyReason::KernelTooRough), WarningCode::KernelTooRough, too_rough),
+            (flagged(DegeneracyReason::UnderResolved), WarningCode::DisagreesWithNeighbours, disagrees),
+            (flagged(DegeneracyReason::FarFromCloud), WarningCode::FarFromCloud, FAR),
+        ];
+        let counted = counted.into_iter().filter(|(count, ..)| *count > 0);
+        let mut warnings: Vec<Warning> = counted
+            .map(|(count, code, what)| Warning { code, detail: format!("{what} (queries: {count} of {m})") })
+            .collect();
+        if self.request.orientation == Orientation::Gradient {
+            return warnings;
+        }
+        if orientation.n_flipped > 0 {
+            let detail = format!("the gradient pointed inward at {} of {n} points", orientation.n_flipped);
+            warnings.push(Warning { code: WarningCode::OrientationRepaired, detail });
+        }
+        if orientation.is_open && !orientation.is_given {
+            warnings.push(Warning { code: WarningCode::OpenCloud, detail: OPEN_CLOUD.to_owned() });
+        }
+        warnings
+    }
+}
+
+fn is_laplace(signature: &Interpolant) -> bool {
+    matches!(signature.solver.kernel().family(), Family::Laplace { .. })
+}
+
+const LAPLACE_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; raise epsilon until sqrt(epsilon)·length_scale is twice the spacing";
+const KERNEL_TOO_ROUGH: &str = "curvatures see the cusp of the kernel at the points; take a smoother kernel";
+const DISAGREES: &str = "curvatures are not confirmed by the points around them; see degenerate";
+const UNCERTAIN: &str = "normals are uncertain by 17 degrees and more; see degenerate";
+const FAR: &str = "farther from the cloud than three spacings";
+const OPEN_CLOUD: &str =
+    "the cloud has a rim, so that outward has no meaning; the side is that of most gradients";
