@@ -74,8 +74,8 @@ fn by_family(set: InstructionSet) {
     }
 }
 
-/// Prints rates by dimension. An operation is a multiplication or an addition for one pair, those
-/// of the profile not counted.
+/// Prints rates by dimension. Operations are the multiplications and additions for one pair. Those of
+/// the profile are not counted.
 fn by_dimension() {
     println!("\n{:28} {:>10} {:>10} {:>10}", "gauss, best set", "value", "Hessian", "G flop/s");
     for d in [1, 2, 3, 4, 6, 8, 16] {

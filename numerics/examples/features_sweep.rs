@@ -1,9 +1,10 @@
 //! Prints a table of docs/error-bars.md: coverage of posterior bands with default parameters, for fields that
 //! are local, rough, in many dimensions, or drowned in noise.
 //!
-//! `cargo run --release --example features_sweep [seeds] [only]
-//! [full]`, 10 seeds by default. `only` is a part of the names of rows. `full` adds a comparison with the
-//! likelihood of all values where there are at most 1,000. It takes some minutes.
+//! `cargo run --release --example features_sweep [seeds] [only] [full]`.
+//!
+//! 10 seeds by default. `only` is a part of the names of rows. `full` adds a comparison with the likelihood
+//! of all values where there are at most 1,000. It takes some minutes.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

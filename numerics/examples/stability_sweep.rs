@@ -1,9 +1,8 @@
 //! Writes sparse Laplace–Beltrami operators of random clouds and of the bunny. examples/rightmost.py prints
 //! their rightmost eigenvalues: the tables of docs/numerics.md.
 //!
-//! `cargo run --release --example stability_sweep FOLDER [seeds] [points] && python3
-//! numerics/examples/rightmost.py FOLDER`, by default 20 seeds and 1,000 points.
-//! Python needs NumPy and SciPy.
+//! `cargo run --release --example stability_sweep FOLDER [seeds] [points]`, by default 20 seeds and 1,000
+//! points. Then `python3 numerics/examples/rightmost.py FOLDER`, which needs NumPy and SciPy.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -93,8 +93,8 @@ pub fn square_grid(side: usize) -> Cloud {
     Cloud::new((0..side * side).flat_map(|i| [at(i % side), at(i / side)]).collect(), 2).unwrap()
 }
 
-/// A point of the paper's closed curve `(sin t, sin³t + ½ cos t)`, which has four inflections, and the
-/// outward direction there, not of length 1. The curve runs clockwise, so outward is left of the tangent.
+/// A point of the paper's closed curve `(sin t, sin³t + ½ cos t)`, and the outward direction there, not of
+/// length 1. The curve has four inflections. It runs clockwise, so outward is left of the tangent.
 pub fn closed_curve_point(t: f64) -> ([f64; 2], [f64; 2]) {
     let (sin, cos) = t.sin_cos();
     ([sin, sin.powi(3) + 0.5 * cos], [-(3.0 * sin * sin * cos - 0.5 * sin), cos])

@@ -92,7 +92,7 @@ fn any_unit_from_a_millionth_to_a_million_changes_rounding_alone() {
     let (points, queries) = (fibonacci_sphere(N), around_sphere(15, 7));
     let values = waves(&points);
     // With α = 1e-6 the condition is at most ‖K‖₁/α = 1e8. Rounding of the coordinates moves entries of K by
-    // a few ε, weights by n ε times the condition, and sums over them by no more. Derivatives lose two
+    // a few ε. Weights move by n ε times the condition, and sums over them by no more. Derivatives lose two
     // further digits, hence the factor 100.
     for (family, length_scale, alpha) in cases().filter(|case| case.2 > 0.0) {
         let expected = answers(&points, &queries, kernel(family, length_scale), alpha, &values);

@@ -60,7 +60,7 @@ fn drawn(shape: Shape, n: usize, share: &dyn Fn(&[f64; 3]) -> f64, random: &mut 
     points
 }
 
-/// At least n of the points, with the largest distance between any two that still leaves so many.
+/// A choice of at least n of the points, as far apart from one another as that allows.
 fn keep_apart(points: &[[f64; 3]], n: usize) -> Vec<[f64; 3]> {
     let (mut near, mut far) = (0.0, 4.0);
     let mut kept = points.to_vec();

@@ -56,8 +56,9 @@ mod tests {
         }
     }
 
-    /// The reach of analytic continuation depends on the precision of the data. A precision of 1e-10 (α =
-    /// 1e-10) instead of rounding costs a quarter of the angle. The bounds leave as much to other roundings.
+    /// The reach of analytic continuation depends on the precision of the data. It loses a
+    /// quarter of its angle if α = 1e-10 limits the precision instead of rounding. The bounds
+    /// leave as much to other roundings.
     #[test]
     fn level_1_continues_the_ellipse_beyond_the_points_and_further_from_more_of_them() {
         let continued: Vec<f64> = table().rows.iter().map(|row| row.ours()[1]).collect();

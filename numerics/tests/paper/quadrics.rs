@@ -2,8 +2,8 @@
 //! origin, α = 1e-10.
 //!
 //! Curvatures are for ν = +∇u/|∇u|, as in the paper: a and −b. For a = b the symmetry leaves the signature
-//! function no gradient at the origin. The paper divides by its rounding. The library answers null by the
-//! signature function alone, and by the offset model where that is allowed.
+//! function no gradient at the origin. The paper divides by its rounding. The library answers null if it may
+//! use only the signature function, and otherwise asks the offset model.
 
 use super::errors::medians;
 use super::random::Random;

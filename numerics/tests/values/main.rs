@@ -82,8 +82,8 @@ fn sensors_have_posteriors_whose_bands_cover() {
 
 #[test]
 fn what_is_local_or_drowned_in_noise_is_learned() {
-    // Two former faults: of 256 values the bump was taken for noise, and 6 % of it covered. With noise beyond
-    // the field, no kernel of less variance than the values was considered.
+    // The cases guard against two former faults. From 256 values the bump was taken for noise, and 6 % of it
+    // was covered. With noise beyond the field, no kernel of less variance than the values was considered.
     let cases = [
         (Feature::Bump(0.03), 2000, 0.01),
         (Feature::Bump(0.05), 1000, 0.01),
@@ -137,8 +137,8 @@ fn operators_that_are_off_by_half_are_flagged_whatever_the_kernel() {
                 "noise {noise}: {all:?}"
             );
         }
-        // Flagging everything would pass the assertion above. Without noise a quarter of all answers has no
-        // flag, although a torus of 250 points has none such.
+        // Flagging everything would pass the assertion above. Without noise a quarter of all answers is
+        // served without a flag, although none on a torus of 250 points is.
         assert!(noise > 0.0 || all.n_unflagged[1] * 5 > all.n[1], "{all:?}");
     }
 }

@@ -18,10 +18,10 @@ from scipy.sparse import csr_matrix
 
 import gramian
 import gramian.dask
-from gramian.dask.cut import Cut
-from gramian.dask.parts import Part, Reach, join, look, rim, split
+from gramian.dask.cells.cut import Cut
+from gramian.dask.cells.parts import Part, Reach, join, look, rim, split
+from gramian.dask.cells.thinning import distinct, thinned
 from gramian.dask.replicas import Replicas
-from gramian.dask.thinning import distinct, thinned
 from gramian.dask.tile import assemble
 from gramian.wire.tensors import Array
 

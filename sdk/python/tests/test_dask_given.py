@@ -12,8 +12,9 @@ import pytest
 
 import gramian
 import gramian.dask
-from gramian.dask import parts, plan, replicas
-from gramian.dask.parts import Part, Reach, nearest
+from gramian.dask import replicas
+from gramian.dask.cells import parts, plan
+from gramian.dask.cells.parts import Part, Reach, nearest
 from gramian.dask.requests import OTHER_HYPERPARAMETERS
 from gramian.wire.tensors import Array
 

@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 import gramian
 import gramian.dask
-from gramian.dask.cut import Ints
-from gramian.dask.measures import Truths
-from gramian.dask.regions import Regions
-from gramian.dask.signs import joined
+from gramian.dask.cells.cut import Ints
+from gramian.dask.orientation.measures import Truths
+from gramian.dask.orientation.regions import Regions
+from gramian.dask.orientation.signs import joined
 from gramian.wire.tensors import Array
 
 
@@ -88,7 +88,7 @@ def test_small_pieces_have_the_side_of_their_volume(
 ) -> None:
     points, outward = grains(90, per_axis=4)
     for limit in ("MAX_COARSE", "LEAST_COARSE"):
-        monkeypatch.setattr(f"gramian.dask.thinning.{limit}", 192)  # three points of each
+        monkeypatch.setattr(f"gramian.dask.cells.thinning.{limit}", 192)  # three points of each
     (found,) = dask.compute(service.tiles(points, n_tiles=3).normals())
     cosines = (found.normals * outward).sum(axis=1)
     assert np.count_nonzero(cosines < 0) == 0

@@ -17,7 +17,7 @@ use crate::http::serve::fitted::Fits;
 use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
-use crate::http::wire::read::members::{present, present_word, present_words};
+use crate::http::wire::read::members::{present, present_unless_empty, present_word, present_words};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
@@ -46,8 +46,8 @@ request! {
         /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
         /// 191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
         /// learn the same.
-        #[serde(default, deserialize_with = "present")]
-        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1, max_items = 192)]
+        #[serde(default, deserialize_with = "present_unless_empty")]
+        #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
     }
 }

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from ..arguments.fit import OperatorFit, operator_fit_used
-from .sparse import csr_matrices
 from ..rest.models import Degenerate, Diagnostics
 from ..wire.tensors import Array, Members
 from .answer import Answer
+from .sparse import csr_matrices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

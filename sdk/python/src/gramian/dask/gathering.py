@@ -13,7 +13,7 @@ import numpy as np
 from dask.base import tokenize
 from scipy.sparse import csr_matrix, vstack
 
-from .graph import many
+from .cells.graph import many
 from .requests import Rows
 
 

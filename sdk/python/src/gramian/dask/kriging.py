@@ -13,7 +13,7 @@ from ..client import Client
 from ..rest.models import KernelUsed
 from ..rest.types import Unset
 from ..wire.tensors import Array
-from .parts import Part, Reach, join
+from .cells.parts import Part, Reach, join
 from .replicas import Replicas
 from .requests import Rows
 

@@ -13,10 +13,10 @@ from ..answers import Curvatures, Normals
 from ..client import Client
 from ..rest.models import Degenerate
 from ..wire.tensors import Array
-from .cut import Ints
+from .cells.cut import Ints
+from .orientation.signs import Sides
 from .replicas import Replicas
 from .settling import Settled
-from .signs import Sides
 
 Rows: TypeAlias = dict[str, Any]
 """Arrays by name with a row for each of `index`, the rows of a cloud or of queries, ascending."""

@@ -11,12 +11,12 @@ import dask.array as da
 import numpy as np
 from scipy.spatial import cKDTree
 
-from . import graph
-from .parts import Part, Reach, join
-from .plan import PROBE_POINTS, REGRESSED, Plan
+from .cells import graph
+from .cells.parts import Part, Reach, join
+from .cells.plan import PROBE_POINTS, REGRESSED, Plan
+from .orientation.signs import joined
 from .replicas import Replicas
 from .settling import Learned, Learning, Settled, learn, orient, settle
-from .signs import joined
 from .tile import assemble
 
 AROUND = {2: 24, 3: 48, 4: 96}

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ..arguments.keywords import suggest_names
 from ..client import DEFAULT_URL
-from . import graph
+from .cells import graph
 from .replicas import Replicas
 from .tiles import Tiles
 

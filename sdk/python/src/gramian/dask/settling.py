@@ -17,11 +17,11 @@ from ..arguments.fit import Fit, Kernel
 from ..client import Client
 from ..cloud import Cloud
 from ..wire.tensors import Array
-from .cut import Ints
-from .parts import Part
-from .regions import Regions
+from .cells.cut import Ints
+from .cells.parts import Part
+from .cells.thinning import scales
+from .orientation.regions import Regions
 from .replicas import Replicas
-from .thinning import scales
 from .tile import Tile, widened
 
 SAME = 1e-6

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..wire.tensors import Array
-from .cut import Ints
-from .parts import Part, join
+from .cells.cut import Ints
+from .cells.parts import Part, join
 
 
 @dataclass(frozen=True)

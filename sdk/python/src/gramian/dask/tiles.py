@@ -11,9 +11,10 @@ from scipy.sparse import csr_matrix
 from ..arguments.fit import KernelLike, Mean, Number, ValuesFit
 from ..arguments.keywords import suggest_names
 from ..wire.tensors import Array
-from . import answers, graph, kriging, parts, requests
+from . import answers, kriging, requests
+from .cells import graph, parts
+from .cells.plan import Plan
 from .gathering import gathered
-from .plan import Plan
 from .replicas import Replicas
 from .sampled import SurfaceTiles
 

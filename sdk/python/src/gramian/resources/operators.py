@@ -14,11 +14,11 @@ from ..answers import (
     SurfaceGradientMatrix,
     SurfaceGradientSparseMatrix,
 )
+from ..answers.sparse import require_scipy
 from ..arguments.fit import Deviations, Duplicates, GeometryLike, KernelLike, Mean, Number, Solver
 from ..arguments.keywords import suggest_names
 from ..arguments.normalise import GEOMETRIC, with_deviations
 from ..arguments.registration import RegisteredCloud
-from ..answers.sparse import require_scipy
 
 
 @suggest_names

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from ..wire.tensors import Array
-from .cut import Ints
+from ...wire.tensors import Array
+from ..cells.cut import Ints
 
 Truths = npt.NDArray[np.bool_]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..wire.tensors import Array
+from ...wire.tensors import Array
 
 Ints = npt.NDArray[np.int64]
 

@@ -12,10 +12,10 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..wire.tensors import Array
-from .cut import Ints
+from ...wire.tensors import Array
+from ..cells.cut import Ints
+from ..cells.thinning import distinct
 from .measures import SPACING_NEIGHBOURS, Measures, sums
-from .thinning import distinct
 
 SAYS_SIGN = 0.2
 SAME_REGION = 0.7

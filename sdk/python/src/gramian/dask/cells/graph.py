@@ -15,8 +15,8 @@ from dask.base import tokenize
 from dask.delayed import Delayed
 from dask.highlevelgraph import HighLevelGraph
 
-from ..arguments.arrays import as_array, as_block
-from ..wire.tensors import Array
+from ...arguments.arrays import as_array, as_block
+from ...wire.tensors import Array
 from . import parts
 from .plan import Plan, blocks_of
 

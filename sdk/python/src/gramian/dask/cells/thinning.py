@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..wire.tensors import Array
+from ...wire.tensors import Array
 from .cut import Ints
 
 # As the service has them: numerics/src/points/thinning.rs.

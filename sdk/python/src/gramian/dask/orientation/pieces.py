@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..wire.tensors import Array
-from .cut import Ints
+from ...wire.tensors import Array
+from ..cells.cut import Ints
+from ..cells.plan import REGRESSED
 from .measures import Measures, Truths, means, sums
-from .plan import REGRESSED
 
 UNANIMITY = 0.95
 BULKY = 0.1

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..wire.tensors import Array
+from ...wire.tensors import Array
 from .cut import Cut, Ints
 from .thinning import distinct
 

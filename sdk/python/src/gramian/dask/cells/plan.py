@@ -9,7 +9,7 @@ import dask
 import dask.array as da
 import numpy as np
 
-from ..wire.tensors import Array
+from ...wire.tensors import Array
 from .cut import Cut, Ints
 from .parts import Part, Reach, join, nearest
 from .thinning import distinct, n_coarse, thinned

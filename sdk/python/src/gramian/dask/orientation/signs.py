@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
-from ..wire.tensors import Array
-from .cut import Ints
+from ...wire.tensors import Array
+from ..cells.cut import Ints
 from .measures import Measures, Truths, sums
 from .pieces import Pieces
 from .regions import Regions, graph_of
