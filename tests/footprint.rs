@@ -15,11 +15,11 @@ use gramian::store::prepared::{PreparedBytes, PreparedFit, PreparedStore};
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
+use gramian_numerics::model::price::system_price;
 use gramian_numerics::model::{Model, Recipe};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
-use gramian_numerics::solver::choose::choose;
 use gramian_numerics::solver::{Solution, Solver, System};
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
@@ -134,14 +134,13 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
             .unwrap();
         Ok(PreparedFit::new(Model::System(Arc::new(factor)), Duration::ZERO, Duration::ZERO, memory))
     };
-    let memory =
-        store.reserve(OWNER, choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
+    let memory = store.reserve(OWNER, system_price(n, 3).expected.n_bytes, || true).await.unwrap().unwrap();
     let (stored, _) = store.get_or_prepare(key, Some(memory), factorize).await.unwrap().unwrap();
     if with_surface {
         let factor = stored.model().solver().unwrap().clone();
         let make = |memory| async move { Ok((fits::surface(&factor), memory)) };
         let memory =
-            store.reserve(OWNER, choose(n, 3, usize::MAX).surface.n_bytes, || true).await.unwrap().unwrap();
+            store.reserve(OWNER, system_price(n, 3).surface.n_bytes, || true).await.unwrap().unwrap();
         let surface = store.get_or_make_surface(key, &stored, Some(memory), make).await.unwrap().unwrap();
         Geometry::of(&surface, surface.cloud(), &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     }

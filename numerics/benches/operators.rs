@@ -24,7 +24,7 @@ use gramian_numerics::solver::{Solver, System};
 use gramian_numerics::sums::jets::{JetOrder, Jets};
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::operators::laplace_beltrami_matrix;
+use gramian_numerics::surface::operators::Operator;
 use support::common::clouds::{fibonacci_sphere, turned_fibonacci_sphere};
 use support::common::fits;
 use support::{ROUNDS, Times, measure, size_argument, timed};
@@ -75,7 +75,7 @@ fn factorize(cloud: &Arc<Cloud>) -> Solver {
 fn laplace_beltrami(factor: &Arc<Solver>) -> Vec<f64> {
     let request = GeometryRequest { max_offsets: 0, ..GeometryRequest::CURVATURES };
     let geometry = Geometry::of(&fits::surface(factor), factor.cloud(), &request, &Unobserved).unwrap();
-    laplace_beltrami_matrix(&geometry, factor, factor.cloud(), Mean::Zero, &Unobserved).unwrap()
+    Operator::LaplaceBeltrami.matrix(&geometry, factor, factor.cloud(), Mean::Zero, &Unobserved).unwrap()
 }
 
 /// The time of one fused pass over n points at n queries.

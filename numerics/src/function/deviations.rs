@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use super::functionals::{FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance};
+use super::functionals::{JetFunctional, deviations, has_variance};
 use super::interpolant::Interpolant;
+use super::price::COLUMNS_AT_ONCE;
 use crate::error::NumericsError;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -45,7 +46,7 @@ impl JetDeviations {
         }
         let (m, d) = (queries.n_points(), queries.dimension());
         let width = width(d, order);
-        let per_block = (FUNCTIONALS_PER_BLOCK / width).max(1);
+        let per_block = (COLUMNS_AT_ONCE / width).max(1);
         let (mut all, mut clamped) = (Vec::with_capacity(m * width), Vec::new());
         for first in (0..m).step_by(per_block) {
             let functionals = functionals(first..(first + per_block).min(m), d, order);

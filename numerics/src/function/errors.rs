@@ -15,10 +15,12 @@ use crate::kernel::Kernel;
 use crate::machine::vector::dot;
 use crate::observer::{Observer, Stage};
 use crate::points::cloud::Cloud;
-use crate::solver::choose::JUDGED_AT_ONCE;
 use crate::solver::trend::Trend;
 use crate::sums::many::values_of_each;
 use crate::sums::regularization::Regularization;
+
+/// Functionals whose weights, covariances and images are held at once: a pass over all pairs for each block.
+pub(super) const JUDGED_AT_ONCE: usize = 64;
 
 /// The process that values come from: covariance, noise and mean.
 ///

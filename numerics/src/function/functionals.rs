@@ -9,6 +9,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::mean_variance::MeanVariance;
+use super::price::COLUMNS_AT_ONCE;
 use crate::error::NumericsError;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};
@@ -20,9 +21,6 @@ use crate::solver::trend::{Basis, Trend};
 use crate::solver::{Solution, Solver};
 use crate::sums::jets::check_smooth_at;
 use crate::sums::nodes::Nodes;
-
-/// Functionals whose columns `L⁻¹Fk(X)` are held at once.
-pub(crate) const FUNCTIONALS_PER_BLOCK: usize = 512;
 
 /// The functional `c u + g·∇u + A : D²u` at a query.
 #[derive(Debug, Clone)]
@@ -210,9 +208,9 @@ pub(crate) fn deviations(
     }
     let covariances = Covariant::of(solver.cloud(), kernel);
     let of_mean = solution.trend.as_ref().map(|trend| MeanVariance::of(solver, trend)).transpose()?;
-    let mut buffer = vec![0.0; n * FUNCTIONALS_PER_BLOCK.min(functionals.len())];
+    let mut buffer = vec![0.0; n * COLUMNS_AT_ONCE.min(functionals.len())];
     let (mut found, mut clamped) = (Vec::with_capacity(functionals.len()), Vec::new());
-    for block in functionals.chunks(FUNCTIONALS_PER_BLOCK) {
+    for block in functionals.chunks(COLUMNS_AT_ONCE) {
         observer.checkpoint()?;
         // Normalised so that squares do not overflow.
         let sizes: Vec<f64> = block.iter().map(|functional| functional.size(kernel)).collect();

@@ -9,6 +9,7 @@ mod mean_variance;
 pub mod moving;
 mod pivoted_root;
 pub mod posterior;
+pub mod price;
 pub mod samples;
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use faer::{Accum, ColRef, MatMut, MatRef};
 use rayon::prelude::*;
 
 use super::mean_variance::MeanVariance;
+use super::price::COLUMNS_AT_ONCE;
 use crate::error::{NotDefinite, NumericsError};
 use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};
@@ -17,11 +18,6 @@ use crate::solver::{Solution, Solver};
 use crate::sums::gram::{fill_cross_gram, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
-
-/// Queries whose columns `L⁻¹k(X, q)` are held at once.
-///
-/// Blocks bound the memory to n × 512 numbers, and are wide enough for solves to run as matrix products.
-const QUERIES_PER_BLOCK: usize = 512;
 
 /// Posterior variances of the latent function, and the queries whose variance was clamped to 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,9 +85,9 @@ pub fn variances_with_mean(
     let k0 = solver.kernel().at_zero();
     let nodes = Nodes::of(solver.cloud());
     let of_mean = trend.map(|trend| MeanVariance::of(solver, trend)).transpose()?;
-    let mut buffer = vec![0.0; n * QUERIES_PER_BLOCK.min(queries.n_points())];
+    let mut buffer = vec![0.0; n * COLUMNS_AT_ONCE.min(queries.n_points())];
     let mut variances = Variances { latent: Vec::with_capacity(queries.n_points()), clamped: Vec::new() };
-    for rows in queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension()) {
+    for rows in queries.coordinates().chunks(COLUMNS_AT_ONCE * queries.dimension()) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
         let columns = &mut buffer[..n * block.n_points()];
         whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
@@ -144,8 +140,8 @@ pub fn covariance_with_mean(
     solver.cloud().check_same_dimension(queries)?;
     let nodes = Nodes::of(solver.cloud());
     let mut v = vec![0.0; n * m];
-    let rows = queries.coordinates().chunks(QUERIES_PER_BLOCK * queries.dimension());
-    for (rows, columns) in rows.zip(v.chunks_mut(QUERIES_PER_BLOCK * n)) {
+    let rows = queries.coordinates().chunks(COLUMNS_AT_ONCE * queries.dimension());
+    for (rows, columns) in rows.zip(v.chunks_mut(COLUMNS_AT_ONCE * n)) {
         let block = Cloud::new(rows.to_vec(), queries.dimension())?;
         whitened_cross_gram(solver, &nodes, &block, columns, observer)?;
     }
@@ -154,9 +150,9 @@ pub fn covariance_with_mean(
     fill_lower_gram(queries, solver.kernel(), &Regularization::Uniform(0.0), &mut covariance, m, observer)?;
     let v = MatRef::from_column_major_slice(&v, n, m);
     let mut lower = MatMut::from_column_major_slice_mut(&mut covariance, m, m);
-    for first in (0..m).step_by(QUERIES_PER_BLOCK) {
+    for first in (0..m).step_by(COLUMNS_AT_ONCE) {
         observer.checkpoint()?;
-        let width = QUERIES_PER_BLOCK.min(m - first);
+        let width = COLUMNS_AT_ONCE.min(m - first);
         let (rows, columns) = (v.subcols(first, m - first), v.subcols(first, width));
         let block = lower.as_mut().submatrix_mut(first, first, m - first, width);
         let par = parallelism((2 * n * width * (m - first)) as f64);

@@ -4,6 +4,7 @@ pub mod heap;
 pub mod instruction_set;
 pub mod normal;
 pub mod pages;
+pub mod price;
 
 pub(crate) mod eigen;
 pub(crate) mod exp;

@@ -4,6 +4,7 @@
 //! ready. All that depends on which solver it is stands in this folder, so a new solver is a variant of both enums, and an arm in
 //! each verb. A verb that a solver lacks refuses with [`NumericsError::Unsupported`].
 
+pub mod choose;
 mod making;
 pub mod price;
 mod process;

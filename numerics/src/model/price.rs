@@ -1,11 +1,16 @@
-//! Prices of what a model is asked, by the solver that it will have: known before anything is made.
+//! Prices of a model, and of what it is asked, by the solver that it will have: known before anything is made.
 
+use super::Recipe;
 use crate::error::SolverKind;
-use crate::solver::choose::{
-    Asked, AskedOfSurface, Price, deviations_price, judging_price, kriged_operator_price, many_price,
-    samples_price, work_price,
-};
+use crate::function::moving::price::{kriged_operator_price, kriging_price, making_price};
+use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
+use crate::machine::price::{Price, Sizes};
+use crate::solver::price::FactorPrice;
 use crate::surface::operators::JUDGED_FUNCTIONALS;
+use crate::surface::operators::price::applied_price;
+use crate::surface::price::{
+    self as surfaces, AskedOfSurface, local_geometry_price, local_surface_price, signature_surface_price,
+};
 
 /// A cloud that is fitted.
 #[derive(Debug, Clone, Copy)]
@@ -16,12 +21,41 @@ pub struct CloudSize {
     pub is_merged: bool,
 }
 
-/// A cloud and the queries over it.
-#[derive(Debug, Clone, Copy)]
-pub struct Sizes {
-    pub n_points: usize,
-    pub n_queries: usize,
-    pub dimension: usize,
+/// What making a model and its surface ready takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MakingPrice {
+    /// The price of the model as nearly always; `usize::MAX` bytes for what cannot be counted.
+    pub expected: Price,
+    /// The price of the model at most.
+    pub at_most: Price,
+    /// The price of the surface with its quadrics and normals.
+    pub surface: Price,
+}
+
+impl Recipe {
+    /// The price of making the model and its surface ready.
+    pub fn price(&self, size: CloudSize) -> MakingPrice {
+        let CloudSize { n_points, dimension, is_merged } = size;
+        match self {
+            Self::System { .. } => system_price(n_points, dimension),
+            Self::LocalKriging { kernel, .. } => {
+                let price = making_price(n_points, dimension, is_merged, kernel.is_stretched());
+                MakingPrice { expected: price, at_most: price, surface: Price::default() }
+            }
+            Self::LocalSurface { .. } => {
+                // A trifle, but something: what takes nothing is not missing.
+                let trifle = Price { n_bytes: 1 << 10, flops: 0.0 };
+                let surface = local_surface_price(n_points, dimension);
+                MakingPrice { expected: trifle, at_most: trifle, surface }
+            }
+        }
+    }
+}
+
+/// The price of a dense factorization and of the surface of its signature function.
+pub fn system_price(n_points: usize, dimension: usize) -> MakingPrice {
+    let FactorPrice { expected, at_most } = FactorPrice::of(n_points, dimension);
+    MakingPrice { expected, at_most, surface: signature_surface_price(n_points, dimension) }
 }
 
 /// A posterior of k lists of values.
@@ -48,25 +82,11 @@ pub struct OperatorAsked {
     pub has_deviations: bool,
 }
 
-impl Sizes {
-    fn price(self, asked: Asked) -> Price {
-        work_price(asked, self.n_points, self.n_queries, self.dimension)
-    }
-
-    /// Deviations of so many functionals at each query.
-    fn deviations(self, per_query: usize) -> Price {
-        if per_query == 0 {
-            return Price::default();
-        }
-        deviations_price(self.n_points, self.n_queries.saturating_mul(per_query), self.dimension)
-    }
-}
-
 /// The price of a function with derivatives up to an order, and so many deviations, at queries.
 pub fn function_price(solver: SolverKind, order: usize, n_deviations: usize, sizes: Sizes) -> Price {
     match solver {
-        SolverKind::Local => sizes.price(Asked::Moving { n_deviations }),
-        SolverKind::Dense => sizes.price(Asked::Function { order }).and(sizes.deviations(n_deviations)),
+        SolverKind::Local => kriging_price(n_deviations, sizes),
+        SolverKind::Dense => functions::function_price(order, sizes).and(of_deviations(n_deviations, sizes)),
     }
 }
 
@@ -74,46 +94,110 @@ pub fn function_price(solver: SolverKind, order: usize, n_deviations: usize, siz
 pub fn posterior_price(solver: SolverKind, asked: PosteriorAsked, sizes: Sizes) -> Price {
     let PosteriorAsked { has_variances, has_covariance, n_lists, n_deviations, .. } = asked;
     if solver == SolverKind::Local {
-        return sizes.price(Asked::Moving { n_deviations });
+        return kriging_price(n_deviations, sizes);
     }
-    let Sizes { n_points, n_queries, .. } = sizes;
-    let mut price = sizes.price(Asked::Posterior { variances: has_variances, covariance: has_covariance });
+    let mut price = functions::posterior_price(has_variances, has_covariance, sizes);
     if n_lists > 1 {
-        price = price.and(many_price(n_points, n_queries, n_lists, asked.n_derivatives));
+        price = price.and(many_price(n_lists, asked.n_derivatives, sizes));
     }
-    price = price.and(sizes.deviations(n_deviations));
+    price = price.and(of_deviations(n_deviations, sizes));
     if asked.n_samples > 0 {
-        price = price.and(samples_price(n_queries, asked.n_samples.saturating_mul(n_lists)));
+        price = price.and(samples_price(sizes.n_queries, asked.n_samples.saturating_mul(n_lists)));
     }
     price
 }
 
+/// The price of deviations of so many functionals at each query.
+fn of_deviations(per_query: usize, sizes: Sizes) -> Price {
+    let Sizes { n_points, n_queries, dimension } = sizes;
+    match per_query {
+        0 => Price::default(),
+        _ => deviations_price(n_points, n_queries.saturating_mul(per_query), dimension),
+    }
+}
+
 /// The price of normals or curvatures at queries.
 pub fn geometry_price(surface: SolverKind, asked: AskedOfSurface, sizes: Sizes) -> Price {
-    sizes.price(match surface {
-        SolverKind::Local => Asked::LocalGeometry,
-        SolverKind::Dense => Asked::Geometry(asked),
-    })
+    match surface {
+        SolverKind::Local => local_geometry_price(sizes),
+        SolverKind::Dense => surfaces::geometry_price(asked, sizes),
+    }
 }
 
 /// The price of an operator applied to values by one solver on a surface by another.
 pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAsked, sizes: Sizes) -> Price {
-    let Sizes { n_points, n_queries, dimension } = sizes;
     let OperatorAsked { n_surface_points, n_numbers, .. } = asked;
     match values {
         SolverKind::Local => {
-            let geometry =
-                geometry_price(surface, asked.surface, Sizes { n_points: n_surface_points, ..sizes });
-            geometry.and(kriged_operator_price(n_points, n_queries, dimension))
+            let of_surface = Sizes { n_points: n_surface_points, ..sizes };
+            geometry_price(surface, asked.surface, of_surface).and(kriged_operator_price(sizes))
         }
         SolverKind::Dense => {
-            let applied = sizes.price(Asked::Operator { n_surface_points, surface: asked.surface });
-            let n_judged = n_numbers.min(JUDGED_FUNCTIONALS);
-            let price = applied.and(judging_price((n_points, dimension), n_queries, n_judged));
-            if asked.has_deviations {
-                price.and(deviations_price(n_points, n_numbers, dimension))
-            } else {
-                price
+            let applied = applied_price(n_surface_points, asked.surface, sizes);
+            let price = applied.and(judging_price(n_numbers.min(JUDGED_FUNCTIONALS), sizes));
+            match asked.has_deviations {
+                true => price.and(deviations_price(sizes.n_points, n_numbers, sizes.dimension)),
+                false => price,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::operators::price::matrix_price;
+    use crate::surface::price::Offsets;
+
+    #[test]
+    fn a_matrix_takes_half_its_square_and_the_fallback_all_of_it() {
+        let price = system_price(20_000, 3);
+        let square = 20_000usize.pow(2) * 8;
+        assert!((square / 2..square * 52 / 100).contains(&price.expected.n_bytes), "{price:?}");
+        assert!((square..square * 101 / 100).contains(&price.at_most.n_bytes));
+        assert!((price.expected.flops - 8e12 / 3.0).abs() < 1e3);
+        assert!(price.at_most.flops > price.expected.flops);
+    }
+
+    #[test]
+    fn what_cannot_be_counted_costs_everything() {
+        assert_eq!(system_price(usize::MAX / 2, 3).at_most.n_bytes, usize::MAX);
+        let sizes = Sizes { n_points: 1 << 40, n_queries: 1 << 40, dimension: 3 };
+        assert_eq!(functions::posterior_price(true, true, sizes).n_bytes, usize::MAX);
+    }
+
+    #[test]
+    fn more_of_anything_never_costs_less() {
+        let surface = |offsets| AskedOfSurface { offsets, has_own_quadrics: true, has_deviations: true };
+        let all = |n: usize, dimension: usize| {
+            let sizes = Sizes { n_points: n, n_queries: n, dimension };
+            let geometry = |offsets| surfaces::geometry_price(surface(offsets), sizes);
+            [
+                functions::function_price(0, sizes),
+                functions::function_price(2, sizes),
+                functions::posterior_price(false, false, sizes),
+                functions::posterior_price(true, false, sizes),
+                functions::posterior_price(true, true, sizes),
+                kriging_price(0, sizes),
+                kriging_price(10, sizes),
+                geometry(Offsets::Rescues),
+                geometry(Offsets::Confirmations),
+                geometry(Offsets::Everywhere),
+                applied_price(n, surface(Offsets::Confirmations), sizes),
+                matrix_price(n, n, surface(Offsets::Confirmations), sizes),
+                system_price(n, dimension).expected,
+                system_price(n, dimension).surface,
+            ]
+        };
+        let sizes = [1, 10, 600, 30_000];
+        for (few, many) in sizes.iter().zip(&sizes[1..]) {
+            for d in [1, 3, 16] {
+                for (at, (small, large)) in all(*few, d).iter().zip(&all(*many, d)).enumerate() {
+                    assert!(
+                        small.flops < large.flops && small.n_bytes < large.n_bytes,
+                        "price {at}, d = {d}"
+                    );
+                }
             }
         }
     }

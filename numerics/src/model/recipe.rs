@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use super::price;
 use crate::error::{NumericsError, SolverKind};
 use crate::kernel::Kernel;
 use crate::points::cloud::Cloud;
 use crate::solver::System;
-use crate::solver::choose::{Choice, choose, choose_local, choose_moving};
 use crate::sums::regularization::Regularization;
 
 /// How a fit is served. Equal recipes over equal clouds give equal models.
@@ -58,18 +56,6 @@ impl Recipe {
     /// Whether values are seen a neighbourhood at a time, never all at once.
     pub fn is_kriged_locally(&self) -> bool {
         matches!(self, Self::LocalKriging { .. })
-    }
-
-    /// The price of making the model and its surface ready for n points in d dimensions, within so many bytes of memory.
-    pub fn price(&self, size: price::CloudSize, memory: usize) -> Choice {
-        let price::CloudSize { n_points, dimension, is_merged } = size;
-        match self {
-            Self::System { .. } => choose(n_points, dimension, memory),
-            Self::LocalKriging { kernel, .. } => {
-                choose_moving(n_points, dimension, is_merged, kernel.is_stretched())
-            }
-            Self::LocalSurface { .. } => choose_local(n_points, dimension),
-        }
     }
 
     /// The system over a cloud whose factor can be kept and read again; `None` where nothing is factorized.

@@ -12,6 +12,7 @@ mod estimate;
 mod means;
 mod neighbourhood;
 mod pooled;
+pub(crate) mod price;
 mod regression;
 mod room;
 
@@ -33,6 +34,9 @@ pub use answers::{CurvatureDeviations, PatchGeometry};
 
 /// Number of neighbourhoods whose likelihood is pooled, or fewer than twice as many.
 const N_SITES: usize = 96;
+
+/// The greatest dimension of local regressions. Beyond it neighbourhoods say too little.
+pub const MAX_LOCAL_DIMENSION: usize = 4;
 
 /// Greatest number of sites that a caller of [`Patches::learned_at`] may choose.
 pub const MAX_SITES: usize = 2 * N_SITES;

@@ -11,10 +11,10 @@ use crate::observer::Observer;
 
 /// Residual degrees of freedom of the smaller neighbourhood. They are few, so that the neighbourhood stays
 /// small against the curvature of coarse clouds.
-pub(crate) const DEGREES_OF_FREEDOM: usize = 2;
+const DEGREES_OF_FREEDOM: usize = 2;
 
 /// Number of points examined, or up to twice as many. The median of 1,000 estimates scatters by 4 %.
-pub(crate) const MAX_SITES: usize = 1000;
+const MAX_SITES: usize = 1000;
 
 /// Estimates the standard deviation of the noise of the points across their surface, unit L. Returns 0 where
 /// no noise shows, and for clouds that are too small.
@@ -65,6 +65,15 @@ pub fn estimate_noise(
     let correction = (1.0 - 2.0 / (9.0 * DEGREES_OF_FREEDOM as f64)).powi(3);
     let variance = median(variances.into_iter().flatten().collect());
     Ok(variance.map_or(0.0, |variance| (variance.max(0.0) / correction).sqrt()))
+}
+
+/// Flops of [`estimate_noise`]: searches, and two quadrics each by orthogonal factorization.
+pub fn noise_flops(n_points: usize, dimension: usize) -> f64 {
+    let (n, sites) = (n_points as f64, n_points.min(2 * MAX_SITES) as f64);
+    let visited = n.min(200.0 * 2f64.powi(dimension.min(60) as i32));
+    let (n_columns, d) = (n_coefficients(dimension.max(2)) as f64, dimension as f64);
+    let n_rows = 2.0 * (n_columns + DEGREES_OF_FREEDOM as f64);
+    sites * (visited * (3.0 * d + 10.0) + 6.0 * n_rows * n_columns * n_columns)
 }
 
 #[cfg(test)]

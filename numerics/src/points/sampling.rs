@@ -6,6 +6,7 @@ use super::cloud::{Cloud, squared_distance};
 use super::neighbours::{Distances, Neighbour, Neighbours};
 use crate::error::NumericsError;
 use crate::machine::heap::vec_bytes;
+use crate::machine::price::Price;
 use crate::observer::Observer;
 
 /// Number of positions around a point that define the spacing there.
@@ -142,6 +143,20 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
         return None;
     }
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Flops of [`Sampling::of`]: every search visits a few leaves, in many dimensions most of the cloud.
+pub fn sampling_flops(n_points: usize, dimension: usize) -> f64 {
+    let n = n_points as f64;
+    let visited = n.min(60.0 * 2f64.powi(dimension.min(60) as i32));
+    // Distance, comparison and descent.
+    n * visited * (3.0 * dimension as f64 + 10.0)
+}
+
+/// The price of [`Sampling::of`] at its peak: the tree with the points in its order, and four numbers a point.
+pub fn sampling_price(n_points: usize, dimension: usize) -> Price {
+    let n_bytes = n_points.saturating_mul((dimension + 6) * size_of::<f64>());
+    Price { n_bytes, flops: sampling_flops(n_points, dimension) }
 }
 
 #[cfg(test)]

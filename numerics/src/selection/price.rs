@@ -3,7 +3,7 @@
 use super::alpha_path::{ALPHAS_AT_ONCE, is_decomposed};
 use super::criterion::Criterion;
 use super::search::SIDE_BY_SIDE;
-use crate::solver::choose::Price;
+use crate::machine::price::Price;
 
 /// Returns the number of evaluations that a descent over `n_free` numbers usually takes. About 50 were
 /// counted for 6 numbers and 70 to 110 for 12 (`bench/peers/model_selection.py`).

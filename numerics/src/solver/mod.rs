@@ -1,6 +1,6 @@
 //! `(K + αI) Λ = Y`: a system made ready, so that weights for values are cheap, and what else it can.
 
-pub mod choose;
+pub(crate) mod price;
 pub mod system;
 pub mod trend;
 

@@ -5,5 +5,6 @@ pub mod gram;
 pub mod jets;
 pub(crate) mod many;
 pub mod nodes;
+pub(crate) mod price;
 pub mod regularization;
 pub(crate) mod symmetric;

@@ -4,6 +4,7 @@ pub mod degeneracy;
 pub mod geometry;
 pub mod local;
 pub mod operators;
+pub mod price;
 pub mod served;
 pub mod signature;
 pub mod sure;
@@ -12,7 +13,6 @@ mod coarse;
 mod curvature;
 mod orientation;
 mod request;
-mod winding;
 
 use super::error::NumericsError;
 use super::function::interpolant::Interpolant;

@@ -11,7 +11,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::solver::{Method, Solver};
 use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
+use gramian_numerics::surface::operators::Operator;
 use serde_json::Value;
 
 use crate::support::{jets as fit_jets, *};
@@ -137,12 +137,13 @@ impl<'a> Case<'a> {
             &expected["gaussian_curvature"],
             reached.curvatures,
         );
-        let gradient = surface_gradient(&geometry, u, &self.queries, &Unobserved).unwrap();
+        let gradient = Operator::SurfaceGradient.apply(&geometry, u, &self.queries, &Unobserved).unwrap();
         self.check("surface gradient", &gradient, &expected["surface_gradient"], reached.gradient);
-        let applied = laplace_beltrami(&geometry, u, &self.queries, &Unobserved).unwrap();
+        let applied = Operator::LaplaceBeltrami.apply(&geometry, u, &self.queries, &Unobserved).unwrap();
         self.check("Laplace–Beltrami", &applied, &expected["laplace_beltrami"], reached.laplacian);
-        let matrix =
-            laplace_beltrami_matrix(&geometry, &self.factor, &self.queries, Mean::Zero, &Unobserved).unwrap();
+        let matrix = Operator::LaplaceBeltrami
+            .matrix(&geometry, &self.factor, &self.queries, Mean::Zero, &Unobserved)
+            .unwrap();
         self.check("its matrix", &matrix, &expected["laplace_beltrami_matrix"], reached.matrix);
     }
 

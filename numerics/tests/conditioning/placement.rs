@@ -4,7 +4,7 @@ use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::surface::operators::{laplace_beltrami, surface_gradient};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::support::*;
 
@@ -30,8 +30,8 @@ fn answers(
         (laplacian, -2),
         (geometry.normals().to_vec(), 0),
         (curvatures.principal, -1),
-        (surface_gradient(&geometry, &u, queries, &Unobserved).unwrap(), -1),
-        (laplace_beltrami(&geometry, &u, queries, &Unobserved).unwrap(), -2),
+        (Operator::SurfaceGradient.apply(&geometry, &u, queries, &Unobserved).unwrap(), -1),
+        (Operator::LaplaceBeltrami.apply(&geometry, &u, queries, &Unobserved).unwrap(), -2),
         (variances(&factor, queries, &Unobserved).unwrap().latent, 0),
     ]
 }

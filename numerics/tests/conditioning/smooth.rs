@@ -4,10 +4,10 @@
 use std::f64::consts::PI;
 
 use gramian_numerics::kernel::Family;
+use gramian_numerics::model::price::system_price;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::solver::Method;
-use gramian_numerics::solver::choose::choose;
-use gramian_numerics::surface::operators::{laplace_beltrami, surface_gradient};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::support::*;
 
@@ -41,11 +41,11 @@ fn five_orders_of_the_points_give_value_gradient_and_laplacian() {
         let errors = [
             relative_distance(&found, &expected.iter().map(|e| e.0).collect::<Vec<_>>()),
             relative_distance(
-                &surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap(),
+                &Operator::SurfaceGradient.apply(&geometry, &u, &queries, &Unobserved).unwrap(),
                 &expected.iter().flat_map(|e| e.1).collect::<Vec<_>>(),
             ),
             relative_distance(
-                &laplace_beltrami(&geometry, &u, &queries, &Unobserved).unwrap(),
+                &Operator::LaplaceBeltrami.apply(&geometry, &u, &queries, &Unobserved).unwrap(),
                 &expected.iter().map(|e| e.2).collect::<Vec<_>>(),
             ),
         ];
@@ -66,9 +66,9 @@ fn the_fallback_keeps_the_memory_of_cholesky_or_beyond_a_quarter_of_the_rank_all
         assert!(ranks.contains(&factor.rank()), "{} of {n}", factor.rank());
         // Added are the order of the points and the rounding of the allocator: two slices of 64 KiB.
         let needed = if factor.rank() > n / 4 {
-            choose(n, 3, usize::MAX).at_most.n_bytes
+            system_price(n, 3).at_most.n_bytes
         } else {
-            choose(n, 3, usize::MAX).expected.n_bytes
+            system_price(n, 3).expected.n_bytes
         };
         let bound = needed + n * size_of::<usize>() + (128 << 10);
         let found = factor.n_bytes() - size_of_val(points.coordinates());

@@ -12,9 +12,7 @@ use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::jets::{JetOrder, Jets};
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Curvatures, Geometry, GeometryRequest, SurfaceModel};
-use gramian_numerics::surface::operators::{
-    laplace_beltrami, laplace_beltrami_matrix, surface_gradient, surface_gradient_matrices,
-};
+use gramian_numerics::surface::operators::Operator;
 
 /// A solver, and values at its points.
 pub struct Setting {
@@ -47,16 +45,28 @@ pub const VERBS: [Verb; 13] = [
     verb("normals", |setting| Ok(geometry(setting)?.normals().to_vec())),
     verb("principal curvatures", |setting| Ok(curvatures(setting)?.principal)),
     verb("surface gradient", |setting| {
-        surface_gradient(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
+        Operator::SurfaceGradient.apply(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
     }),
     verb("Laplace–Beltrami operator", |setting| {
-        laplace_beltrami(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
+        Operator::LaplaceBeltrami.apply(&geometry(setting)?, &fit(setting)?, &queries(), &Unobserved)
     }),
     matrix("surface gradient as matrices", |setting| {
-        surface_gradient_matrices(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
+        Operator::SurfaceGradient.matrix(
+            &geometry(setting)?,
+            &setting.solver,
+            &queries(),
+            Mean::Zero,
+            &Unobserved,
+        )
     }),
     matrix("Laplace–Beltrami operator as matrix", |setting| {
-        laplace_beltrami_matrix(&geometry(setting)?, &setting.solver, &queries(), Mean::Zero, &Unobserved)
+        Operator::LaplaceBeltrami.matrix(
+            &geometry(setting)?,
+            &setting.solver,
+            &queries(),
+            Mean::Zero,
+            &Unobserved,
+        )
     }),
     verb("variances", |setting| Ok(variances(&setting.solver, &queries(), &Unobserved)?.latent)),
     verb("covariance", |setting| Ok(covariance(&setting.solver, &queries(), &Unobserved)?.latent)),

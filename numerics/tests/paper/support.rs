@@ -115,8 +115,10 @@ impl Function<'_> {
     pub fn surface_derivatives(&self, queries: &Cloud) -> (Vec<f64>, Vec<f64>) {
         let geometry = self.surface.geometry(queries, Orientation::Outward);
         assert!(geometry.degenerate().is_empty());
-        let gradients = operators::surface_gradient(&geometry, &self.interpolant, queries, &Unobserved);
-        let laplacians = operators::laplace_beltrami(&geometry, &self.interpolant, queries, &Unobserved);
+        let gradients =
+            operators::Operator::SurfaceGradient.apply(&geometry, &self.interpolant, queries, &Unobserved);
+        let laplacians =
+            operators::Operator::LaplaceBeltrami.apply(&geometry, &self.interpolant, queries, &Unobserved);
         (gradients.unwrap(), laplacians.unwrap())
     }
 }

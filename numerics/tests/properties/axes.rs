@@ -13,9 +13,7 @@ use gramian_numerics::solver::System;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::jets::{JetOrder, Jets};
 use gramian_numerics::sums::regularization::Regularization;
-use gramian_numerics::surface::operators::{
-    laplace_beltrami, laplace_beltrami_matrix, surface_gradient, surface_gradient_matrices,
-};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{fibonacci_sphere, random_cube, stretched, waves};
 use crate::common::fits::{factorize, fit, geometry};
@@ -142,16 +140,17 @@ fn matrices_of_operators_are_the_operators() {
             let row = |row: &[f64]| row.iter().zip(&values).map(|(a, y)| a * y).sum();
             matrix.chunks_exact(100).map(row).collect()
         };
-        let applied = laplace_beltrami(&geometry, &u, &queries, &Unobserved).unwrap();
-        let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
+        let applied = Operator::LaplaceBeltrami.apply(&geometry, &u, &queries, &Unobserved).unwrap();
+        let matrix =
+            Operator::LaplaceBeltrami.matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
         // A row is right to n ε cond.
         let allowed =
             |matrix: &[f64]| rounding(&factor) * largest(matrix.chunks_exact(100).map(norm)) * norm(&values);
         let apart = distance(&product(&matrix), &applied);
         assert!(apart <= allowed(&matrix), "{family:?}: {apart:e} of {:e}", allowed(&matrix));
-        let applied = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
+        let applied = Operator::SurfaceGradient.apply(&geometry, &u, &queries, &Unobserved).unwrap();
         let matrices =
-            surface_gradient_matrices(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
+            Operator::SurfaceGradient.matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
         // Matrices come one for each component, gradients one for each query.
         let by_component = product(&matrices);
         let m = queries.n_points();

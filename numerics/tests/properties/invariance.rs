@@ -9,7 +9,7 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::jets::JetOrder;
-use gramian_numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle, waves};
 use crate::common::fits::{factorize, fit, geometry};
@@ -86,9 +86,12 @@ fn answers(cloud: &Cloud, values: &[f64], queries: &Cloud, kernel: Kernel, alpha
         ("principal", curvatures.principal),
         ("mean", curvatures.mean),
         ("gaussian", curvatures.gaussian),
-        ("gradient", surface_gradient(&geometry, &u, queries, &Unobserved).unwrap()),
-        ("laplacian", laplace_beltrami(&geometry, &u, queries, &Unobserved).unwrap()),
-        ("matrix", laplace_beltrami_matrix(&geometry, &factor, queries, Mean::Zero, &Unobserved).unwrap()),
+        ("gradient", Operator::SurfaceGradient.apply(&geometry, &u, queries, &Unobserved).unwrap()),
+        ("laplacian", Operator::LaplaceBeltrami.apply(&geometry, &u, queries, &Unobserved).unwrap()),
+        (
+            "matrix",
+            Operator::LaplaceBeltrami.matrix(&geometry, &factor, queries, Mean::Zero, &Unobserved).unwrap(),
+        ),
     ];
     Answers { rounding: rounding(&factor), degenerate: geometry.is_null().to_vec(), fields }
 }

@@ -11,7 +11,7 @@ use gramian_numerics::solver::Solver;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::jets::JetOrder;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, Orientation, SurfaceModel};
-use gramian_numerics::surface::operators::{laplace_beltrami, laplace_beltrami_matrix, surface_gradient};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{circle, fibonacci_sphere, stretched, turned_circle};
 use crate::common::fits::{factorize, fit, geometry, surface};
@@ -43,7 +43,7 @@ fn exact_factor(cloud: &Cloud, family: Family, length_scale: f64) -> Arc<Solver>
 }
 
 fn laplacian(geometry: &Geometry, u: &Interpolant, queries: &Cloud) -> Vec<f64> {
-    laplace_beltrami(geometry, u, queries, &Unobserved).unwrap()
+    Operator::LaplaceBeltrami.apply(geometry, u, queries, &Unobserved).unwrap()
 }
 
 /// An ellipsoid, and queries on it that are none of its points, where all kernels are smooth.
@@ -58,9 +58,10 @@ fn one_fit_for_surface_and_values_annihilates_constants() {
     for family in families() {
         let factor = factorize(&cloud, kernel(family, 1.0), 1e-6);
         let (u, geometry) = (fit(&factor, &vec![1.0; 100]), geometry(&factor, &queries));
-        let gradients = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
+        let gradients = Operator::SurfaceGradient.apply(&geometry, &u, &queries, &Unobserved).unwrap();
         let laplacians = laplacian(&geometry, &u, &queries);
-        let matrix = laplace_beltrami_matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
+        let matrix =
+            Operator::LaplaceBeltrami.matrix(&geometry, &factor, &queries, Mean::Zero, &Unobserved).unwrap();
         let jets = u.at(&queries, JetOrder::Hessian, &Unobserved).unwrap();
         for query in 0..queries.n_points() {
             // The two terms cancel up to the rounding of the few operations that compute each of them.

@@ -3,7 +3,7 @@
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::surface::operators::laplace_beltrami;
+use gramian_numerics::surface::operators::Operator;
 
 use crate::common::clouds::{fibonacci_sphere, random_sphere, random_torus};
 use crate::common::fits::fit;
@@ -49,7 +49,7 @@ fn the_laplacian_of_a_coordinate_of_the_sphere_is_minus_twice_it() {
         let geometry = geometry(&cloud, Purpose::Curvatures);
         let values: Vec<f64> = cloud.points().map(|x| x[2]).collect();
         let u = fit(&factor(&cloud, Purpose::Values), &values);
-        let found = laplace_beltrami(&geometry, &u, &cloud, &Unobserved).unwrap();
+        let found = Operator::LaplaceBeltrami.apply(&geometry, &u, &cloud, &Unobserved).unwrap();
         let worst = found.iter().zip(&values).map(|(f, z)| (f + 2.0 * z).abs() / 2.0).fold(0.0, f64::max);
         println!("Laplacian of a coordinate: worst {worst:.4} of its maximum");
         assert!(worst <= 0.05, "{worst}");

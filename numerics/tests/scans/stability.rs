@@ -9,7 +9,7 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{RowKind, Stencils, laplace_beltrami_stencils};
+use gramian_numerics::surface::operators::{Operator, RowKind, Stencils};
 
 use crate::bunny::bunny;
 
@@ -19,7 +19,7 @@ fn stencils(cloud: &Cloud) -> Stencils {
     let surface = LocalSurface::of(cloud.clone(), sampling.clone(), Given::default(), &Unobserved).unwrap();
     let geometry =
         Geometry::of(&Surface::from(surface), &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
-    laplace_beltrami_stencils(&geometry, &cloud, sampling.neighbours(), &cloud, &Unobserved).unwrap()
+    Operator::LaplaceBeltrami.stencils(&geometry, &cloud, sampling.neighbours(), &cloud, &Unobserved).unwrap()
 }
 
 #[test]

@@ -19,7 +19,7 @@ use gramian_numerics::solver::{Solver, System};
 use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
-use gramian_numerics::surface::operators::{Judged, laplace_beltrami, surface_gradient};
+use gramian_numerics::surface::operators::{Judged, Operator};
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -122,12 +122,12 @@ impl Request {
         };
         let mut counts = Counts::default();
 
-        let found = surface_gradient(&geometry, &interpolant, &at, &Unobserved)?;
-        let doubts = judged(&found).surface_gradient(&Unobserved)?;
+        let found = Operator::SurfaceGradient.apply(&geometry, &interpolant, &at, &Unobserved)?;
+        let doubts = judged(&found).judge(Operator::SurfaceGradient, &Unobserved)?;
         let exact: Vec<f64> = truth.iter().flat_map(|(jet, on)| tangential(jet, on)).collect();
         counts.add(0, (&found, &exact), &geometry, &doubts);
-        let found = laplace_beltrami(&geometry, &interpolant, &at, &Unobserved)?;
-        let doubts = judged(&found).laplace_beltrami(&Unobserved)?;
+        let found = Operator::LaplaceBeltrami.apply(&geometry, &interpolant, &at, &Unobserved)?;
+        let doubts = judged(&found).judge(Operator::LaplaceBeltrami, &Unobserved)?;
         let exact: Vec<f64> = truth.iter().map(|(jet, on)| laplacian(jet, on)).collect();
         counts.add(1, (&found, &exact), &geometry, &doubts);
         Ok(counts)

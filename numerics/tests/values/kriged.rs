@@ -17,9 +17,7 @@ use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{
-    Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged,
-};
+use gramian_numerics::surface::operators::{Kriged, OfKriged, Operator};
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -94,8 +92,8 @@ impl Case {
             queries.iter().map(|&x| (self.field.at(x), self.shape.truth(x))).collect();
         let gradients: Vec<f64> = truth.iter().flat_map(|(t, on)| tangential(t, on)).collect();
         let laplacians: Vec<f64> = truth.iter().map(|(t, on)| laplacian(t, on)).collect();
-        let gradient = surface_gradient_of_kriged(&geometry, function, &at, &Unobserved).unwrap();
-        let operator = laplace_beltrami_of_kriged(&geometry, function, &at, &Unobserved).unwrap();
+        let gradient = Operator::SurfaceGradient.on_kriged(&geometry, function, &at, &Unobserved).unwrap();
+        let operator = Operator::LaplaceBeltrami.on_kriged(&geometry, function, &at, &Unobserved).unwrap();
         ([outcome(&gradient, &gradients, 3), outcome(&operator, &laplacians, 1)], learned)
     }
 }

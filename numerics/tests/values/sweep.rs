@@ -18,9 +18,7 @@ use gramian_numerics::sums::regularization::Regularization;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::geometry::{Geometry, GeometryRequest, SurfaceModel};
 use gramian_numerics::surface::local::{Given, LocalSurface};
-use gramian_numerics::surface::operators::{
-    laplace_beltrami, laplace_beltrami_deviations, surface_gradient, surface_gradient_deviations,
-};
+use gramian_numerics::surface::operators::Operator;
 
 use crate::common::random::Random;
 use crate::fields::Field;
@@ -125,11 +123,11 @@ impl Case {
         let geometry = Geometry::of(&surface, &at, &request, &Unobserved).unwrap();
         let on: Vec<(Jet, Truth)> =
             truth.iter().zip(&queries).map(|(t, &x)| (*t, self.shape.truth(x))).collect();
-        let found = surface_gradient(&geometry, &u, &at, &Unobserved).unwrap();
-        let bars = surface_gradient_deviations(&geometry, &u, factor, &at, &Unobserved).unwrap();
+        let found = Operator::SurfaceGradient.apply(&geometry, &u, &at, &Unobserved).unwrap();
+        let bars = Operator::SurfaceGradient.deviations(&geometry, &u, factor, &at, &Unobserved).unwrap();
         row.add(3, &found, &bars, on.iter().flat_map(|(t, on)| tangential(t, on)));
-        let found = laplace_beltrami(&geometry, &u, &at, &Unobserved).unwrap();
-        let bars = laplace_beltrami_deviations(&geometry, &u, factor, &at, &Unobserved).unwrap();
+        let found = Operator::LaplaceBeltrami.apply(&geometry, &u, &at, &Unobserved).unwrap();
+        let bars = Operator::LaplaceBeltrami.deviations(&geometry, &u, factor, &at, &Unobserved).unwrap();
         row.add(4, &found, &bars, on.iter().map(|(t, on)| laplacian(t, on)));
     }
 }

@@ -30,8 +30,8 @@ use crate::store::clouds::{CloudPage, ListedCloud, RegisteredCloud};
 use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::CloudHead;
 use crate::store::objects::{ListWindow, Listed};
+use gramian_numerics::points::sampling::sampling_price;
 use gramian_numerics::points::sampling::{NearestRange, Scales};
-use gramian_numerics::solver::choose::{sampling_bytes, sampling_flops};
 
 /// Clouds in a page when the client names no number.
 const DEFAULT_PAGE: usize = 50;
@@ -178,7 +178,7 @@ pub async fn create_cloud(
         memory.shrink_to(
             stored
                 .n_bytes()
-                .saturating_add(sampling_bytes(stored.cloud.n_points(), stored.cloud.dimension())),
+                .saturating_add(sampling_price(stored.cloud.n_points(), stored.cloud.dimension()).n_bytes),
         );
         Ok::<_, Problem>((stored, is_new, memory))
     };
@@ -233,7 +233,7 @@ async fn describe(
     stored: &RegisteredCloud,
 ) -> Result<Cloud, Problem> {
     let (n, d) = (stored.cloud.n_points(), stored.cloud.dimension());
-    let work = Work { operation: "describe_cloud", is_cached: false, flops: sampling_flops(n, d) };
+    let work = Work { operation: "describe_cloud", is_cached: false, flops: sampling_price(n, d).flops };
     admission.set_work(work);
     find_sampling(app, admission, stored).await?;
     admission.finish();

@@ -13,10 +13,10 @@ use crate::http::state::app::{App, FitFailure};
 use crate::store::budget::Reservation;
 use crate::store::key::ValuesKey;
 use crate::store::prepared::{CacheOutcome, Missing, PreparedFit};
+use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::model::{Making, SurfaceMaking};
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::solver::Workspace;
-use gramian_numerics::solver::choose::Choice;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::local::Given;
 
@@ -129,30 +129,29 @@ impl Fitting<'_> {
     }
 
     /// What is missing now of the solver and the surface of each fit, with what making it ready takes.
-    fn missing<'w>(&self, wanted: &Wanted<'w>) -> impl Iterator<Item = (Missing, Choice, Extent)> {
-        let memory = self.app.prepared.memory();
+    fn missing<'w>(&self, wanted: &Wanted<'w>) -> impl Iterator<Item = (Missing, MakingPrice, Extent)> {
         let fits = [(Some(wanted.main), wanted.of_main), (wanted.other, wanted.of_other)];
         // The surface is that of the last of them.
         let of_surface = wanted.other.unwrap_or(wanted.main).key;
         fits.into_iter().filter_map(move |(plan, extent)| {
             let plan = plan?;
             let with_surface = self.has_surface && plan.key == of_surface;
-            Some((self.app.prepared.missing(plan.key, with_surface), plan.choice(memory), extent))
+            Some((self.app.prepared.missing(plan.key, with_surface), plan.price(), extent))
         })
     }
 
     /// Bytes for the solvers and the surface that are missing now.
     fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
         let mut counted = [0; 3];
-        for (at, (missing, choice, extent)) in self.missing(wanted).enumerate() {
+        for (at, (missing, price, extent)) in self.missing(wanted).enumerate() {
             if missing.solver {
                 counted[at] = match extent {
-                    Extent::Expected => choice.expected.n_bytes,
-                    Extent::AtMost => choice.at_most.n_bytes,
+                    Extent::Expected => price.expected.n_bytes,
+                    Extent::AtMost => price.at_most.n_bytes,
                 };
             }
             if missing.surface {
-                counted[2] = choice.surface.n_bytes;
+                counted[2] = price.surface.n_bytes;
             }
         }
         counted
@@ -162,8 +161,8 @@ impl Fitting<'_> {
     pub fn outlook(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> Outlook {
         let wanted = Wanted::of(main, surface, cost);
         let mut outlook = Outlook { flops: cost.work.flops, n_bytes: n_bytes_of_work(cost), is_cached: true };
-        for (missing, choice, _) in self.missing(&wanted) {
-            let parts = [(missing.solver, choice.expected), (missing.surface, choice.surface)];
+        for (missing, price, _) in self.missing(&wanted) {
+            let parts = [(missing.solver, price.expected), (missing.surface, price.surface)];
             for (_, price) in parts.into_iter().filter(|(is_missing, _)| *is_missing) {
                 outlook.flops += price.flops;
                 outlook.n_bytes = outlook.n_bytes.saturating_add(price.n_bytes);
@@ -284,7 +283,7 @@ async fn prepare(
     if let Some(model) = factors::restore(&app, &admission, &plan).await {
         return Ok(PreparedFit::restored(model, memory));
     }
-    let flops = plan.choice(app.prepared.memory()).at_most.flops;
+    let flops = plan.price().at_most.flops;
     let sampling = match plan.recipe.needs_sampling() {
         true => sampling_unless_merged(&app, &admission, &plan).await?,
         false => None,
@@ -332,7 +331,7 @@ fn make_surface(
     memory: Reservation,
 ) -> impl Future<Output = Result<(Surface, Reservation), FitFailure>> + Send + 'static {
     let (plan, stored) = (fitted.plan.clone(), fitted.stored.clone());
-    let flops = plan.choice(app.prepared.memory()).surface.flops;
+    let flops = plan.price().surface.flops;
     async move {
         let sampling = sampling_unless_merged(&app, &admission, &plan).await?;
         let shared = app.clone();

@@ -184,7 +184,7 @@ pub async fn estimate<O: Operation>(
     let seconds = admission.expected_seconds(outlook.as_work(O::NAME));
     let has_memory = outlook.n_bytes <= app.prepared.memory();
     Ok(Estimate {
-        solver: plan.main.choice(app.prepared.memory()).solver,
+        solver: plan.main.recipe.solver(),
         outlook,
         seconds,
         is_admissible: has_memory && seconds <= app.config.deadline_seconds,

@@ -9,9 +9,10 @@ use crate::http::state::app::App;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::noise::estimate_noise;
+use gramian_numerics::points::noise::noise_flops;
 use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::points::sampling::sampling_flops;
 use gramian_numerics::selection::{Learned, learning_price};
-use gramian_numerics::solver::choose::{noise_flops, sampling_flops};
 
 /// Finds what a fit lacks of its cloud.
 ///

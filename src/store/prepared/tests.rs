@@ -5,10 +5,10 @@ use super::*;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
+use gramian_numerics::model::price::system_price;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::System;
-use gramian_numerics::solver::choose::choose;
 use gramian_numerics::sums::regularization::Regularization;
 
 type Store = PreparedStore<&'static str>;
@@ -36,7 +36,7 @@ async fn factorize(n: usize, memory: Reservation) -> Result<PreparedFit, &'stati
 
 async fn outcome_of(store: &Store, alpha: f64, n: usize) -> CacheOutcome {
     let memory =
-        store.reserve(Owner(0), choose(n, 3, usize::MAX).expected.n_bytes, || true).await.unwrap().unwrap();
+        store.reserve(Owner(0), system_price(n, 3).expected.n_bytes, || true).await.unwrap().unwrap();
     let found = store.get_or_prepare(key(alpha), Some(memory), |memory| factorize(n, memory)).await;
     found.unwrap().unwrap().1
 }

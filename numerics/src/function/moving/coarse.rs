@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::NEIGHBOURS;
 use super::near::Near;
 use super::{Moving, MovingRequest};
 use crate::error::NumericsError;
@@ -13,7 +14,6 @@ use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbours;
 use crate::points::thinning::thinned_points;
 use crate::solver::System;
-use crate::solver::choose::NEIGHBOURS;
 use crate::sums::jets::JetOrder;
 use crate::sums::regularization::Regularization;
 

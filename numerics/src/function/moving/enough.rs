@@ -1,12 +1,12 @@
 //! A check that neighbourhoods are large enough.
 
+use super::NEIGHBOURS;
 use super::{Asked, Moving, MovingRequest, Quantities, Raw};
 use crate::error::NumericsError;
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::thinning::thinned_points;
-use crate::solver::choose::NEIGHBOURS;
 use crate::solver::trend::Trend;
 use crate::sums::jets::JetOrder;
 

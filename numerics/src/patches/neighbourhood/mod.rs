@@ -9,8 +9,8 @@ mod sheet;
 use super::means::Support;
 use super::regression::{Batch, n_terms};
 use crate::machine::small::Small;
+use crate::patches::MAX_LOCAL_DIMENSION;
 use crate::points::neighbours::Neighbour;
-use crate::solver::choose::MAX_LOCAL_DIMENSION;
 use grown::Grown;
 
 /// Points per term of the trend in a whole neighbourhood: 30 points for surfaces in space.

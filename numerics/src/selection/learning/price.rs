@@ -2,7 +2,8 @@
 
 use super::order::{DEEP_GROUPS, GIVEN, GIVEN_DEEP, MAX_GROUPS, MAX_SAMPLE, MAX_TOGETHER, RESPONSES};
 use super::values::MAX_LISTS;
-use crate::solver::choose::{Price, sampling_bytes};
+use crate::machine::price::Price;
+use crate::points::sampling::sampling_price;
 
 /// Number of cells of the grid that a search from nothing usually scores. [`CELLS_FROM_SAMPLE`] is for a
 /// search that begins at the result of a sample, [`CELLS_OF_DEEP`] for deep groups.
@@ -36,7 +37,8 @@ pub fn learning_price(n_points: usize, dimension: usize, n_lists: usize) -> Pric
     let n_members = MAX_SAMPLE + n_groups * given + DEEP_GROUPS * deep;
     let n_numbers = n_members.saturating_mul(of_member) + DEEP_GROUPS * square(deep);
     // Earlier points are copied for their tree, and there are five lists of indices.
-    let of_order = sampling_bytes(n_points, dimension)
+    let of_order = sampling_price(n_points, dimension)
+        .n_bytes
         .saturating_add(n_points.saturating_mul((dimension + 5) * size_of::<f64>()));
     let of_groups = n_groups as f64 * together(given) + together(MAX_SAMPLE);
     let flops = CELLS * together(MAX_SAMPLE)

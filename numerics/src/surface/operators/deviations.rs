@@ -12,39 +12,49 @@
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
 use crate::error::NumericsError;
-use crate::function::functionals::{FUNCTIONALS_PER_BLOCK, JetFunctional, deviations, has_variance};
+use crate::function::functionals::{JetFunctional, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
+use crate::function::price::COLUMNS_AT_ONCE;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::sums::jets::{JetOrder, Jets};
+use crate::sums::jets::Jets;
 
-/// Computes standard deviations of `Δ_M u`, `[m]`, unit V/L², 0 at null queries.
-///
-/// Kernel and noise are `factor` times those of the solver.
-///
-/// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no second derivatives,
-/// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, and the errors of [`Interpolant::at`].
-pub fn laplace_beltrami_deviations(
-    geometry: &Geometry,
-    interpolant: &Interpolant,
-    factor: f64,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    let of = Applied { geometry, interpolant, factor, queries };
-    let mut total = of.of_function(Operator::LaplaceBeltrami, observer)?;
-    if geometry.deviations().is_some() {
-        let jets = interpolant.at(queries, JetOrder::Hessian, observer)?;
-        add_surface_to_laplace_beltrami(geometry, &jets, &mut total);
+impl Operator {
+    /// Computes standard deviations of the operator on a function, `[m, d]` or `[m]`, 0 at null queries.
+    ///
+    /// Kernel and noise are `factor` times those of the solver.
+    ///
+    /// # Errors
+    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives,
+    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, and the errors of [`Interpolant::at`].
+    pub fn deviations(
+        self,
+        geometry: &Geometry,
+        interpolant: &Interpolant,
+        factor: f64,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        let mut total = Applied { geometry, interpolant, factor, queries }.of_function(self, observer)?;
+        if geometry.deviations().is_some() {
+            self.add_surface(geometry, &interpolant.at(queries, self.order(), observer)?, &mut total);
+        }
+        Ok(total)
     }
-    Ok(total)
+
+    /// Adds the deviations of the surface, if known, to those of the operator on a function known by its jets.
+    pub(super) fn add_surface(self, geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+        match self {
+            Self::SurfaceGradient => add_surface_to_gradient(geometry, jets, total),
+            Self::LaplaceBeltrami => add_surface_to_laplace_beltrami(geometry, jets, total),
+        }
+    }
 }
 
 /// Adds the deviations of the surface, if known, to deviations `[m]` of `Δ_M u`. The function u is known by
 /// its jets.
-pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
     let Some(known) = geometry.deviations() else { return };
     for query in regular(geometry) {
         let (normal, gradient, hessian) = (geometry.normal(query), jets.gradient(query), jets.hessian(query));
@@ -61,31 +71,9 @@ pub(super) fn add_surface_to_laplace_beltrami(geometry: &Geometry, jets: &Jets, 
     }
 }
 
-/// Computes standard deviations of the components of `∇_M u`, `[m, d]`, unit V/L, 0 at null queries.
-///
-/// Kernel and noise are `factor` times those of the solver.
-///
-/// # Errors
-/// Returns the errors of [`laplace_beltrami_deviations`], for first derivatives.
-pub fn surface_gradient_deviations(
-    geometry: &Geometry,
-    interpolant: &Interpolant,
-    factor: f64,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    let of = Applied { geometry, interpolant, factor, queries };
-    let mut total = of.of_function(Operator::SurfaceGradient, observer)?;
-    if geometry.deviations().is_some() {
-        let jets = interpolant.at(queries, JetOrder::Gradient, observer)?;
-        add_surface_to_gradient(geometry, &jets, &mut total);
-    }
-    Ok(total)
-}
-
 /// Adds the deviations of the surface, if known, to deviations `[m, d]` of the components of `∇_M u`. The
 /// function u is known by its jets.
-pub(super) fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
+fn add_surface_to_gradient(geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
     let Some(known) = geometry.deviations() else { return };
     let d = jets.dimension();
     for query in regular(geometry) {
@@ -112,14 +100,14 @@ impl Applied<'_> {
     /// Computes the deviations that come from the function alone: `[m]` or `[m, d]`.
     fn of_function(&self, operator: Operator, observer: &dyn Observer) -> Result<Vec<f64>, NumericsError> {
         let (solver, solution) = (&*self.interpolant.solver, &*self.interpolant.solution);
-        let order = operator.order();
+        let order = operator.order().degree();
         if !has_variance(solver.kernel(), order) {
             return Err(NumericsError::DerivativesVary { order });
         }
         let width = operator.n_components(self.queries.dimension());
         let all: Vec<usize> = regular(self.geometry).collect();
         let mut total = vec![0.0; self.queries.n_points() * width];
-        for some in all.chunks((FUNCTIONALS_PER_BLOCK / width).max(1)) {
+        for some in all.chunks((COLUMNS_AT_ONCE / width).max(1)) {
             let functionals: Vec<JetFunctional> =
                 some.iter().flat_map(|&query| functionals(self.geometry, operator, query)).collect();
             let found = deviations((solver, solution, self.factor), self.queries, &functionals, observer)?;

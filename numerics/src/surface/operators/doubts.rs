@@ -58,28 +58,6 @@ pub struct Judged<'a> {
 }
 
 impl Judged<'_> {
-    /// Finds the queries, ascending, at which `∇_M u` is uncertain, as [`Judged::laplace_beltrami`] does.
-    ///
-    /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
-    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    pub fn surface_gradient(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
-        self.judge(Operator::SurfaceGradient, observer)
-    }
-
-    /// Finds the queries, ascending, at which `Δ_M u` is uncertain.
-    ///
-    /// Errors are computed for at most [`JUDGED_FUNCTIONALS`] functionals, at queries that are spread as all
-    /// queries are. Each of the other queries takes the greatest error of those around it. All queries are
-    /// uncertain for a kernel whose process has no second derivatives.
-    ///
-    /// # Errors
-    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
-    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-    pub fn laplace_beltrami(self, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
-        self.judge(Operator::LaplaceBeltrami, observer)
-    }
-
     /// Finds the queries, ascending, that known deviations `[m, k]` make uncertain.
     ///
     /// # Errors
@@ -93,9 +71,18 @@ impl Judged<'_> {
         Ok(findings.doubtful(deviations, &self.functionals(operator, &some)))
     }
 
-    fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
+    /// Finds the queries, ascending, at which the answers of an operator are uncertain.
+    ///
+    /// Errors are computed for at most [`JUDGED_FUNCTIONALS`] functionals, at queries that are spread as all
+    /// queries are. Each of the other queries takes the greatest error of those around it. All queries are
+    /// uncertain for a kernel whose process has no such derivatives.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::MeanNotDetermined`],
+    /// [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn judge(self, operator: Operator, observer: &dyn Observer) -> Result<Vec<usize>, NumericsError> {
         let regular: Vec<usize> = regular(self.geometry).collect();
-        let has_derivatives = has_variance(self.interpolant.solver.kernel(), operator.order());
+        let has_derivatives = has_variance(self.interpolant.solver.kernel(), operator.order().degree());
         if regular.is_empty() || !has_derivatives {
             return Ok(regular);
         }

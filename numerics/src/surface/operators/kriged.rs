@@ -5,16 +5,15 @@
 //! reaches further.
 
 use super::super::geometry::Geometry;
-use super::deviations::{add_surface_to_gradient, add_surface_to_laplace_beltrami, functionals};
+use super::deviations::functionals;
 use super::doubts::Findings;
-use super::{Operator, laplace_beltrami_of, regular, surface_gradient_of};
+use super::{Operator, regular};
 use crate::error::NumericsError;
 use crate::function::functionals::JetFunctional;
 use crate::function::moving::{FunctionalsRequest, Moving, MovingFunctionals};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
-use crate::sums::jets::JetOrder;
 
 /// A function through values, kriged around each query.
 #[derive(Clone, Copy)]
@@ -39,32 +38,21 @@ pub struct OfKriged {
     pub n_dependent: usize,
 }
 
-/// Computes `∇_M u` at the queries of a geometry, `[m, d]`, unit V/L.
-///
-/// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no first derivatives, and the errors of
-/// [`Moving::at`].
-pub fn surface_gradient_of_kriged(
-    geometry: &Geometry,
-    function: Kriged<'_>,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<OfKriged, NumericsError> {
-    function.with(Operator::SurfaceGradient, geometry, queries, observer)
-}
-
-/// Computes `Δ_M u` at the queries of a geometry, `[m]`, unit V/L².
-///
-/// # Errors
-/// [`NumericsError::DerivativesVary`] where the process has no second derivatives, and the errors of
-/// [`Moving::at`].
-pub fn laplace_beltrami_of_kriged(
-    geometry: &Geometry,
-    function: Kriged<'_>,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<OfKriged, NumericsError> {
-    function.with(Operator::LaplaceBeltrami, geometry, queries, observer)
+impl Operator {
+    /// Applies the operator to a kriged function at the queries of a geometry, `[m, d]` or `[m]`.
+    ///
+    /// # Errors
+    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, and the errors of
+    /// [`Moving::at`].
+    pub fn on_kriged(
+        self,
+        geometry: &Geometry,
+        function: Kriged<'_>,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<OfKriged, NumericsError> {
+        function.with(self, geometry, queries, observer)
+    }
 }
 
 impl Kriged<'_> {
@@ -75,10 +63,7 @@ impl Kriged<'_> {
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<OfKriged, NumericsError> {
-        let order = match operator {
-            Operator::SurfaceGradient => JetOrder::Gradient,
-            Operator::LaplaceBeltrami => JetOrder::Hessian,
-        };
+        let order = operator.order();
         let (d, count) = (queries.dimension(), operator.n_components(queries.dimension()));
         let of_query = |query: usize| match geometry.is_null()[query] {
             true => vec![JetFunctional::derivative(query, &vec![0.0; d]); count],
@@ -98,16 +83,10 @@ impl Kriged<'_> {
 
     fn judged(self, operator: Operator, geometry: &Geometry, found: MovingFunctionals) -> OfKriged {
         let MovingFunctionals { jets, mut deviations, n_dependent } = found;
-        let values = match operator {
-            Operator::SurfaceGradient => surface_gradient_of(geometry, &jets),
-            Operator::LaplaceBeltrami => laplace_beltrami_of(geometry, &jets),
-        };
+        let values = operator.of_jets(geometry, &jets);
         let root = self.factor.sqrt();
         deviations.iter_mut().for_each(|deviation| *deviation *= root);
-        match operator {
-            Operator::SurfaceGradient => add_surface_to_gradient(geometry, &jets, &mut deviations),
-            Operator::LaplaceBeltrami => add_surface_to_laplace_beltrami(geometry, &jets, &mut deviations),
-        }
+        operator.add_surface(geometry, &jets, &mut deviations);
         let kernel = self.moving.system().kernel();
         let findings = Findings { geometry, found: &values, kernel, factor: self.factor };
         let some: Vec<JetFunctional> = regular(geometry)

@@ -7,6 +7,7 @@
 mod deviations;
 mod doubts;
 mod kriged;
+pub mod price;
 mod resolution;
 mod stencils;
 
@@ -29,26 +30,79 @@ use crate::solver::Solver;
 use crate::solver::trend::{Basis, Mean};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
 use crate::sums::nodes::Nodes;
-pub use deviations::{laplace_beltrami_deviations, surface_gradient_deviations};
 pub use doubts::{JUDGED_FUNCTIONALS, Judged};
-pub use kriged::{Kriged, OfKriged, laplace_beltrami_of_kriged, surface_gradient_of_kriged};
-pub use stencils::{RowKind, SparseMatrix, Stencils, laplace_beltrami_stencils, surface_gradient_stencils};
+pub use kriged::{Kriged, OfKriged};
+pub use stencils::{RowKind, SparseMatrix, Stencils};
 
-/// Computes `∇_M u = ∇u − (∇u·ν)ν` at the queries of the geometry, `[m, d]`, unit V/L. It is zero at null
-/// queries.
+/// An operator on functions u over a surface. Answers at null queries are zero.
 ///
-/// # Errors
-/// Returns the errors of [`Interpolant::at`].
-pub fn surface_gradient(
-    geometry: &Geometry,
-    interpolant: &Interpolant,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    Ok(surface_gradient_of(geometry, &interpolant.at(queries, JetOrder::Gradient, observer)?))
+/// - The surface gradient `∇_M u = ∇u − (∇u·ν)ν`, `[m, d]`, unit V/L.
+/// - The Laplace–Beltrami operator `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu`, `[m]`, unit V/L². The last term has a
+///   minus (errata.md, 1). On the unit circle Δ cos θ = −cos θ. The result does not depend on the orientation
+///   of ν.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    SurfaceGradient,
+    LaplaceBeltrami,
 }
 
-/// Computes the surface gradient of a function known by its jets, `[m, d]`, unit V/L.
+impl Operator {
+    /// The derivatives of u that the operator needs.
+    fn order(self) -> JetOrder {
+        match self {
+            Self::SurfaceGradient => JetOrder::Gradient,
+            Self::LaplaceBeltrami => JetOrder::Hessian,
+        }
+    }
+
+    /// Numbers per query: d, or 1.
+    pub fn n_components(self, dimension: usize) -> usize {
+        match self {
+            Self::SurfaceGradient => dimension,
+            Self::LaplaceBeltrami => 1,
+        }
+    }
+
+    /// Applies the operator to a function at the queries of the geometry, `[m, d]` or `[m]`.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Interpolant::at`].
+    pub fn apply(
+        self,
+        geometry: &Geometry,
+        interpolant: &Interpolant,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        Ok(self.of_jets(geometry, &interpolant.at(queries, self.order(), observer)?))
+    }
+
+    /// Applies the operator to a function known by its jets.
+    fn of_jets(self, geometry: &Geometry, jets: &Jets) -> Vec<f64> {
+        match self {
+            Self::SurfaceGradient => surface_gradient_of(geometry, jets),
+            Self::LaplaceBeltrami => laplace_beltrami_of(geometry, jets),
+        }
+    }
+
+    /// Computes the operator as a matrix, with rows for the queries and columns for the nodes: `[d, m, n]`, a
+    /// matrix for each component, or `[m, n]`. It is not symmetric in general.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
+    /// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
+    pub fn matrix(
+        self,
+        geometry: &Geometry,
+        solver: &Arc<Solver>,
+        queries: &Cloud,
+        mean: Mean,
+        observer: &dyn Observer,
+    ) -> Result<Vec<f64>, NumericsError> {
+        with_mean(operator_matrix(geometry, solver, queries, self, observer)?, geometry, solver, mean, self)
+    }
+}
+
 fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     let d = jets.dimension();
     let mut gradients = vec![0.0; jets.n_queries() * d];
@@ -62,23 +116,6 @@ fn surface_gradient_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     gradients
 }
 
-/// Computes `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu` at the queries of the geometry, `[m]`, unit V/L².
-///
-/// It is zero at null queries. The last term has a minus (errata.md, 1). On the unit circle Δ cos θ = −cos θ.
-/// The result does not depend on the orientation of ν.
-///
-/// # Errors
-/// Returns the errors of [`Interpolant::at`].
-pub fn laplace_beltrami(
-    geometry: &Geometry,
-    interpolant: &Interpolant,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    Ok(laplace_beltrami_of(geometry, &interpolant.at(queries, JetOrder::Hessian, observer)?))
-}
-
-/// Computes the Laplace–Beltrami operator of a function known by its jets, `[m]`, unit V/L².
 fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
     let mut values = vec![0.0; jets.n_queries()];
     for query in regular(geometry) {
@@ -88,64 +125,6 @@ fn laplace_beltrami_of(geometry: &Geometry, jets: &Jets) -> Vec<f64> {
             tangential_trace(&jets.hessian(query), normal) - geometry.trace_of_shape_operator(query) * along;
     }
     values
-}
-
-/// Computes the matrices of the components of the surface gradient, `[d, m, n]`, unit 1/L. Rows of null
-/// queries are zero.
-///
-/// # Errors
-/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
-/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
-pub fn surface_gradient_matrices(
-    geometry: &Geometry,
-    solver: &Arc<Solver>,
-    queries: &Cloud,
-    mean: Mean,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    let matrix = operator_matrix(geometry, solver, queries, Operator::SurfaceGradient, observer)?;
-    with_mean(matrix, geometry, solver, mean, Operator::SurfaceGradient)
-}
-
-/// Computes the Laplace–Beltrami matrix, `[m, n]`, unit 1/L². Rows of null queries are zero. The matrix is
-/// not symmetric in general.
-///
-/// # Errors
-/// [`NumericsError::DimensionMismatch`], [`NumericsError::KernelNotSmooth`], [`NumericsError::Overflow`],
-/// [`NumericsError::MeanNotDetermined`], [`NumericsError::Cancelled`].
-pub fn laplace_beltrami_matrix(
-    geometry: &Geometry,
-    solver: &Arc<Solver>,
-    queries: &Cloud,
-    mean: Mean,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, NumericsError> {
-    let matrix = operator_matrix(geometry, solver, queries, Operator::LaplaceBeltrami, observer)?;
-    with_mean(matrix, geometry, solver, mean, Operator::LaplaceBeltrami)
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Operator {
-    SurfaceGradient,
-    LaplaceBeltrami,
-}
-
-impl Operator {
-    /// Order of the highest derivative.
-    fn order(self) -> usize {
-        match self {
-            Self::SurfaceGradient => 1,
-            Self::LaplaceBeltrami => 2,
-        }
-    }
-
-    /// Rows per query.
-    fn n_components(self, dimension: usize) -> usize {
-        match self {
-            Self::SurfaceGradient => dimension,
-            Self::LaplaceBeltrami => 1,
-        }
-    }
 }
 
 /// Computes the matrix `BW`, `[components, m, n]` row-major, with `W = (K + αI)⁻¹`.

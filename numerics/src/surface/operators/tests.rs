@@ -35,7 +35,9 @@ fn the_laplacian_of_cosine_on_the_circle_is_minus_cosine() {
     let solver = solver(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
     let cosine: Vec<f64> = cloud.points().map(|x| x[0]).collect();
     let interpolant = Interpolant::fit(solver.clone(), &cosine, &Unobserved).unwrap();
-    let found = laplace_beltrami(&geometry(&solver, &cloud), &interpolant, &cloud, &Unobserved).unwrap();
+    let found = Operator::LaplaceBeltrami
+        .apply(&geometry(&solver, &cloud), &interpolant, &cloud, &Unobserved)
+        .unwrap();
     assert!(largest(found.iter().zip(&cosine).map(|(f, c)| f + c)) < 1e-6);
 }
 
@@ -48,7 +50,7 @@ fn the_laplacian_of_the_coordinates_of_a_sphere_is_minus_twice_them() {
     for axis in 0..3 {
         let values: Vec<f64> = cloud.points().map(|x| x[axis]).collect();
         let interpolant = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
-        let found = laplace_beltrami(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
+        let found = Operator::LaplaceBeltrami.apply(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
         assert!(largest(found.iter().zip(&values).map(|(f, v)| f + 2.0 * v)) < 1e-4);
     }
 }
@@ -63,17 +65,20 @@ fn matrices_times_values_are_the_operators_applied() {
         let geometry = geometry(&solver, &queries);
         let interpolant = Interpolant::fit(solver.clone(), &values, &Unobserved).unwrap();
 
-        let applied = laplace_beltrami(&geometry, &interpolant, &queries, &Unobserved).unwrap();
-        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
+        let applied =
+            Operator::LaplaceBeltrami.apply(&geometry, &interpolant, &queries, &Unobserved).unwrap();
+        let matrix =
+            Operator::LaplaceBeltrami.matrix(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
         let product: Vec<f64> = matrix.chunks(90).map(|row| dot(row, &values)).collect();
         // Weights reach Y/α^{1/2}, so that cancellation in the row sums costs up to six digits here.
         let scale = largest(applied.iter().copied()).max(1.0);
         let error = largest(applied.iter().zip(&product).map(|(a, b)| a - b));
         assert!(error < 1e-7 * scale, "{family:?}: {error:e}");
 
-        let applied = surface_gradient(&geometry, &interpolant, &queries, &Unobserved).unwrap();
+        let applied =
+            Operator::SurfaceGradient.apply(&geometry, &interpolant, &queries, &Unobserved).unwrap();
         let matrices =
-            surface_gradient_matrices(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
+            Operator::SurfaceGradient.matrix(&geometry, &solver, &queries, Mean::Zero, &Unobserved).unwrap();
         for (row, component) in matrices.chunks(90).enumerate() {
             let (axis, query) = (row / 31, row % 31);
             let error = (dot(component, &values) - applied[query * 3 + axis]).abs();
@@ -88,8 +93,8 @@ fn one_fit_for_both_annihilates_constants() {
     let solver = solver(&cloud, Family::Matern { order: 3 }, 1.0, 1e-10);
     let geometry = geometry(&solver, &cloud);
     let constant = Interpolant::signature(solver.clone(), &Unobserved).unwrap();
-    let gradients = surface_gradient(&geometry, &constant, &cloud, &Unobserved).unwrap();
-    let laplacians = laplace_beltrami(&geometry, &constant, &cloud, &Unobserved).unwrap();
+    let gradients = Operator::SurfaceGradient.apply(&geometry, &constant, &cloud, &Unobserved).unwrap();
+    let laplacians = Operator::LaplaceBeltrami.apply(&geometry, &constant, &cloud, &Unobserved).unwrap();
     assert!(largest(gradients.into_iter()) < 1e-12);
     assert!(largest(laplacians.into_iter()) < 1e-10);
 }
@@ -101,7 +106,9 @@ fn with_different_kernels_the_laplacian_of_a_constant_tends_to_zero() {
         let surface = solver(&cloud, Family::Laplace { epsilon: 1.0 }, 1.0, 0.0);
         let data = solver(&cloud, Family::Matern { order: 3 }, 1.0, 0.0);
         let constant = Interpolant::signature(data, &Unobserved).unwrap();
-        let found = laplace_beltrami(&geometry(&surface, &cloud), &constant, &cloud, &Unobserved).unwrap();
+        let found = Operator::LaplaceBeltrami
+            .apply(&geometry(&surface, &cloud), &constant, &cloud, &Unobserved)
+            .unwrap();
         largest(found.into_iter())
     };
     let errors = [error(64), error(128), error(256), error(512)];
@@ -116,7 +123,7 @@ fn the_surface_gradient_is_tangent() {
     let geometry = geometry(&solver, &cloud);
     let values: Vec<f64> = cloud.points().map(|x| x[2]).collect();
     let interpolant = Interpolant::fit(solver, &values, &Unobserved).unwrap();
-    let gradients = surface_gradient(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
+    let gradients = Operator::SurfaceGradient.apply(&geometry, &interpolant, &cloud, &Unobserved).unwrap();
     for (query, gradient) in gradients.chunks(3).enumerate() {
         let x = cloud.point(query);
         assert!(dot(gradient, geometry.normal(query)).abs() < 1e-12);
@@ -142,14 +149,16 @@ fn matrices_with_a_mean_are_the_operators_on_functions_with_one() {
     };
     for mean in [Mean::Constant, Mean::Linear] {
         let u = Interpolant::fit_with_mean(solver.clone(), &values, mean, &Unobserved).unwrap();
-        let matrix = laplace_beltrami_matrix(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
-        let applied = laplace_beltrami(&geometry, &u, &queries, &Unobserved).unwrap();
+        let matrix =
+            Operator::LaplaceBeltrami.matrix(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
+        let applied = Operator::LaplaceBeltrami.apply(&geometry, &u, &queries, &Unobserved).unwrap();
         // Entries of hundreds add up to numbers of order one.
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
         assert!(near(&times(&matrix, &values), &applied), "{mean:?}");
         assert!(near(&times(&matrix, &[1.0; 120]), &[0.0; 4]), "constants are 0");
-        let matrices = surface_gradient_matrices(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
-        let applied = surface_gradient(&geometry, &u, &queries, &Unobserved).unwrap();
+        let matrices =
+            Operator::SurfaceGradient.matrix(&geometry, &solver, &queries, mean, &Unobserved).unwrap();
+        let applied = Operator::SurfaceGradient.apply(&geometry, &u, &queries, &Unobserved).unwrap();
         let found = times(&matrices, &values);
         let transposed: Vec<f64> = (0..12).map(|at| found[at % 3 * 4 + at / 3]).collect();
         assert!(near(&transposed, &applied), "{mean:?}");

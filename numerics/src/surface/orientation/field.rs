@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::Sampled;
 use super::areas::areas;
 use super::edges::Edge;
+use super::winding::Dipoles;
 use crate::error::NumericsError;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::surface::winding::Dipoles;
 
 /// Points with their areas and normals, in units of the radius of the cloud. So powers of distances stay
 /// inside float64.

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::edges::Edge;
 use super::field::Field;
 use super::parts::Parts;
+use super::winding::Dipoles;
 use crate::error::NumericsError;
 use crate::points::sampling::median;
-use crate::surface::winding::Dipoles;
 
 /// Most parts whose signs are unknown. Other parts keep their signs.
 const MAX_UNKNOWN: usize = 150;

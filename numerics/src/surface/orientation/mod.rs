@@ -30,6 +30,7 @@ mod sides;
 #[cfg(test)]
 mod tests;
 mod turns;
+mod winding;
 
 use crate::error::NumericsError;
 use crate::machine::vector::{dot, unit};

@@ -5,22 +5,30 @@ use crate::http::fields::Degenerate;
 use crate::http::problem::Problem;
 use crate::http::serve::fitted::Fits;
 use crate::http::serve::surface::SurfaceGeometry;
-use gramian_numerics::error::NumericsError;
-use gramian_numerics::surface::operators::Judged;
+use gramian_numerics::surface::operators::{Judged, Operator};
 
-/// The queries that the surface flags, and those at which the values do not bear out what was found: by deviations, where they are known, and by
-/// `judge` unless those say all of it.
+/// Answers of an operator that may be doubtful.
+pub struct Doubted<'a> {
+    pub operator: Operator,
+    pub judged: Judged<'a>,
+    /// Values at the points of the client's cloud.
+    pub values: &'a [f64],
+    /// Deviations of the answers, if they are known.
+    pub deviations: Option<&'a [f64]>,
+}
+
+/// The queries that the surface flags, and those at which the values do not bear out the answers: by deviations, where they
+/// are known, and by what is learned from the values, unless deviations say all of it.
 ///
 /// # Errors
 /// 503 and 504 where nobody waits any more.
 pub fn degenerate(
-    (fits, surface): (&Fits, &SurfaceGeometry),
-    values: &[f64],
-    judged: Judged<'_>,
-    deviations: Option<&[f64]>,
-    judge: impl Fn(Judged<'_>) -> Result<Vec<usize>, NumericsError>,
+    doubted: Doubted<'_>,
+    fits: &Fits,
+    surface: &SurfaceGeometry,
     observer: &JobObserver,
 ) -> Result<Vec<Degenerate>, Problem> {
+    let Doubted { operator, judged, values, deviations } = doubted;
     let refused = |error| fits.main.refused(error);
     let mut degenerate = surface.degenerate();
     if let Some(deviations) = deviations {
@@ -30,7 +38,9 @@ pub fn degenerate(
     let learned = fits.learned_beside(values, observer);
     // Deviations of a kernel that was learned say all of it.
     if !matches!(learned, Ok(None)) || deviations.is_none() {
-        let uncertain = learned.and_then(|learned| judge(Judged { learned: learned.as_ref(), ..judged }));
+        let judge =
+            |learned: &Option<_>| Judged { learned: learned.as_ref(), ..judged }.judge(operator, observer);
+        let uncertain = learned.and_then(|learned| judge(&learned));
         surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
     }
     Ok(degenerate)

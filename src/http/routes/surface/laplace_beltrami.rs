@@ -8,10 +8,7 @@ use axum::response::Response;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::common::{
-    Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
-};
-use super::doubts::degenerate;
+use super::operator::{Applied, AppliedWork, MatrixWork, StencilWork};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
@@ -23,17 +20,17 @@ use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word, present_words};
+use crate::http::wire::read::members::{
+    present, present_object, present_unless_empty, present_word, present_words,
+};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::Owner;
-use gramian_numerics::model::Report;
-use gramian_numerics::surface::operators::{
-    Judged, laplace_beltrami, laplace_beltrami_deviations, laplace_beltrami_matrix,
-    laplace_beltrami_of_kriged, laplace_beltrami_stencils,
-};
+use gramian_numerics::surface::operators::Operator;
+
+const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
 request! {
     /// Values on a surface, and where their Laplace–Beltrami operator is wanted.
@@ -178,7 +175,7 @@ impl Operation for LaplaceBeltramiRequest {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let applied =
             Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
-        plan_applied(planner, fit, applied, |_| 1)
+        AppliedWork::plan(planner, OPERATOR, fit, applied)
     }
 
     fn compute(
@@ -186,40 +183,12 @@ impl Operation for LaplaceBeltramiRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiResponse, Problem> {
-        let surface = work.surface(fits, observer)?;
-        if let Some(found) = work.by_kriging(fits, &surface, laplace_beltrami_of_kriged, observer)? {
-            let m = surface.geometry.n_queries();
-            return Ok(LaplaceBeltramiResponse {
-                values: surface.per_query(found.values, &[m]),
-                value_deviations: found.deviations.map(|found| surface.known_per_query(found, &[m])),
-                degenerate: found.degenerate,
-                diagnostics: found.diagnostics,
-            });
-        }
-        let geometry = &surface.geometry;
-        let interpolant = fits.interpolant(&work.values, observer)?;
-        let values = laplace_beltrami(geometry, &interpolant, &work.queries, observer)
-            .map_err(|error| fits.main.refused(error))?;
-        let m = geometry.n_queries();
-        let (factor, queries) = (fits.main.plan.process.scale, &*work.queries);
-        let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
-        let mut diagnostics = fits.main.diagnostics(&report, m);
-        let has_deviations = work.request.has_deviations;
-        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
-        let interpolant = &interpolant;
-        let deviations = || laplace_beltrami_deviations(geometry, interpolant, factor, queries, observer);
-        let deviations = work.request.has_deviations.then(deviations).transpose();
-        let deviations = deviations.map_err(|error| fits.main.refused(error))?;
-        let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
-        let judge = |judged: Judged<'_>| judged.laplace_beltrami(observer);
-        let of = (fits, &surface);
-        let degenerate = degenerate(of, &work.values.list, judged, deviations.as_deref(), judge, observer)?;
+        let found = work.apply(OPERATOR, fits, observer)?;
         Ok(LaplaceBeltramiResponse {
-            values: surface.per_query(values, &[m]),
-            value_deviations: deviations.map(|found| surface.known_per_query(found, &[m])),
-            degenerate,
-            diagnostics,
+            values: found.values,
+            value_deviations: found.deviations,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }
@@ -238,7 +207,7 @@ impl Operation for LaplaceBeltramiMatrixRequest {
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let MatrixFormat::Dense = self.format.unwrap_or_default();
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        plan_matrix(planner, fit, self.geometry, self.queries, |_| 1)
+        MatrixWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 
     fn compute(
@@ -246,22 +215,11 @@ impl Operation for LaplaceBeltramiMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiMatrixResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let geometry = &surface.geometry;
-        let matrix = laplace_beltrami_matrix(
-            geometry,
-            fits.main.model().solver().map_err(|error| fits.main.refused(error))?,
-            &work.queries,
-            fits.main.plan.process.mean,
-            observer,
-        )
-        .map_err(|error| fits.main.refused(error))?;
-        let shape = [geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
-        let diagnostics = work.diagnostics(fits, &surface, observer)?;
+        let found = work.matrix(OPERATOR, fits, observer)?;
         Ok(LaplaceBeltramiMatrixResponse {
-            matrix: surface.per_query(fits.main.unmerge(matrix), &shape),
-            degenerate: surface.degenerate(),
-            diagnostics,
+            matrix: found.matrix,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }
@@ -343,7 +301,7 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
-        plan_stencils(planner, fit, self.geometry, self.queries, |_| 1)
+        StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 
     fn compute(
@@ -351,19 +309,14 @@ impl Operation for LaplaceBeltramiSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<LaplaceBeltramiSparseMatrixResponse, Problem> {
-        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
-        let matrix = work.matrix(fits, &mut surface, laplace_beltrami_stencils, observer)?;
-        let n_entries = matrix.indices.len();
-        let shape = vec![m as i64, n as i64];
-        let data = Array::new(matrix.data, &[n_entries]);
+        let found = work.matrix(OPERATOR, fits, observer)?;
         Ok(LaplaceBeltramiSparseMatrixResponse {
-            shape: Integers::new(shape),
-            indptr: Integers::new(matrix.indptr),
-            indices: Integers::new(matrix.indices),
-            data,
-            degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits),
+            shape: found.shape,
+            indptr: found.indptr,
+            indices: found.indices,
+            data: found.data,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }

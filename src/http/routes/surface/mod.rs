@@ -5,4 +5,5 @@ pub mod curvatures;
 mod doubts;
 pub mod laplace_beltrami;
 pub mod normals;
+mod operator;
 pub mod surface_gradient;

@@ -6,10 +6,7 @@ use axum::Extension;
 use axum::extract::{Request, State};
 use axum::response::Response;
 
-use super::common::{
-    Applied, AppliedWork, MatrixWork, StencilWork, plan_applied, plan_matrix, plan_stencils,
-};
-use super::doubts::degenerate;
+use super::operator::{Applied, AppliedWork, MatrixWork, StencilWork};
 use crate::http::compute::JobObserver;
 use crate::http::fields::{
     CloudRef, Degenerate, Diagnostics, Fit, Geometry, MeanChoice, ValuesInclude, request,
@@ -21,17 +18,17 @@ use crate::http::serve::operation::{Operation, Plan, serve};
 use crate::http::serve::planner::Planner;
 use crate::http::state::app::App;
 use crate::http::wire::negotiation::Format;
-use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word, present_words};
+use crate::http::wire::read::members::{
+    present, present_object, present_unless_empty, present_word, present_words,
+};
 use crate::http::wire::read::points::Points;
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::Owner;
-use gramian_numerics::model::Report;
-use gramian_numerics::surface::operators::{
-    Judged, surface_gradient, surface_gradient_deviations, surface_gradient_matrices,
-    surface_gradient_of_kriged, surface_gradient_stencils,
-};
+use gramian_numerics::surface::operators::Operator;
+
+const OPERATOR: Operator = Operator::SurfaceGradient;
 
 request! {
     /// Values on a surface, and where their surface gradient is wanted.
@@ -162,7 +159,7 @@ impl Operation for SurfaceGradientRequest {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
         let applied =
             Applied { geometry: self.geometry, values, queries: self.queries, include: self.include };
-        plan_applied(planner, fit, applied, |d| d)
+        AppliedWork::plan(planner, OPERATOR, fit, applied)
     }
 
     fn compute(
@@ -170,40 +167,12 @@ impl Operation for SurfaceGradientRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientResponse, Problem> {
-        let surface = work.surface(fits, observer)?;
-        if let Some(found) = work.by_kriging(fits, &surface, surface_gradient_of_kriged, observer)? {
-            let (m, d) = (surface.geometry.n_queries(), surface.geometry.dimension());
-            return Ok(SurfaceGradientResponse {
-                gradients: surface.per_query(found.values, &[m, d]),
-                gradient_deviations: found.deviations.map(|found| surface.known_per_query(found, &[m, d])),
-                degenerate: found.degenerate,
-                diagnostics: found.diagnostics,
-            });
-        }
-        let geometry = &surface.geometry;
-        let interpolant = fits.interpolant(&work.values, observer)?;
-        let gradients = surface_gradient(geometry, &interpolant, &work.queries, observer)
-            .map_err(|error| fits.main.refused(error))?;
-        let (m, d) = (geometry.n_queries(), geometry.dimension());
-        let (factor, queries) = (fits.main.plan.process.scale, &*work.queries);
-        let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
-        let mut diagnostics = fits.main.diagnostics(&report, m);
-        let has_deviations = work.request.has_deviations;
-        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, has_deviations);
-        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
-        let interpolant = &interpolant;
-        let deviations = || surface_gradient_deviations(geometry, interpolant, factor, queries, observer);
-        let deviations = work.request.has_deviations.then(deviations).transpose();
-        let deviations = deviations.map_err(|error| fits.main.refused(error))?;
-        let judged = Judged { geometry, interpolant, factor, queries, found: &gradients, learned: None };
-        let judge = |judged: Judged<'_>| judged.surface_gradient(observer);
-        let of = (fits, &surface);
-        let degenerate = degenerate(of, &work.values.list, judged, deviations.as_deref(), judge, observer)?;
+        let found = work.apply(OPERATOR, fits, observer)?;
         Ok(SurfaceGradientResponse {
-            gradients: surface.per_query(gradients, &[m, d]),
-            gradient_deviations: deviations.map(|found| surface.known_per_query(found, &[m, d])),
-            degenerate,
-            diagnostics,
+            gradients: found.values,
+            gradient_deviations: found.deviations,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }
@@ -221,7 +190,7 @@ impl Operation for SurfaceGradientMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<MatrixWork>, Problem> {
         let fit = Fit { mean: self.mean, ..self.take_fit() };
-        plan_matrix(planner, fit, self.geometry, self.queries, |d| d)
+        MatrixWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 
     fn compute(
@@ -229,22 +198,11 @@ impl Operation for SurfaceGradientMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientMatrixResponse, Problem> {
-        let surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let geometry = &surface.geometry;
-        let matrices = surface_gradient_matrices(
-            geometry,
-            fits.main.model().solver().map_err(|error| fits.main.refused(error))?,
-            &work.queries,
-            fits.main.plan.process.mean,
-            observer,
-        )
-        .map_err(|error| fits.main.refused(error))?;
-        let shape = [geometry.dimension(), geometry.n_queries(), fits.main.plan.stored.cloud.n_points()];
-        let diagnostics = work.diagnostics(fits, &surface, observer)?;
+        let found = work.matrix(OPERATOR, fits, observer)?;
         Ok(SurfaceGradientMatrixResponse {
-            matrices: Array::new(fits.main.unmerge(matrices), &shape).with_nulls(1, geometry.is_null()),
-            degenerate: surface.degenerate(),
-            diagnostics,
+            matrices: found.matrix,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }
@@ -324,7 +282,7 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
 
     fn plan(mut self, planner: &Planner<'_>) -> Result<Plan<StencilWork>, Problem> {
         let fit = Fit { sites: self.sites.take(), ..self.take_fit() };
-        plan_stencils(planner, fit, self.geometry, self.queries, |d| d)
+        StencilWork::plan(planner, OPERATOR, fit, self.geometry, self.queries)
     }
 
     fn compute(
@@ -332,19 +290,14 @@ impl Operation for SurfaceGradientSparseMatrixRequest {
         fits: &Fits,
         observer: &JobObserver,
     ) -> Result<SurfaceGradientSparseMatrixResponse, Problem> {
-        let mut surface = fits.geometry(&work.queries, &work.request, observer)?;
-        let (m, n) = (work.queries.n_points(), work.nodes.cloud.n_points());
-        let matrix = work.matrix(fits, &mut surface, surface_gradient_stencils, observer)?;
-        let (n_entries, d) = (matrix.indices.len(), surface.geometry.dimension());
-        let shape = vec![d as i64, m as i64, n as i64];
-        let data = Array::new(matrix.data, &[d, n_entries]);
+        let found = work.matrix(OPERATOR, fits, observer)?;
         Ok(SurfaceGradientSparseMatrixResponse {
-            shape: Integers::new(shape),
-            indptr: Integers::new(matrix.indptr),
-            indices: Integers::new(matrix.indices),
-            data,
-            degenerate: surface.degenerate(),
-            diagnostics: surface.diagnostics(fits),
+            shape: found.shape,
+            indptr: found.indptr,
+            indices: found.indices,
+            data: found.data,
+            degenerate: found.degenerate,
+            diagnostics: found.diagnostics,
         })
     }
 }

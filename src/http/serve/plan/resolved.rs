@@ -11,12 +11,13 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::FitKey;
 use gramian_numerics::error::{NotDefinite, NumericsError};
 use gramian_numerics::model::Recipe;
+use gramian_numerics::model::choose::AutoLocal;
 use gramian_numerics::model::price::CloudSize;
+use gramian_numerics::model::price::MakingPrice;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::duplicates::Merge;
 use gramian_numerics::selection::Learned;
 use gramian_numerics::solver::Disagreement;
-use gramian_numerics::solver::choose::{AutoLocal, Choice};
 use gramian_numerics::solver::trend::{Mean, Trend};
 use gramian_numerics::sums::regularization::Regularization;
 
@@ -126,10 +127,10 @@ impl FitPlan {
         }
     }
 
-    /// The solver of this fit with what it and the surface take, within so many bytes of memory.
-    pub fn choice(&self, memory: usize) -> Choice {
+    /// The price of making the model and its surface ready.
+    pub fn price(&self) -> MakingPrice {
         let (n_points, dimension) = (self.fitted.n_points(), self.fitted.dimension());
-        self.recipe.price(CloudSize { n_points, dimension, is_merged: self.merge.is_some() }, memory)
+        self.recipe.price(CloudSize { n_points, dimension, is_merged: self.merge.is_some() })
     }
 
     /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.

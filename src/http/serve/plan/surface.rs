@@ -8,9 +8,9 @@ use crate::http::fields::kernel::PlannedKernel;
 use crate::http::problem::Problem;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
+use gramian_numerics::model::choose::AutoLocal;
 use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::points::cloud::Cloud;
-use gramian_numerics::solver::choose::AutoLocal;
 use gramian_numerics::sums::regularization::Regularization;
 
 /// A fit of a surface.

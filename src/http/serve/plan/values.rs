@@ -11,12 +11,12 @@ use crate::store::learned::LearnedKey;
 use gramian_numerics::error::{NumericsError, SolverKind};
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::kernel::defaults::{DEFAULT_ALPHA, Purpose, default_fit};
+use gramian_numerics::model::choose::AutoLocal;
 use gramian_numerics::model::{Recipe, ScaledProcess};
 use gramian_numerics::observer::Observer;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Learned, Noise, Observed, learn, learn_mean};
-use gramian_numerics::solver::choose::AutoLocal;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 

@@ -22,7 +22,8 @@ use choice::{
 };
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
-use gramian_numerics::solver::choose::{AutoLocal, MAX_LOCAL_DIMENSION, prefers_local};
+use gramian_numerics::model::choose::{AutoLocal, prefers_local};
+use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use inputs::length_mismatch;

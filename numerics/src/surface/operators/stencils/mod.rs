@@ -57,41 +57,30 @@ impl Stencils {
     }
 }
 
-/// Computes the Laplace–Beltrami operator at the queries of the geometry as a sum over nodes, `[m, n]`, unit
-/// 1/L².
-///
-/// Over the nodes themselves no eigenvalue has a positive real part beyond rounding. Rows of nodes at a rim
-/// are those of a boundary that nothing flows through, and are flagged. Rows are empty for null queries that
-/// are not nodes, and in a cloud of one position.
-///
-/// # Errors
-/// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
-pub fn laplace_beltrami_stencils(
-    geometry: &Geometry,
-    nodes: &Cloud,
-    neighbours: &Neighbours,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Stencils, NumericsError> {
-    let (operator, rows) = (Operator::LaplaceBeltrami, Rows::Stable);
-    Assembly { geometry, nodes, neighbours, queries, operator, rows }.stencils(observer)
-}
-
-/// Computes the components of the surface gradient at the queries of the geometry, `[d, m, n]`, unit 1/L.
-///
-/// Rows of null queries are empty.
-///
-/// # Errors
-/// Returns the errors of [`laplace_beltrami_stencils`].
-pub fn surface_gradient_stencils(
-    geometry: &Geometry,
-    nodes: &Cloud,
-    neighbours: &Neighbours,
-    queries: &Cloud,
-    observer: &dyn Observer,
-) -> Result<Stencils, NumericsError> {
-    let (operator, rows) = (Operator::SurfaceGradient, Rows::Pointwise);
-    Assembly { geometry, nodes, neighbours, queries, operator, rows }.stencils(observer)
+impl Operator {
+    /// Computes the operator at the queries of the geometry as a sum over nodes: `[m, n]`, unit 1/L², or `[d, m, n]`,
+    /// unit 1/L.
+    ///
+    /// Over the nodes themselves no eigenvalue of the Laplace–Beltrami operator has a positive real part beyond
+    /// rounding. Its rows at a rim are those of a boundary that nothing flows through, and are flagged. Rows are
+    /// empty for null queries that are not nodes, and in a cloud of one position.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::Overflow`], [`NumericsError::Cancelled`].
+    pub fn stencils(
+        self,
+        geometry: &Geometry,
+        nodes: &Cloud,
+        neighbours: &Neighbours,
+        queries: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<Stencils, NumericsError> {
+        let rows = match self {
+            Self::LaplaceBeltrami => Rows::Stable,
+            Self::SurfaceGradient => Rows::Pointwise,
+        };
+        Assembly { geometry, nodes, neighbours, queries, operator: self, rows }.stencils(observer)
+    }
 }
 
 #[cfg(test)]

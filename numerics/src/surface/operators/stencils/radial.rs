@@ -61,7 +61,7 @@ pub(super) fn weights(disc: &Disc, degree: usize, operator: Operator) -> Option<
             (found - right[(n + term, form)]).abs()
         };
         // NaN where the system is singular.
-        total <= UNSTABLE * (n as f64).powf(operator.order() as f64 / k as f64)
+        total <= UNSTABLE * (n as f64).powf(operator.order().degree() as f64 / k as f64)
             && (0..exponents.len()).all(|term| error(term) <= INDETERMINATE * (1.0 + total))
     };
     (0..n_forms).all(are_right).then_some(weights)

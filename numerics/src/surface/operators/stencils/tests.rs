@@ -24,8 +24,8 @@ pub(super) fn operators(cloud: &Cloud) -> Operators {
     let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved).unwrap();
     let tree = sampling.neighbours();
     Operators {
-        stable: laplace_beltrami_stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
-        gradient: surface_gradient_stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
+        stable: Operator::LaplaceBeltrami.stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
+        gradient: Operator::SurfaceGradient.stencils(&geometry, &cloud, tree, &cloud, &Unobserved).unwrap(),
     }
 }
 

@@ -22,9 +22,10 @@ use crate::http::wire::read::points::{Points, ValueLists};
 use crate::http::wire::write::answer::answer;
 use crate::http::wire::write::array::Array;
 use crate::store::Owner;
+use gramian_numerics::function::price::many_price;
+use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::EachAt;
-use gramian_numerics::model::price::{Sizes, function_price};
-use gramian_numerics::solver::choose::many_price;
+use gramian_numerics::model::price::function_price;
 
 request! {
     /// Many lists of values at the points of a cloud, and where the functions through them are wanted.
@@ -121,7 +122,7 @@ impl Operation for InterpolationBatchRequest {
         let n_deviations = if has_deviations { deviations_per_query(d, derivatives) } else { 0 };
         let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
         let work = function_price(main.solver, usize::from(derivatives), n_deviations, sizes)
-            .and(many_price(n, m, k, per_query - 1));
+            .and(many_price(k, per_query - 1, sizes));
         let of_means = k.checked_mul(1 + d);
         let n_numbers = k
             .checked_add(usize::from(has_deviations))

@@ -17,13 +17,13 @@ use crate::http::wire::write::json::Nullable;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::kernel::{Family, Kernel, MAX_MATERN_ORDER, WendlandSmoothness};
+use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::Report;
 use gramian_numerics::selection::{
     Criterion, Hyperparameters, LeaveOneOut, MAX_EVALUATIONS, Parameter, Selected, Selection, Variation,
     alpha_path, alpha_path_price, default_alphas, expected_evaluations, leave_one_out_price,
     leave_one_out_with, select, selection_price,
 };
-use gramian_numerics::solver::choose::Price;
 use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::sums::regularization::Regularization;
 

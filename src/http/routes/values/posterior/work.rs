@@ -22,7 +22,8 @@ use gramian_numerics::function::posterior::{
 };
 use gramian_numerics::function::samples::Root;
 use gramian_numerics::machine::normal::{cumulative, quantile};
-use gramian_numerics::model::price::{PosteriorAsked, Sizes, posterior_price};
+use gramian_numerics::machine::price::Sizes;
+use gramian_numerics::model::price::{PosteriorAsked, posterior_price};
 use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::sums::jets::JetOrder;

@@ -1,0 +1,25 @@
+//! Prices of local regressions.
+
+use super::MAX_LOCAL_DIMENSION;
+
+/// Flops of a local regression at one query by all models of the mixture. None is made beyond the dimensions
+/// that have one.
+pub(crate) fn regression_flops(dimension: usize) -> f64 {
+    match dimension {
+        ..=2 => 2e5,
+        3 => 3e5,
+        MAX_LOCAL_DIMENSION => 3e6,
+        _ => 0.0,
+    }
+}
+
+/// Regressions that choosing neighbourhoods and hyperparameters takes, of large clouds and for each point of
+/// small ones.
+const REGRESSIONS_TO_CHOOSE: usize = 500;
+const REGRESSIONS_PER_POINT: usize = 5;
+
+/// Flops of choosing them.
+pub(crate) fn choosing_flops(n_points: usize, dimension: usize) -> f64 {
+    let n_regressions = n_points.saturating_mul(REGRESSIONS_PER_POINT).min(REGRESSIONS_TO_CHOOSE);
+    n_regressions as f64 * regression_flops(dimension)
+}

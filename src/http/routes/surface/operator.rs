@@ -1,0 +1,393 @@
+//! Operators over a surface, the same for each of them: checked work, its price, its answers and their diagnostics.
+
+use std::sync::Arc;
+
+use super::common::{asked_of, check_is_surface, geometry_request};
+use super::doubts::{Doubted, degenerate};
+use crate::http::compute::JobObserver;
+use crate::http::fields::{
+    Degenerate, Diagnostics, Fit, Geometry, OrientationChoice, StencilsUsed, ValuesInclude,
+};
+use crate::http::problem::Problem;
+use crate::http::serve::fitted::Fits;
+use crate::http::serve::operation::Plan;
+use crate::http::serve::plan::{Cost, Values};
+use crate::http::serve::planner::{GivenValues, OperatorFits, Planner};
+use crate::http::serve::surface::SurfaceGeometry;
+use crate::http::wire::read::points::Points;
+use crate::http::wire::write::array::Array;
+use crate::http::wire::write::integers::Integers;
+use crate::store::clouds::RegisteredCloud;
+use gramian_numerics::function::moving::Moving;
+use gramian_numerics::model::Report;
+use gramian_numerics::model::price::{OperatorAsked, Sizes, operator_price};
+use gramian_numerics::points::cloud::Cloud;
+use gramian_numerics::points::neighbours::Neighbours;
+use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::selection::learning_price;
+use gramian_numerics::solver::choose::{Asked, n_entries_per_row, sampling_bytes, work_price};
+use gramian_numerics::surface::geometry::GeometryRequest;
+use gramian_numerics::surface::operators::{Judged, Kriged, OfKriged, Operator, SparseMatrix};
+
+/// A checked request to apply an operator to values.
+pub struct AppliedWork {
+    values: Arc<Values>,
+    queries: Arc<Cloud>,
+    request: GeometryRequest,
+}
+
+/// What a request to apply an operator has beside its fit.
+pub struct Applied {
+    pub geometry: Option<Geometry>,
+    pub values: Vec<f64>,
+    pub queries: Option<Points>,
+    pub include: Option<Vec<ValuesInclude>>,
+}
+
+/// A checked request for an operator as a matrix.
+pub struct MatrixWork {
+    queries: Arc<Cloud>,
+    request: GeometryRequest,
+}
+
+/// A checked request for an operator as a sparse matrix.
+pub struct StencilWork {
+    nodes: Arc<RegisteredCloud>,
+    queries: Arc<Cloud>,
+    request: GeometryRequest,
+}
+
+/// An operator on values at queries.
+pub struct AppliedAnswer {
+    /// `[m]` or `[m, d]`.
+    pub values: Array,
+    /// Standard deviations of the same shape, if they are asked for.
+    pub deviations: Option<Array>,
+    pub degenerate: Vec<Degenerate>,
+    pub diagnostics: Diagnostics,
+}
+
+/// An operator as a matrix: `[m, n]`, or `[d, m, n]` with a matrix for each component.
+pub struct MatrixAnswer {
+    pub matrix: Array,
+    pub degenerate: Vec<Degenerate>,
+    pub diagnostics: Diagnostics,
+}
+
+/// An operator as compressed sparse rows; components share the places of their entries.
+pub struct SparseAnswer {
+    /// `[m, n]` or `[d, m, n]`.
+    pub shape: Integers,
+    pub indptr: Integers,
+    pub indices: Integers,
+    /// A number for each entry, or a row of them for each component.
+    pub data: Array,
+    pub degenerate: Vec<Degenerate>,
+    pub diagnostics: Diagnostics,
+}
+
+impl AppliedWork {
+    /// Plans an operator applied to values.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn plan(
+        planner: &Planner<'_>,
+        operator: Operator,
+        fit: Fit,
+        applied: Applied,
+    ) -> Result<Plan<Self>, Problem> {
+        let Applied { geometry, values, queries, include } = applied;
+        let has_deviations = include.is_some_and(|include| include.contains(&ValuesInclude::Deviations));
+        let request = GeometryRequest { has_deviations, ..operator_request(&geometry) };
+        let OperatorFits { mut main, values, mut surface } =
+            planner.operator_fits(fit, GivenValues::one(values), geometry, &request)?;
+        check_is_surface(&main.on.stored.cloud)?;
+        let queries = planner.queries(queries, &mut surface.on)?;
+        main.on.pointers.queries = surface.on.pointers.queries;
+        let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
+        let n_surface_points = surface.on.n_points();
+        let of_operator = m.checked_mul(operator.n_components(d));
+        let asked = OperatorAsked {
+            n_surface_points,
+            n_numbers: of_operator.unwrap_or(usize::MAX),
+            surface: asked_of(&request, &surface, &queries),
+            has_deviations,
+        };
+        let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
+        let mut work =
+            operator_price(main.solver, surface.solver(), asked, sizes).and(learning_price(n, d, 1));
+        // Where the kernel stretches the cloud or duplicates are merged, another cloud is sampled.
+        work.n_bytes = work.n_bytes.saturating_add(sampling_price(n, d).n_bytes);
+        let n_lists = if has_deviations { 2 } else { 1 };
+        let n_numbers = planner.check_answer(of_operator.and_then(|n| n.checked_mul(n_lists)))?;
+        let cost = Cost { work, n_numbers, n_held: n + n_surface_points + m * d };
+        let work = Self { values, queries, request };
+        Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
+    }
+
+    /// Applies the operator: to the function through all values, or to functions that are kriged around each query.
+    ///
+    /// # Errors
+    /// Those of the numerics as a [`Problem`].
+    pub fn apply(
+        &self,
+        operator: Operator,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<AppliedAnswer, Problem> {
+        let applying = Applying { work: self, operator, fits, surface: self.surface(fits, observer)? };
+        match fits.main.model().kriging() {
+            Some(moving) => applying.by_kriging(moving, observer),
+            None => applying.by_one_function(observer),
+        }
+    }
+
+    /// The surface at the queries, of which those are flagged that are far from the nodes of the values.
+    fn surface(&self, fits: &Fits, observer: &JobObserver) -> Result<SurfaceGeometry, Problem> {
+        let mut surface = fits.geometry(&self.queries, &self.request, observer)?;
+        let nodes = &fits.main.plan.stored;
+        if fits.surface().plan.stored.id != nodes.id {
+            let sampling = match nodes.sampling() {
+                Some(sampling) => sampling.clone(),
+                None => {
+                    Arc::new(Sampling::of(&nodes.cloud, observer).map_err(|error| fits.main.refused(error))?)
+                }
+            };
+            surface.geometry.flag_far_from(&sampling, &self.queries);
+        }
+        Ok(surface)
+    }
+}
+
+/// An operator on its way to an answer.
+struct Applying<'a> {
+    work: &'a AppliedWork,
+    operator: Operator,
+    fits: &'a Fits,
+    surface: SurfaceGeometry,
+}
+
+/// Numbers of an operator at queries, with what is said of them.
+struct Found {
+    values: Vec<f64>,
+    deviations: Option<Vec<f64>>,
+    degenerate: Vec<Degenerate>,
+    report: Report,
+}
+
+impl Applying<'_> {
+    fn by_one_function(&self, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
+        let Self { work, operator, fits, surface } = self;
+        let refused = |error| fits.main.refused(error);
+        let (geometry, queries) = (&surface.geometry, &*work.queries);
+        let factor = fits.main.plan.process.scale;
+        let interpolant = &fits.interpolant(&work.values, observer)?;
+        let values = operator.apply(geometry, interpolant, queries, observer).map_err(refused)?;
+        let deviations = || operator.deviations(geometry, interpolant, factor, queries, observer);
+        let deviations = work.request.has_deviations.then(deviations).transpose().map_err(refused)?;
+        let judged = Judged { geometry, interpolant, factor, queries, found: &values, learned: None };
+        let doubted = Doubted {
+            operator: *operator,
+            judged,
+            values: &work.values.list,
+            deviations: deviations.as_deref(),
+        };
+        let degenerate = degenerate(doubted, fits, surface, observer)?;
+        let report = Report::of_function(&interpolant.solver, &interpolant.solution, factor);
+        Ok(self.answer(Found { values, deviations, degenerate, report }))
+    }
+
+    fn by_kriging(&self, moving: &Moving, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
+        let Self { work, operator, fits, surface } = self;
+        let refused = |error| fits.main.refused(error);
+        let plan = &fits.main.plan;
+        let merged = plan.merged(&work.values.list);
+        let (trend, factor) = (plan.trend(), plan.process.scale);
+        let function = Kriged { moving, values: &merged, trend, factor };
+        let found = operator.on_kriged(&surface.geometry, function, &work.queries, observer);
+        let OfKriged { values, deviations, uncertain, n_dependent } = found.map_err(refused)?;
+        let mut degenerate = surface.degenerate();
+        surface.flag_uncertain(Ok(uncertain), &mut degenerate).map_err(refused)?;
+        let report = Report {
+            trend: trend.cloned(),
+            n_neighbours: moving.n_neighbours(),
+            n_dependent,
+            ..Report::default()
+        };
+        let deviations = work.request.has_deviations.then_some(deviations);
+        Ok(self.answer(Found { values, deviations, degenerate, report }))
+    }
+
+    fn answer(&self, found: Found) -> AppliedAnswer {
+        let Self { work, operator, fits, surface } = self;
+        let Found { values, deviations, degenerate, report } = found;
+        let (m, d) = (work.queries.n_points(), work.queries.dimension());
+        let shape = match operator {
+            Operator::LaplaceBeltrami => vec![m],
+            Operator::SurfaceGradient => vec![m, d],
+        };
+        let mut diagnostics = fits.main.diagnostics(&report, m);
+        fits.main.warn_of_misfit(&mut diagnostics, report.disagreement, work.request.has_deviations);
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        AppliedAnswer {
+            values: surface.per_query(values, &shape),
+            deviations: deviations.map(|deviations| surface.known_per_query(deviations, &shape)),
+            degenerate,
+            diagnostics,
+        }
+    }
+}
+
+impl MatrixWork {
+    /// Plans an operator as a matrix.
+    ///
+    /// # Errors
+    /// A [`Problem`] with a pointer to the field.
+    pub fn plan(
+        planner: &Planner<'_>,
+        operator: Operator,
+        fit: Fit,
+        geometry: Option<Geometry>,
+        queries: Option<Points>,
+    ) -> Result<Plan<Self>, Problem> {
+        let request = operator_request(&geometry);
+        let (mut main, mut surface) = planner.matrix_fits(fit, geometry, &request)?;
+        check_is_surface(&main.on.stored.cloud)?;
+        let queries = planner.queries(queries, &mut surface.on)?;
+        main.on.pointers.queries = surface.on.pointers.queries;
+        let (n, m, d) = (main.on.n_points(), queries.n_points(), queries.dimension());
+        let n_rows = m.checked_mul(operator.n_components(d));
+        let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
+        let of_surface = asked_of(&request, &surface, &queries);
+        let work = matrix_price(n_rows.unwrap_or(usize::MAX), surface.on.n_points(), of_surface, sizes);
+        let cost = Cost {
+            n_numbers: planner.check_answer(n_rows.and_then(|rows| rows.checked_mul(n)))?,
+            work,
+            n_held: m * d,
+        };
+        let work = Self { queries, request };
+        Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
+    }
+
+    /// Computes the matrix, with a column for each point of the client's cloud.
+    ///
+    /// # Errors
+    /// Those of the numerics as a [`Problem`].
+    pub fn matrix(
+        &self,
+        operator: Operator,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<MatrixAnswer, Problem> {
+        let refused = |error| fits.main.refused(error);
+        let surface = fits.geometry(&self.queries, &self.request, observer)?;
+        let (geometry, mean) = (&surface.geometry, fits.main.plan.process.mean);
+        let solver = fits.main.model().solver().map_err(refused)?;
+        let matrix = operator.matrix(geometry, solver, &self.queries, mean, observer).map_err(refused)?;
+        let (m, n) = (geometry.n_queries(), fits.main.plan.stored.cloud.n_points());
+        let (shape, axis_of_queries) = match operator {
+            Operator::LaplaceBeltrami => (vec![m, n], 0),
+            Operator::SurfaceGradient => (vec![geometry.dimension(), m, n], 1),
+        };
+        let matrix = Array::new(fits.main.unmerge(matrix), &shape);
+        Ok(MatrixAnswer {
+            matrix: matrix.with_nulls(axis_of_queries, geometry.is_null()),
+            degenerate: surface.degenerate(),
+            diagnostics: self.diagnostics(fits, &surface, observer)?,
+        })
+    }
+
+    /// Without values, the quality of the main fit is that of Y = 1.
+    fn diagnostics(
+        &self,
+        fits: &Fits,
+        surface: &SurfaceGeometry,
+        observer: &JobObserver,
+    ) -> Result<Diagnostics, Problem> {
+        let constant = match (&fits.surface, surface.surface.signature()) {
+            (None, Some(signature)) => signature.clone(),
+            _ => fits.interpolant_of_one(observer)?,
+        };
+        let report = Report::of_function(&constant.solver, &constant.solution, 1.0);
+        let mut diagnostics = fits.main.diagnostics(&report, self.queries.n_points());
+        diagnostics.geometry = Some(Box::new(surface.diagnostics(fits)));
+        Ok(diagnostics)
+    }
+}
+
+impl StencilWork {
+    /// Plans an operator as a sparse matrix.
+    ///
+    /// # Errors
+    /// Those of the planner.
+    pub fn plan(
+        planner: &Planner<'_>,
+        operator: Operator,
+        fit: Fit,
+        geometry: Option<Geometry>,
+        queries: Option<Points>,
+    ) -> Result<Plan<Self>, Problem> {
+        let request = operator_request(&geometry);
+        let (nodes, mut main) = planner.stencils(fit, geometry, &request)?;
+        check_is_surface(&main.on.stored.cloud)?;
+        let queries = planner.queries(queries, &mut main.on)?;
+        let (m, d) = (queries.n_points(), queries.dimension());
+        // A column for each entry, which all components share, and a number for each of these.
+        let per_entry = 1 + operator.n_components(d);
+        let n_numbers = m.checked_mul(n_entries_per_row(d)).and_then(|n| n.checked_mul(per_entry));
+        let cost = Cost {
+            work: stencils_price(Sizes { n_points: nodes.cloud.n_points(), n_queries: m, dimension: d }),
+            n_numbers: planner.check_answer(n_numbers)?,
+            n_held: m * d,
+        };
+        let work = Self { nodes, queries, request };
+        Ok(Plan { main: main.into(), surface: None, work, cost })
+    }
+
+    /// Assembles the matrix; queries that its nodes do not resolve are flagged.
+    ///
+    /// # Errors
+    /// Those of the numerics as a [`Problem`].
+    pub fn matrix(
+        &self,
+        operator: Operator,
+        fits: &Fits,
+        observer: &JobObserver,
+    ) -> Result<SparseAnswer, Problem> {
+        let mut surface = fits.geometry(&self.queries, &self.request, observer)?;
+        let (nodes, queries) = (&*self.nodes.cloud, &*self.queries);
+        let of = |neighbours: &Neighbours| {
+            operator.stencils(&surface.geometry, nodes, neighbours, queries, observer)
+        };
+        let found = if surface.surface.cloud() == nodes {
+            // The neighbours of the points of the surface are known already.
+            of(surface.surface.neighbours())
+        } else {
+            Neighbours::of(nodes, observer).and_then(|neighbours| of(&neighbours))
+        };
+        let found = found.map_err(|error| fits.surface().refused(error))?;
+        surface.geometry.take_resolutions(&found.resolutions);
+        surface.stencils = Some(StencilsUsed::of(&found));
+        let SparseMatrix { indptr, indices, data, .. } = found.matrix;
+        let (m, n, d) = (queries.n_points(), nodes.n_points(), queries.dimension());
+        let (shape, of_data) = match operator {
+            Operator::LaplaceBeltrami => (vec![m, n], vec![indices.len()]),
+            Operator::SurfaceGradient => (vec![d, m, n], vec![d, indices.len()]),
+        };
+        Ok(SparseAnswer {
+            shape: Integers::new(shape.into_iter().map(|side| side as i64).collect()),
+            indptr: Integers::new(indptr),
+            indices: Integers::new(indices),
+            data: Array::new(data, &of_data),
+            degenerate: surface.degenerate(),
+            diagnostics: surface.diagnostics(fits),
+        })
+    }
+}
+
+/// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
+fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
+    let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
+    geometry_request(surface, Some(OrientationChoice::Gradient), true, None)
+}
