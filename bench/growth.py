@@ -3,10 +3,12 @@
 
     bench/growth.py [--binary GRAMIAN] [--sizes N,N,…] [--rounds K] [--svg FILE] [--table FILE]
 
-Two servers a size and round, each new, so that its peak resident memory is that of one cold request: /v1/normals in one,
-/v1/curvatures in the other. The first then answers from its cache: values it has not seen (one solve), values seen before at
-one query, and posterior variances at 100. Times are the best of the rounds, by stage from Server-Timing; slopes are fitted to
-log time against log n over the larger half of the sizes. Needs nothing but the standard library.
+Each size and round starts two new servers: one answers /v1/curvatures, the other /v1/normals. The peak
+resident memory of each is therefore that of one cold request. The server of /v1/normals then answers from its
+cache: new values (one solve), values seen before at one query, and posterior variances at 100 queries.
+
+Times are the best of the rounds. Stages come from Server-Timing. Slopes are fitted to log time against log n
+over the larger half of the sizes. Needs only the standard library.
 """
 
 import argparse
@@ -26,7 +28,7 @@ KERNEL = {"family": "matern", "length_scale": 0.3}
 N_WARM = 50
 SECONDS = 600
 
-# Key, name, expected slope, colour; times in milliseconds.
+# Key, name, expected slope, colour. Times are in milliseconds.
 TIMES = [
     ("normals", "/v1/normals, cold, whole request", 3, "#222222"),
     ("curvatures", "/v1/curvatures, cold, whole request", 3, "#888888"),
@@ -54,7 +56,7 @@ def main():
     rows = []
     for n in arguments.sizes:
         rounds = [measure(arguments.binary, n) for _ in range(arguments.rounds)]
-        # Memory is no matter of luck: the largest of the rounds.
+        # Times depend on chance, so the best round counts. Memory does not, so the largest one counts.
         best = {key: (max if key.endswith("_bytes") else min)(found[key] for found in rounds) for key in rounds[0]}
         rows.append({"n": n, **best})
         print(", ".join(f"{key} {value:.4g}" for key, value in rows[-1].items()), flush=True)
@@ -65,7 +67,7 @@ def main():
 
 
 def measure(binary, n):
-    """One round for one size: milliseconds and bytes."""
+    """Measures one size once; returns milliseconds and bytes by key."""
     points = sphere(n)
     cloud = {"cloud": {"points": points}, "kernel": KERNEL, "alpha": 1e-8}
     found = {"matrix_bytes": 8 * n * n}
@@ -90,7 +92,7 @@ def measure(binary, n):
 
 @contextmanager
 def server(binary):
-    """A server of its own, on a free port."""
+    """Starts a new server on a free port; yields its process and address."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("GRAMIAN_")}
     command = [binary, "--bind", "127.0.0.1:0", "--deadline-seconds", str(SECONDS)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
@@ -102,7 +104,10 @@ def server(binary):
 
 
 def ask(address, path, request):
-    """The answer, the milliseconds from the first byte sent to the last received, and those of each stage."""
+    """Posts a request; returns the answer, its milliseconds and those of each stage.
+
+    Milliseconds count from the first byte sent to the last byte received.
+    """
     body = json.dumps(request).encode()
     connection = http.client.HTTPConnection(address, timeout=SECONDS)
     connection.connect()
@@ -119,13 +124,13 @@ def ask(address, path, request):
 
 
 def memory(process, field):
-    """VmRSS or VmHWM of a process, in bytes."""
+    """Returns VmRSS or VmHWM of a process, in bytes."""
     status = Path(f"/proc/{process.pid}/status").read_text()
     return 1024 * next(int(line.split()[1]) for line in status.splitlines() if line.startswith(field + ":"))
 
 
 def sphere(n):
-    """n points on the unit sphere, z_i = 1 − (2i+1)/n, angle π(1+√5)i."""
+    """Returns n points on the unit sphere: z_i = 1 − (2i+1)/n, angle π(1+√5)i."""
     golden = math.pi * (1 + math.sqrt(5))
     heights = [1 - (2 * i + 1) / n for i in range(n)]
     radii = [math.sqrt(1 - z * z) for z in heights]
@@ -133,7 +138,7 @@ def sphere(n):
 
 
 def slope(rows, key):
-    """Least squares of log value against log n over the larger half of the sizes."""
+    """Fits log value against log n by least squares over the larger half of the sizes; returns the slope."""
     upper = rows[len(rows) // 2 :]
     x = [math.log(row["n"]) for row in upper]
     y = [math.log(row[key]) for row in upper]
@@ -143,7 +148,7 @@ def slope(rows, key):
 
 
 def table(rows, slopes):
-    """The measurements and slopes in Markdown."""
+    """Formats the measurements and slopes as a Markdown table."""
     sizes = [row["n"] for row in rows]
     lines = ["| n | " + " | ".join(f"{n:,}" for n in sizes) + " | slope | expected |"]
     lines.append("|---|" + "---:|" * (len(sizes) + 2))
@@ -169,7 +174,7 @@ def number(x):
 
 
 class Panel:
-    """Logarithmic axes."""
+    """A plot with logarithmic axes."""
 
     WIDTH, HEIGHT, TOP = 400, 330, 50
 
@@ -206,7 +211,7 @@ class Panel:
 
 
 def picture(rows, slopes, times, memory):
-    """Time on the left, memory on the right."""
+    """Draws time on the left and memory on the right; returns the SVG."""
     x_range = (rows[0]["n"] / 1.1, rows[-1]["n"] * 1.1)
     ticks = (500, 1000, 2000, 4000, 8000, 16000) if x_range[1] < 50_000 else (1000, 10_000, 100_000, 1_000_000)
     x_ticks = [tick for tick in ticks if x_range[0] <= tick <= x_range[1]]

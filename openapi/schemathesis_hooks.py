@@ -1,9 +1,11 @@
-"""Makes well-formed requests meaningful, in what no schema can say: rows of equal length, one entry per point, one of two
-alternatives; and gives the links that refer to a cloud in the body the body that they describe.
+"""Hooks that make random requests of Schemathesis meaningful.
 
-Without it nearly all random clouds are ragged and refused, and nothing behind the first check is ever reached. Only
-well-formed data of the fuzzing and stateful phases is touched, and it stays well-formed; the other phases and all malformed
-data go out as Schemathesis makes them.
+A schema cannot say that rows have equal length, that lists have one entry per point, or that one of two
+alternatives is given. Without these hooks nearly all random clouds are ragged and refused, and nothing behind
+the first check is reached. The hooks change only well-formed data of the fuzzing and stateful phases, and
+keep it well-formed. Other phases and malformed data are sent as Schemathesis makes them.
+
+Links that refer to a cloud in the body also get the body that their description asks for.
 """
 
 import schemathesis
@@ -15,7 +17,10 @@ TRIANGLE = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
 
 @schemathesis.hook
 def before_load_schema(context, raw_schema):
-    """The document says it in words, see src/http/openapi/links.rs."""
+    """Adds the request body to links without parameters, whose document describes it only in words.
+
+    See src/http/openapi/links.rs.
+    """
     links = raw_schema["components"]["links"].values()
     bare = [link for link in links if "parameters" not in link]
     assert bare, "no link refers to a cloud in the body"
@@ -33,7 +38,7 @@ def before_call(context, case, **kwargs):
 
 
 def meaningful(request):
-    """The request with one of each two alternatives, rows of one length, and lists as long as the cloud."""
+    """Makes a request meaningful: one of two alternatives, equal rows, and lists as long as the cloud."""
     if "cloud" not in request:
         return rectangular(request) if "points" in request else request
     request = with_fit(request)
@@ -52,7 +57,7 @@ def meaningful(request):
 
 
 def with_fit(fit):
-    """Alpha or variances of the noise; of the kernel the parameters that its family has."""
+    """Keeps alpha or the noise variances, and only those kernel parameters that the family has."""
     others = {"noise_variances"} if "alpha" in fit else set()
     fit = {name: value for name, value in fit.items() if name not in others}
     if "kernel" in fit:
@@ -63,14 +68,14 @@ def with_fit(fit):
 
 
 def one_cloud(cloud):
-    """Its points where it has some, else its id."""
+    """Keeps the points of a cloud where it has some, else its id."""
     if "points" not in cloud:
         return {"id": cloud["id"]} if "id" in cloud else {"points": TRIANGLE}
     return rectangular({name: value for name, value in cloud.items() if name != "id"})
 
 
 def rectangular(cloud):
-    """Points and normals with rows as long as the first point, and as many normals as points."""
+    """Gives points and normals rows as long as the first point, and makes as many normals as points."""
     points = cloud["points"] or TRIANGLE
     dimension = max(len(points[0]), 1)
     cloud = {**cloud, "points": [resized(row, dimension) for row in points]}
@@ -81,6 +86,6 @@ def rectangular(cloud):
 
 
 def resized(items, length):
-    """The numbers or rows, cut or repeated to a length; ones where there are none."""
+    """Cuts or repeats numbers or rows to a length. Uses ones where there are none."""
     items = items or [1.0]
     return [items[i % len(items)] for i in range(length)]

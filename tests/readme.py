@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Runs the examples of pages against a server and compares the answers.
 
-    tests/readme.py [BASE_URL] [PAGE]…               asks the server at BASE_URL, http://localhost:8080 if absent
-    tests/readme.py --binary GRAMIAN [PAGE]…         starts that binary for each page, on a free port, and ends it
+    tests/readme.py [BASE_URL] [PAGE]…          asks the server at BASE_URL, http://localhost:8080 if absent
+    tests/readme.py --binary GRAMIAN [PAGE]…    starts that binary for each page, on a free port, and ends it
 
 Without pages it runs README.md, docs/walkthrough.md and docs/operations.md. No page depends on another.
 
 Every ```sh block that contains curl is run by bash, in order, in the root of the repository. The server's
-address replaces localhost:8080. The output is compared with the fenced block that follows, ```json or ```text:
+address replaces localhost:8080. The output is compared with the fenced block that follows, ```json or
+```text:
 
 - `…` matches anything: a JSON value, any run of entries of a list, any further members of an object, any part
   of a string, any number of lines of text.

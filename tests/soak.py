@@ -9,16 +9,18 @@ The server has a directory as its store. The clients:
 - register clouds, ask for estimates, list clouds and scrape metrics;
 - read slowly or not at all, send bodies that never end, leave midway, and ask for more than there is memory.
 
-Meanwhile a probe sends small requests, whose clouds are new or known. Before that, on another server, it does so
-beside factorizations of 16,400 points. These conditions must hold at the end:
+Meanwhile a probe sends small requests, whose clouds are new or known. Before that, on another server, it does
+so beside factorizations of 16,400 points. These conditions must hold at the end:
 
 - Every request that was read to its end was answered within its deadline and two seconds. Events are exempt.
 - There was no status of 500 and above, except 503 for refusals and 504 for deadlines.
-- The resident memory never exceeded the budget by more than a tenth. It was flat within 5 % over the second half.
-- Beside the factorizations, the 99th percentile of small requests was at most ten times that on the idle server.
-  A few time slices of the scheduler are also accepted: when every core computes, a waking thread waits its turn.
+- The resident memory never exceeded the budget by more than a tenth. It was flat within 5 % over the second
+  half.
+- Beside the factorizations, the 99th percentile of small requests was at most ten times that on the idle
+  server. A few time slices of the scheduler are also accepted: when every core computes, a waking thread
+  waits its turn.
 
-Needs only the standard library. The measured figures go to standard output as a table, and to the report as JSON.
+Needs only the standard library. Figures go to standard output as a table, and to the report as JSON.
 """
 
 import argparse
@@ -226,7 +228,7 @@ def post_jobs(soak, source):
 
 
 def send(soak, path, body, length=None):
-    """Sends a request over a new socket and returns the socket. `length` is the announced size of its body."""
+    """Sends a request over a new socket; returns the socket. `length` is the announced size of its body."""
     stream = socket.create_connection((soak.host, soak.port), timeout=DEADLINE + 30)
     head = f"POST {path} HTTP/1.1\r\nHost: soak\r\nContent-Type: application/json\r\n"
     stream.sendall(f"{head}Content-Length: {length or len(body)}\r\n\r\n{body}".encode())

@@ -4,9 +4,9 @@
     tests/with_server.py GRAMIAN COMMAND [ARGUMENT]…
 
 Starts the binary GRAMIAN on a free port, in its default configuration, and runs the command. The command gets
-the base URL of the server as GRAMIAN_URL, and the path of the binary as GRAMIAN_BINARY, in case it starts more
-servers. Then ends the server and exits with the status of the command. Neither sees other GRAMIAN_ variables.
-Needs only the standard library.
+the base URL of the server as GRAMIAN_URL, and the path of the binary as GRAMIAN_BINARY, in case it starts
+more servers. Then ends the server and exits with the status of the command. Neither sees other GRAMIAN_
+variables. Needs only the standard library.
 """
 
 import contextlib

@@ -1,1 +1,1 @@
-"""Measures gramian beside its references; `bench/run` starts it."""
+"""Measures gramian beside its references. `bench/run` starts it."""

@@ -13,7 +13,7 @@ from .groups import GROUPS
 from .report import Group, markdown, plain
 from .setting import Setting
 
-#: Cores in use before or after the run beyond which its times are disturbed.
+#: Number of cores in use before or after the run, above which its times count as disturbed.
 MAX_BUSY_CORES = 0.2
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,7 +50,7 @@ def parse() -> argparse.Namespace:
 
 
 def write_json(groups: list[Group], facts: list[tuple[str, str]]) -> None:
-    """Every figure with its verdict, for plots."""
+    """Writes every figure with its verdict to bench/results.json, for plots."""
     rows = {group.name: [{**asdict(row), "ratio": row.ratio, "holds": row.holds} for row in group.rows] for group in groups}
     document = {"machine": dict(facts), "command": sys.argv[1:], "groups": rows}
     (ROOT / "bench" / "results.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
@@ -78,7 +78,7 @@ def write_results(groups: list[Group], facts: list[tuple[str, str]], is_disturbe
 
 
 def growth() -> str:
-    """Draws docs/growth.svg and answers the table behind it."""
+    """Draws docs/growth.svg and returns the table behind it."""
     table = ROOT / "bench" / "growth.md"
     subprocess.run([sys.executable, ROOT / "bench" / "growth.py", "--table", table], check=True, stdout=subprocess.DEVNULL)
     return table.read_text().strip()

@@ -1,6 +1,7 @@
-"""The least that sending costs: `python -m harness.bare ADDRESS BYTES` answers every request with so many bytes.
+"""A bare socket server, the lower bound for the cost of sending an answer.
 
-A bare socket that writes from one buffer, in a process of its own, so that the client is the same as for a real server.
+`python -m harness.bare ADDRESS BYTES` answers every request with BYTES bytes, written from one buffer. It
+runs in a separate process, so that the client is the same as for a real server.
 """
 
 import socket
@@ -18,7 +19,7 @@ def main() -> None:
 
 
 def answer(connection: socket.socket, content: bytes) -> None:
-    """Serves one keep-alive connection; requests have no body."""
+    """Serves one keep-alive connection. Requests must have no body."""
     pending = b""
     while received := connection.recv(1 << 16):
         pending += received

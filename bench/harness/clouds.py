@@ -10,7 +10,10 @@ TORUS_RADII = (1.0, 0.4)
 
 
 def sphere(n: int, angle: float = 0.0) -> Floats:
-    """n points on the unit sphere, `[n, 3]`: a Fibonacci spiral, turned by an angle; the same as in benches/support."""
+    """Returns n points on the unit sphere, `[n, 3]`: a Fibonacci spiral turned by `angle` (radians).
+
+    benches/support makes the same points.
+    """
     i = np.arange(n)
     z = 1 - (2 * i + 1) / n
     r, t = np.sqrt(1 - z * z), GOLDEN * i + angle
@@ -18,14 +21,14 @@ def sphere(n: int, angle: float = 0.0) -> Floats:
 
 
 def cube(n: int, seed: int) -> Floats:
-    """n random points in the unit cube, `[n, 3]`."""
+    """Returns n random points in the unit cube, `[n, 3]`."""
     return np.random.default_rng(seed).random((n, 3))
 
 
 def torus(n: int, seed: int = 0) -> tuple[Floats, Floats, Floats]:
-    """Random points on a torus, even by area, `[n, 3]`, with outward normals `[n, 3]` and curvatures `[n, 2]`.
+    """Returns random points on a torus `[n, 3]`, outward normals `[n, 3]` and curvatures `[n, 2]`.
 
-    The principal curvatures ascend: cos v/(R + r cos v) and 1/r.
+    The points are uniform by area. The principal curvatures ascend: cos v/(R + r cos v) and 1/r.
     """
     major, minor = TORUS_RADII
     random = np.random.default_rng(seed)
@@ -40,7 +43,10 @@ def torus(n: int, seed: int = 0) -> tuple[Floats, Floats, Floats]:
 
 
 def matern_gram(points: Floats, length_scale: float, alpha: float) -> Floats:
-    """The Matérn 5/2 matrix K + αI in column-major order, `(1 + s + s²/3) e^{−s}` with s = √5 |x − y|/ℓ."""
+    """Returns the Matérn 5/2 matrix K + αI in column-major order.
+
+    k(x, y) = (1 + s + s²/3) e^{−s} with s = √5 |x − y|/ℓ.
+    """
     squares = np.sum(points**2, axis=1)
     squared = np.maximum(squares[:, None] + squares[None, :] - 2 * points @ points.T, 0)
     s = np.sqrt(5 * squared) / length_scale
@@ -50,10 +56,10 @@ def matern_gram(points: Floats, length_scale: float, alpha: float) -> Floats:
 
 
 def harmonic(points: Floats) -> Floats:
-    """A spherical harmonic of degree 3 on the unit sphere, xyz: its Laplace–Beltrami is −12 xyz."""
+    """Evaluates xyz, a spherical harmonic of degree 3 on the unit sphere: Δ(xyz) = −12 xyz."""
     return np.prod(points, axis=1)
 
 
 def wave(points: Floats) -> Floats:
-    """Smooth values in space."""
+    """Evaluates sin 3x + z cos 2y, a smooth function in space."""
     return np.sin(3 * points[:, 0]) + np.cos(2 * points[:, 1]) * points[:, 2]

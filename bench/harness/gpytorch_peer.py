@@ -1,4 +1,4 @@
-"""GPyTorch's exact Gaussian process on the CPU, imported only where it is asked for."""
+"""GPyTorch's exact Gaussian process on the CPU. Imported only for `bench/run --with-gpytorch`."""
 
 import gpytorch
 import torch
@@ -7,7 +7,7 @@ from .clouds import Floats
 
 
 class Exact(gpytorch.models.ExactGP):
-    """No mean, Matérn 5/2 with a fixed length scale."""
+    """An exact Gaussian process with zero mean and a Matérn 5/2 kernel of fixed length scale."""
 
     def __init__(
         self,
@@ -26,11 +26,11 @@ class Exact(gpytorch.models.ExactGP):
 
 
 def posterior(points: Floats, values: Floats, queries: Floats, length_scale: float, alpha: float) -> tuple[Floats, Floats]:
-    """Means and standard deviations of the latent function in float64, by Cholesky at every size."""
+    """Returns means and standard deviations of the latent function in float64, by Cholesky at every size."""
     x, y, z = (torch.from_numpy(array).double() for array in (points, values, queries))
     likelihood = gpytorch.likelihoods.FixedNoiseGaussianLikelihood(torch.full((len(points),), alpha, dtype=torch.float64))
     model = Exact(x, y, likelihood, length_scale).double().eval()
-    # GPyTorch raises smaller noise to 1e-4 and beyond some hundred points iterates, unless told not to.
+    # By default GPyTorch raises smaller noise to 1e-4, and uses iterative solvers beyond some hundred points.
     with (
         torch.no_grad(),
         gpytorch.settings.min_fixed_noise(double_value=alpha),

@@ -1,7 +1,8 @@
 """LAPACK of SciPy's OpenBLAS as a child process: `python -m harness.lapack N LENGTH_SCALE ALPHA`.
 
-Its matrix is the Matérn 5/2 matrix of the sphere with N points. Each line on standard input, `ROUTINE THREADS [COLUMNS]`,
-is answered with the seconds of one call on warm memory. A process of its own, so that its threads do not linger in ours.
+The matrix is the Matérn 5/2 matrix of the sphere with N points. Each line on standard input,
+`ROUTINE THREADS [COLUMNS]`, is answered with the seconds of one call on warm memory. LAPACK runs in a
+separate process, so that its threads do not linger in ours.
 """
 
 import sys
@@ -19,7 +20,7 @@ READ_BYTES = 512 << 20
 
 
 class Routines:
-    """The matrix, its factor, and room to work in."""
+    """The matrix, its factor, and a work array."""
 
     def __init__(self, n: int, length_scale: float, alpha: float) -> None:
         self.matrix = matern_gram(sphere(n), length_scale, alpha)
@@ -34,7 +35,7 @@ class Routines:
         return factor
 
     def prepare(self, routine: str, n_columns: int) -> Callable[[], object]:
-        """Fills the room and answers with the call to be timed."""
+        """Fills the work array and returns the call to be timed."""
         n = len(self.matrix)
         if routine == "dpotrf":
             np.copyto(self.work, self.matrix)
@@ -53,14 +54,14 @@ class Routines:
         raise ValueError(routine)
 
     def vector(self) -> Floats:
-        """Numbers that no cache holds."""
+        """Returns a vector too large for any cache."""
         if not hasattr(self, "_vector"):
             self._vector = np.ones(READ_BYTES // 8)
         return self._vector
 
 
 def openblas_core() -> str:
-    """The kernels that OpenBLAS chose for this machine."""
+    """Returns the name of the kernels that OpenBLAS chose for this machine."""
     cores = [entry["architecture"] for entry in threadpool_info() if entry["internal_api"] == "openblas"]
     return cores[0] if cores else "unknown"
 

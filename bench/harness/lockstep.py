@@ -1,4 +1,4 @@
-"""Child processes that do one round when they are told to: so that ours and the reference take turns."""
+"""Child processes that run one round on request, so that ours and the reference take turns."""
 
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -6,7 +6,10 @@ from types import TracebackType
 
 
 class Child:
-    """A process that answers each line on standard input with lines `name<TAB>figure<TAB>unit` and an empty line."""
+    """A child process that runs one round per line on standard input.
+
+    It answers each line with lines `name<TAB>figure<TAB>unit` and an empty line.
+    """
 
     def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
         self._process = subprocess.Popen(
@@ -14,7 +17,7 @@ class Child:
         )
 
     def ask(self, line: str = "") -> dict[str, float]:
-        """Tells the process to go, and waits for its figures."""
+        """Asks the process for one round, and waits for its figures."""
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()

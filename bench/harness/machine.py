@@ -1,4 +1,4 @@
-"""What a table of times must say about itself: machine, versions, date."""
+"""Facts that a table of times must state: machine, versions, date."""
 
 import os
 import subprocess
@@ -27,13 +27,13 @@ INSTRUCTION_SETS = ("avx2", "fma", "avx512f", "avx512vl", "avx512dq")
 
 
 def describe(setting: Setting) -> list[tuple[str, str]]:
-    """Names and values, in the order of the report."""
+    """Starts a server and returns the facts as names and values, in the order of the report."""
     with setting.gramian() as server:
         return facts(setting, server.version())
 
 
 def facts(setting: Setting, version: Mapping[str, str]) -> list[tuple[str, str]]:
-    """The same, where a server has said its version."""
+    """Returns the facts as names and values. `version` is a server's answer to `/version`."""
     cpu = _cpu()
     flags = " ".join(name for name in INSTRUCTION_SETS if name in cpu.get("flags", "").split())
     return [
@@ -52,7 +52,7 @@ def facts(setting: Setting, version: Mapping[str, str]) -> list[tuple[str, str]]
 
 
 def busy_cores(seconds: float = 3.0) -> float:
-    """Cores that others use, on average over some seconds in which we sleep."""
+    """Returns the number of cores that other processes use, averaged over some seconds of sleep."""
     before = _cpu_ticks()
     time.sleep(seconds)
     idle, total = (after - first for after, first in zip(_cpu_ticks(), before, strict=True))
@@ -60,7 +60,7 @@ def busy_cores(seconds: float = 3.0) -> float:
 
 
 def _cpu_ticks() -> tuple[int, int]:
-    """Idle ticks, those that wait for a disk included, and all ticks since the start of the machine."""
+    """Returns idle ticks (including waits for a disk) and all ticks since the machine started."""
     ticks = [int(word) for word in Path("/proc/stat").read_text().splitlines()[0].split()[1:]]
     return ticks[3] + ticks[4], sum(ticks[:8])
 
@@ -78,7 +78,7 @@ def _caches() -> str:
 
 
 def _commit(root: Path) -> str:
-    """The commit of the sources; what the run itself writes does not count as a change."""
+    """Returns the commit of the sources. Files that the run itself writes do not count as changes."""
     commit = _output(["git", "-C", str(root), "rev-parse", "--short=10", "HEAD"])
     changed = _output(["git", "-C", str(root), "status", "--porcelain", "-uno", "--", ".", ":!bench"])
     return f"{commit} with changes" if changed else commit

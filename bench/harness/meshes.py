@@ -1,7 +1,7 @@
-"""Normals of the service at the vertices of meshes, against those of the faces.
+"""Compares normals of the service at the vertices of meshes with the normals of the faces.
 
-Four resolutions of the dragon, and the cortex: the surfaces of white and grey matter of a mean brain (fsaverage5), whose
-folds are about as thin as their vertices are apart.
+The meshes are four resolutions of the dragon, and the cortex. The cortex is the surfaces of white and grey
+matter of a mean brain (fsaverage5). Its folds are about as thin as the distance between its vertices.
 """
 
 import base64
@@ -28,7 +28,8 @@ SURFACES = ["white_left", "white_right", "pial_left", "pial_right"]
 
 OFF = np.cos(np.radians(30))
 
-#: Length of the mean normal of the faces at a vertex, weighted by area, from which they agree: 1 where they are one.
+#: Smallest length of the area-weighted mean normal of the faces at a vertex for which the faces agree. The
+#: length is 1 where all normals are equal.
 AGREE = 0.9
 
 
@@ -42,7 +43,10 @@ def main() -> None:
 
 
 def row(name: str, vertices: Floats, faces: NDArray[np.int64]) -> str:
-    """Of the points whose faces agree; off and flipped are shares of the normals without a flag."""
+    """Measures one mesh and returns its row of the table.
+
+    Only points whose faces agree count. `off` and `flipped` are shares of the normals without a flag.
+    """
     points, sums, areas = of_mesh(vertices, faces)
     lengths = np.linalg.norm(sums, axis=1)
     is_known = (lengths >= AGREE * areas) & (areas > 0)
@@ -74,7 +78,7 @@ def ask(body: dict[str, object]) -> dict[str, list]:
 
 
 def cortex(surface: str) -> tuple[Floats, NDArray[np.int64]]:
-    """Vertices and triangles, of the file that a package of PyPI has."""
+    """Returns vertices and triangles of a surface in the nilearn package of PyPI."""
     if not (wheels := list(FOLDER.glob("nilearn-*.whl"))):
         download = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", str(FOLDER), CORTEX]
         subprocess.run(download, check=True)
@@ -86,7 +90,7 @@ def cortex(surface: str) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def array(element: ElementTree.Element) -> NDArray:
-    """An array of a GIFTI file."""
+    """Decodes an array of a GIFTI file."""
     assert element.get("Encoding") == "GZipBase64Binary" and element.get("Endian") == "LittleEndian"
     kind = {"NIFTI_TYPE_FLOAT32": "<f4", "NIFTI_TYPE_INT32": "<i4"}[element.attrib["DataType"]]
     data = zlib.decompress(base64.b64decode(element.findtext("Data", "")))

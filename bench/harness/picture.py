@@ -1,4 +1,4 @@
-"""Draws docs/scan.png: a scan coloured by its mean curvature, beside the same coloured by the standard deviation of it."""
+"""Draws docs/scan.png: a scan coloured by its mean curvature, and by the standard deviation of that."""
 
 import argparse
 import io
@@ -23,15 +23,16 @@ BINARY = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" /
 PICTURE = ROOT / "docs" / "scan.png"
 MAX_BYTES = 400_000
 
-#: The scan is in metres; a millimetre is what its curvatures are read in.
+#: Millimetres per metre: the scan is in metres, its curvatures are shown in 1/mm.
 MILLIMETRES = 1e3
 
-#: The camera goes around the upright axis of the scan, then up, in degrees. Light comes from above it, to the left.
+#: Camera angles in degrees: first around the upright axis of the scan, then up. Light comes from above the
+#: camera, to its left.
 AROUND, UP = -25.0, 12.0
 LIGHT = np.array([-0.45, 0.55, 0.7])
 AMBIENT = 0.55
 
-#: In inches, and points of the picture to an inch: a page 800 points wide shows every second one.
+#: Size in inches and pixels per inch. A page 800 pixels wide shows the picture at half its resolution.
 WIDTH, HEIGHT, RESOLUTION = 10.0, 4.3, 160
 MARKER = 4.6
 BENT = 0.5
@@ -62,9 +63,9 @@ def main() -> None:
 
 
 def picture(points: Floats, normals: Floats, curvatures: Floats, deviations: Floats) -> bytes:
-    """The two panels as a PNG, from the same side and with the same light."""
+    """Draws the two panels, seen from the same side with the same light; returns a PNG."""
     turned, facing = points @ camera().T, normals @ camera().T
-    # The side that is turned away hides nothing that is seen; the nearest points are drawn last.
+    # Points turned away from the camera are left out. The nearest points are drawn last, over the others.
     seen = np.flatnonzero((facing[:, 2] > 0) & np.isfinite(curvatures))
     seen = seen[np.argsort(turned[seen, 2])]
     shade = AMBIENT + (1 - AMBIENT) * np.clip(facing[seen] @ LIGHT / np.linalg.norm(LIGHT), 0, 1)
@@ -75,7 +76,7 @@ def picture(points: Floats, normals: Floats, curvatures: Floats, deviations: Flo
     written = io.BytesIO()
     figure.savefig(written, format="png")
     plt.close(figure)
-    # A palette takes a third of the bytes.
+    # With a palette the file is a third as large.
     image = Image.open(written).convert("RGB").quantize(256, kmeans=20, dither=Image.Dither.NONE)
     packed = io.BytesIO()
     image.save(packed, format="png", optimize=True)
@@ -85,7 +86,10 @@ def picture(points: Floats, normals: Floats, curvatures: Floats, deviations: Flo
 def panel(
     axes: Axes, places: NDArray[np.float64], shade: Floats, values: Floats, colours: str, scale: Normalize, label: str
 ) -> None:
-    """Points as discs in the colours of their values, darker where they are turned from the light; with a bar of the colours."""
+    """Draws points as discs coloured by their values, with a colour bar.
+
+    Discs are darker where the surface is turned away from the light.
+    """
     mapped = plt.cm.ScalarMappable(scale, colours)
     rgb = mapped.to_rgba(values)[:, :3] * shade[:, None]
     axes.scatter(*places.T, s=MARKER, c=rgb, linewidths=0)
@@ -98,7 +102,7 @@ def panel(
 
 
 def camera() -> Floats:
-    """The axes of the picture as rows: right, up, towards the eye."""
+    """Returns the axes of the picture as rows: right, up, towards the eye."""
     a, b = np.radians([AROUND, UP])
     around = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     up = np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])

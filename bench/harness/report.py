@@ -1,4 +1,4 @@
-"""Rows of the table: figures, bounds, verdicts."""
+"""Rows of the tables that `bench/run` writes: figures, bounds, verdicts."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,7 +11,10 @@ UNITS_OF_SECONDS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
 
 @dataclass(frozen=True)
 class Figure:
-    """A number with its unit; `median` where the value is the best of several rounds."""
+    """A number with its unit.
+
+    `median` is set where the value is the best of several rounds.
+    """
 
     value: float
     unit: str
@@ -24,7 +27,7 @@ class Figure:
 
     @classmethod
     def rate(cls, amount: float, times: Times, unit: str) -> "Figure":
-        """`amount` per second of the best round."""
+        """Returns `amount` per second in the best round, and in the median round."""
         return cls(amount / times.best, unit, amount / times.median)
 
     def __str__(self) -> str:
@@ -34,7 +37,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Bound:
-    """What the issue asks of `ours`, of ours/reference, of reference/ours (speedup), or of ours − reference."""
+    """A limit for `ours`, the ratio ours/reference, the speedup reference/ours, or ours − reference."""
 
     quantity: Literal["figure", "ratio", "speedup", "difference"]
     relation: Literal["≤", "≥"]
@@ -47,10 +50,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table.
+    """A line of the table.
 
-    `ours` is None where the figure cannot be measured, and `remark` says why. In a contest the reference is a peer and
-    somebody wins; `more_is_better` for rates.
+    `ours` is None where the figure cannot be measured. `remark` then says why. In a contest the reference is
+    a peer, and the verdict names the winner. `more_is_better` is set for rates.
     """
 
     what: str
@@ -69,7 +72,7 @@ class Row:
 
     @property
     def holds(self) -> bool | None:
-        """Whether the bound holds; None without a bound or a figure."""
+        """True if the bound holds, None without a bound or a figure."""
         shortfall = self._shortfall()
         return None if shortfall is None else shortfall <= 0
 
@@ -95,7 +98,10 @@ class Row:
         return 1 / ratio if bound.quantity == "speedup" else ratio
 
     def _shortfall(self) -> float | None:
-        """How far the wrong side of the bound: a fraction of it, or, for a difference, in its unit."""
+        """Returns the distance beyond the bound: relative to the bound, or in its unit for a difference.
+
+        It is negative or zero where the bound holds.
+        """
         measured = None if self.bound is None else self._measured(self.bound)
         if self.bound is None or measured is None:
             return None
@@ -117,7 +123,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Group:
-    """The rows that one module measures, with what the reader must know of all of them."""
+    """The rows that one module measures, with their common name and title."""
 
     name: str
     title: str
@@ -125,7 +131,7 @@ class Group:
 
 
 def significant(value: float) -> str:
-    """Three significant digits, without an exponent where that is readable."""
+    """Formats a number with three significant digits, without an exponent where that is readable."""
     if value == 0 or 1e-3 <= abs(value) < 1e6:
         digits = 3 if value == 0 else max(0, 2 - _decade(value))
         return f"{value:.{digits}f}"
@@ -137,7 +143,7 @@ def _decade(value: float) -> int:
 
 
 def markdown(groups: Iterable[Group]) -> str:
-    """A table per group."""
+    """Formats a Markdown table per group."""
     sections = []
     for group in groups:
         lines = [
@@ -152,7 +158,7 @@ def markdown(groups: Iterable[Group]) -> str:
 
 
 def plain(group: Group) -> str:
-    """The same for a terminal."""
+    """Formats a group for a terminal."""
     lines = [f"-- {group.name}: {group.title}"]
     for row in group.rows:
         what, ours, reference, ratio, bound, verdict, remark = _cells(row)
@@ -166,7 +172,7 @@ def _cells(row: Row) -> list[str]:
 
 
 def _ratios(row: Row) -> str:
-    """The ratio, that of the medians in brackets."""
+    """Formats the ratio, with the ratio of the medians in brackets."""
     if row.ratio is None or row.ours is None or row.reference is None:
         return ""
     if row.ours.median is None or not row.reference.median:

@@ -18,7 +18,7 @@ STAGES_OF_COMPUTATION = ("parse", "gram", "factor", "solve", "evaluate")
 
 @dataclass(frozen=True)
 class Answer:
-    """A response with the seconds from the first byte sent to the last byte read."""
+    """A response, with the seconds from the first byte sent to the last byte read."""
 
     status: int
     headers: Mapping[str, str]
@@ -27,7 +27,7 @@ class Answer:
 
     @property
     def stages(self) -> dict[str, float]:
-        """The entries of Server-Timing, in seconds."""
+        """Returns the entries of Server-Timing, in seconds."""
         entries = [entry.partition(";dur=") for entry in self.headers.get("server-timing", "").split(",") if entry]
         return {name.strip(): float(milliseconds) / 1e3 for name, _, milliseconds in entries}
 
@@ -36,17 +36,20 @@ class Answer:
 
 
 class Refused(RuntimeError):
-    """A status that is not of success."""
+    """Raised when a request is answered with a status other than success."""
 
 
 class Client:
-    """One keep-alive connection. Bodies are given encoded: encoding is the caller's to time or to leave out."""
+    """A client with one keep-alive connection.
+
+    `request` takes encoded bodies: the caller decides whether encoding is timed.
+    """
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port)
 
     def request(self, method: str, path: str, body: bytes | None = None, headers: Mapping[str, str] | None = None) -> Answer:
-        """Any status is an answer."""
+        """Sends a request and returns the answer, whatever its status."""
         sent = {"Content-Type": "application/json", **(headers or {})} if body is not None else dict(headers or {})
         began = time.perf_counter()
         self._connection.request(method, path, body, sent)
@@ -54,25 +57,25 @@ class Client:
         content = response.read()
         seconds = time.perf_counter() - began
         if response.status >= 400:
-            # A request refused before its body was read leaves a connection that the server closes.
+            # The server closes the connection after refusing a request whose body it has not read.
             self._connection.close()
         names = {name.lower(): value for name, value in response.getheaders()}
         return Answer(response.status, names, content, seconds)
 
     def post(self, path: str, request: Any, headers: Mapping[str, str] | None = None) -> Answer:
-        """Posts JSON; the status must be one of success."""
+        """Posts JSON. Raises `Refused` unless the status is one of success."""
         answer = self.request("POST", path, encode(request), headers)
         if answer.status >= 300:
             raise Refused(f"{answer.status} {answer.body[:300].decode(errors='replace')}")
         return answer
 
     def forget(self, answer: Answer) -> None:
-        """Deletes the cloud of an answer and with it all that was computed from it."""
+        """Deletes the cloud of an answer, together with everything computed from it."""
         self.request("DELETE", f"/v1/clouds/{answer.json()['diagnostics']['cloud_id']}")
 
 
 def encode(request: Any) -> bytes:
-    """JSON with every float exact; NumPy arrays become arrays of numbers."""
+    """Encodes JSON with every float exact. NumPy arrays become arrays of numbers."""
     return orjson.dumps(request, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
@@ -96,7 +99,7 @@ class Server:
         Path(f"/proc/{self._process.pid}/clear_refs").write_text("5")
 
     def memory_bytes(self, field: str) -> int:
-        """`VmHWM`, the peak of the resident set since the last reset, or `VmRSS`."""
+        """Returns `VmHWM` (the peak of the resident set since the last reset) or `VmRSS`."""
         lines = Path(f"/proc/{self._process.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(field + ":"))
 

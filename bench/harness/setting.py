@@ -1,4 +1,4 @@
-"""Where things are and how long a run may take."""
+"""Locations of builds, and sizes and rounds of a run."""
 
 import json
 import os
@@ -27,7 +27,7 @@ class Setting:
         return cls(root, is_quick, with_gpytorch, _bench_executables(root))
 
     def size(self, n: int, quick: int = 400) -> int:
-        """A problem size, made small in a quick run."""
+        """Returns a problem size, limited to `quick` in a quick run."""
         return min(n, quick) if self.is_quick else n
 
     def rounds(self, n: int) -> int:
@@ -44,11 +44,11 @@ class Setting:
         return Server(self._release / "examples" / "echo", [], self.environment)
 
     def bare(self, n_bytes: int) -> Server:
-        """A socket that sends as many bytes whatever is asked."""
+        """Starts a socket server that answers every request with n_bytes bytes."""
         return Server(self.python, ["-m", "harness.bare"], self.environment, more=[str(n_bytes)])
 
     def bench(self, name: str, *arguments: str) -> Child:
-        """A benchmark in lockstep."""
+        """Starts a benchmark in lockstep."""
         return Child([str(self.benches[name]), *arguments, "--lockstep"], self.environment)
 
     def lapack(self, n: int, length_scale: float, alpha: float) -> Child:
@@ -56,7 +56,7 @@ class Setting:
         return Child(command, self.environment)
 
     def output_of_bench(self, name: str, arguments: Sequence[str] = ()) -> str:
-        """What a benchmark prints that runs by itself."""
+        """Runs a benchmark to its end and returns what it prints."""
         command = [str(self.benches[name]), *arguments]
         return subprocess.run(command, env=self.environment, check=True, capture_output=True, text=True).stdout
 

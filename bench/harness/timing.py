@@ -1,4 +1,4 @@
-"""Times of tasks that take turns."""
+"""Timing of tasks that take turns."""
 
 import statistics
 import time
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds of one task, a number per round."""
+    """Seconds of one task, one number per round."""
 
     seconds: tuple[float, ...]
 
@@ -27,15 +27,16 @@ class Times:
         return Times(tuple(a + b for a, b in zip(self.seconds, other.seconds, strict=True)))
 
 
-#: Threads of a numerical library spin for a while after a call; whoever is measured next must not pay for it.
+#: Pause in seconds. Threads of a numerical library spin for a while after a call and would slow the next
+#: task.
 SPIN_SECONDS = 0.1
 
 
 def alternate(n_rounds: int, tasks: Mapping[str, Callable[[int], float]], pause: float = 0.0) -> dict[str, Times]:
     """Runs all tasks once per round, in turn, so that a drifting machine disturbs all of them.
 
-    A task gets the number of the round and answers with the seconds that count. Round 0 warms up and is forgotten. Before
-    each task there is a pause, in seconds.
+    A task takes the number of the round and returns the seconds that count. Round 0 warms up and is
+    discarded. `pause` seconds pass before each task.
     """
     seconds: dict[str, list[float]] = {name: [] for name in tasks}
     for round_number in range(n_rounds + 1):
@@ -48,12 +49,12 @@ def alternate(n_rounds: int, tasks: Mapping[str, Callable[[int], float]], pause:
 
 
 def fastest(candidates: Mapping[str, Times]) -> tuple[str, Times]:
-    """The candidate with the best time, with its name."""
+    """Returns the candidate with the best time, and its name."""
     return min(candidates.items(), key=lambda candidate: candidate[1].best)
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
-    """What a piece of work answers, and the seconds it took."""
+    """Runs a piece of work; returns its result and the seconds it took."""
     began = time.perf_counter()
     result = work()
     return result, time.perf_counter() - began

@@ -1,11 +1,15 @@
-"""Model selection beside scikit-learn: the greatest log marginal likelihood on regression sets of its package, and the time to find it.
+"""Compares model selection with scikit-learn on regression sets of its package.
 
     cargo build --release --example model_selection
-    bench/.venv/bin/python bench/peers/model_selection.py target/release/examples/model_selection [--restarts N]
+    bench/.venv/bin/python bench/peers/model_selection.py \
+        target/release/examples/model_selection [--restarts N]
 
-Coordinates and values are standardised; kernels are a variance times Gauss or Matern 5/2 with a length scale for each axis, and noise. Both
-have the same start, bounds and number of restarts, though the restarts themselves differ. Times are the best of several rounds that take turns,
-those of scikit-learn on one thread or on all, whichever is faster.
+Prints the greatest log marginal likelihood that each finds, and the time to find it.
+
+Coordinates and values are standardised. Kernels are a variance times Gauss or Matern 5/2 with a length scale
+for each axis, plus noise. Both programs have the same start, bounds and number of restarts. The restarts
+themselves differ. Times are the best of several rounds that take turns. scikit-learn runs on one thread and
+on all, and the faster time counts.
 """
 
 import argparse
@@ -70,7 +74,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     threads = sorted({1, os.cpu_count() or 1})
-    # Length scales of axes that do not matter end at their bounds.
+    # Length scales of irrelevant axes end at their bounds, of which scikit-learn warns.
     warnings.simplefilter("ignore", ConvergenceWarning)
     print("| set | n | d | kernel | ours | scikit-learn | difference | ours | scikit-learn | times faster | evaluations | converged |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes dashboard.json, which Grafana imports, of panels.py.
+"""Writes dashboard.json, which Grafana imports, from panels.py.
 
 deploy/grafana/dashboard.py           writes it beside this file
-deploy/grafana/dashboard.py --check   says whether it is what would be written
+deploy/grafana/dashboard.py --check   fails if it differs from what would be written
 """
 
 import json
@@ -35,7 +35,7 @@ def panel_json(number, panel, place):
 
 
 def dashboard():
-    """The document that Grafana imports."""
+    """Returns the document that Grafana imports."""
     shown, y = [], 0
     for title, row in ROWS.items():
         shown.append(

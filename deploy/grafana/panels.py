@@ -1,41 +1,41 @@
-"""The panels of the dashboard, in rows, and what they ask Prometheus for; dashboard.py writes them for Grafana.
+"""Panels of the dashboard, in rows, with their Prometheus queries. dashboard.py writes them for Grafana.
 
 deploy/test sends each query to a Prometheus that scrapes replicas under load.
 """
 
-# $instance is what is chosen at the top of the dashboard.
+# $instance is the selection at the top of the dashboard.
 OF = 'job="gramian", instance=~"$instance"'
 
 
 def rate(family, labels="", by=""):
-    """What a counter does per second, summed but for the labels in `by`."""
+    """Returns the query for a counter's rate per second, summed over all labels except those in `by`."""
     labels = f"{OF}, {labels}" if labels else OF
     return f"sum {f'by ({by}) ' if by else ''}(rate({family}{{{labels}}}[$__rate_interval]))"
 
 
 def share(family, labels):
-    """The share of those with these labels in all that a counter counts; 0 if there is none yet."""
+    """Returns the query for the share of a counter's rate that has these labels. 0 if there is none yet."""
     return f"({rate(family, labels)} or vector(0)) / {rate(family)}"
 
 
 def quantile(share, by=""):
-    """A quantile of the time of requests under /v1."""
+    """Returns the query for a quantile of the time of requests under /v1."""
     buckets = rate("gramian_http_request_duration_seconds_bucket", 'route=~"/v1/.*"', f"le{by and ', ' + by}")
     return f"histogram_quantile({share}, {buckets})"
 
 
 def used(part):
-    """The share of a part of the memory that is used."""
+    """Returns the query for the used share of a part of the memory."""
     bytes_of = f'_bytes{{{OF}, part="{part}"}}'
     return f"gramian_memory_used{bytes_of} / gramian_memory_limit{bytes_of}"
 
 
 def gauge(family, labels=""):
-    """What holds now, of each replica."""
+    """Returns the query for the current value of a gauge on each replica."""
     return f"{family}{{{OF}{labels and ', ' + labels}}}"
 
 
-# Row: panels; a panel: title, unit, its queries with their legends, and what it is for.
+# Panels by row. A panel is a title, a unit, queries by legend, and a description.
 ROWS = {
     "At a glance": [
         ("Replicas that answer", "none", {"replicas": 'sum(up{job="gramian"})'}, "Of those that Prometheus knows."),
@@ -190,5 +190,5 @@ ROWS = {
 
 
 def queries():
-    """All that is asked, by the title of the panel."""
+    """Returns all queries, each with the title of its panel."""
     return [(title, query) for row in ROWS.values() for title, _, queries, _ in row for query in queries.values()]

@@ -1,4 +1,8 @@
-"""The Helm chart, by Helm's own engine and the schemas of Kubernetes; what else the fleet has, without its programs."""
+"""Checks of the shipped files that need no running fleet.
+
+The Helm chart is rendered by Helm's own engine and validated by the schemas of Kubernetes. compose.yaml and
+envoy.yaml are checked as text.
+"""
 
 import re
 
@@ -12,10 +16,11 @@ CHART = DEPLOY / "helm/gramian"
 OPEN = {"keys": {"allowAnonymous": True}}
 KEYS = {"keys": {"file": '[[key]]\nname = "a"\nhash = "blake3:00"\n'}}
 STORE = {"store": {"url": "s3://bucket/prefix", "variables": {"AWS_REGION": "x"}, "existingSecret": "bucket"}}
-# As Helm reads them from a file of values: numbers are floating-point.
+# Settings as Helm reads them from a file of values: numbers are floating-point.
 SETTINGS = {"GRAMIAN_CACHE_BYTES": 8589934592.0, "GRAMIAN_DEADLINE_SECONDS": 2.5, "OTEL_TRACES_SAMPLER": "traceidratio"}
 WRITTEN = ['"8589934592"', '"2.5"', '"traceidratio"']
-# What users would set, and the kinds that come of it.
+# Number of objects by kind that the chart makes by default. `VARIANTS`: values that users would set, with the
+# kinds that they result in.
 BASE = {"ServiceAccount": 1, "Service": 2, "StatefulSet": 1, "ConfigMap": 1, "Deployment": 1, "PodDisruptionBudget": 2}
 VARIANTS = {
     "open, one router": ({**OPEN, "router": {"replicas": 1}}, BASE),
@@ -27,12 +32,12 @@ VARIANTS = {
         {**BASE, "HorizontalPodAutoscaler": 1, "NetworkPolicy": 1, "PodMonitor": 2},
     ),
 }
-# What has to be refused, with what is then said.
+# Values that have to be refused, by the words that the refusal contains.
 REFUSED = {"who may use": {}, "schema": {**OPEN, "settings": {"GRAMIAN_THREAD-S": "1"}}}
 
 
 def check(report):
-    """Lints and renders it, validates what comes out, and compares the router's file with the shipped one."""
+    """Lints and renders the chart, validates its objects, and checks the files of router and fleet."""
     chart = helm.Chart.load(str(CHART))
     lint = helm.lint(str(CHART), OPEN, strict=True)
     errors = [message for message in lint["messages"] if message["severity"] > 1]
@@ -62,7 +67,7 @@ def check(report):
 
 
 def rendered(chart, values, live=None):
-    """The objects that the chart makes, of a cluster that is asked for those that are there."""
+    """Returns the objects that the chart makes. It may ask the cluster `live` for existing objects."""
     release = {"name": "gramian", "namespace": "test"}
     files = live.render(chart, values, **release) if live else chart.render(values, **release)
     documents = [
@@ -72,7 +77,7 @@ def rendered(chart, values, live=None):
 
 
 def scaling(report, chart):
-    """Who turns autoscaling on keeps the replicas that are there."""
+    """Checks that turning autoscaling on keeps the existing number of replicas."""
 
     def n_replicas(n, is_on, live=None):
         values = {**OPEN, "replicas": n, "autoscaling": {"enabled": is_on, "minReplicas": 3}}
@@ -86,12 +91,12 @@ def scaling(report, chart):
 
 
 def stateful_set(documents):
-    """What the replicas are."""
+    """Returns the specification of the replicas."""
     return next(document["spec"] for document in documents if document["kind"] == "StatefulSet")
 
 
 def faults(document):
-    """What the schema of Kubernetes says against an object; those of operators have none."""
+    """Returns the faults of an object by the schema of Kubernetes. Objects of operators have no schema."""
     if document["kind"] == "PodMonitor":
         return []
     try:
@@ -102,7 +107,7 @@ def faults(document):
 
 
 def refusal(chart, values):
-    """How values are refused; empty if they are not."""
+    """Returns the message that refuses values, or an empty string if they are accepted."""
     try:
         chart.validate_schema(values)
     except helm.HelmError as error:
@@ -115,7 +120,7 @@ def refusal(chart, values):
 
 
 def compare_routers(report, documents):
-    """The configuration in the chart is the tested one but for the names of replicas, and comments."""
+    """Checks that the chart's haproxy.cfg is the tested one, apart from comments and names of replicas."""
     texts = [document["data"]["haproxy.cfg"] for document in documents if document["kind"] == "ConfigMap"]
     for number, name in enumerate(REPLICAS):
         texts = [text.replace(f"gramian-{number}.gramian-replicas.test.svc.cluster.local", name) for text in texts]
@@ -126,12 +131,12 @@ def compare_routers(report, documents):
 
 
 def statements(text):
-    """The lines that say something."""
+    """Returns the lines that are neither empty nor comments."""
     return [line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith("#")]
 
 
 def compose(report):
-    """Every file that compose.yaml mounts is here, and every service that one waits for."""
+    """Checks that all files and services named in compose.yaml exist, and that the image gets no secrets."""
     services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
     mounts = [
         volume for service in services.values() for volume in service.get("volumes", []) if volume.startswith("./")
@@ -149,7 +154,7 @@ def compose(report):
 
 
 def envoy(report):
-    """No route has an end for whole answers: those that stream, such as events of jobs, have none."""
+    """Checks that no route limits the time of whole answers: streams, such as events of jobs, never end."""
     text = (DEPLOY / "envoy/envoy.yaml").read_text()
     timeouts = re.findall(r"^ +cluster: replicas\n +timeout: (\S+)$", text, re.MULTILINE)
     n_routes = len(re.findall(r"^ +route:$", text, re.MULTILINE))

@@ -1,4 +1,4 @@
-"""A cluster, as far as the chart asks one for what is there."""
+"""A stand-in for a Kubernetes cluster, which answers the chart's questions about existing objects."""
 
 import contextlib
 import http.server
@@ -15,7 +15,7 @@ NOT_FOUND = {"kind": "Status", "apiVersion": "v1", "status": "Failure", "reason"
 
 @contextlib.contextmanager
 def cluster(name, namespace, n_replicas):
-    """Helm's way to a cluster that has a StatefulSet of so many replicas, and nothing else."""
+    """Yields Helm's configuration for a cluster that has only a StatefulSet with n_replicas replicas."""
     version = {"groupVersion": APPS, "version": "v1"}
     live = {"apiVersion": APPS, "kind": "StatefulSet", "metadata": {"name": name, "namespace": namespace}}
     answers = {
@@ -46,7 +46,7 @@ def cluster(name, namespace, n_replicas):
             self.wfile.write(body)
 
         def log_message(self, *_):
-            """Says nothing."""
+            """Logs nothing."""
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Answer)
     threading.Thread(target=server.serve_forever, daemon=True).start()

@@ -1,4 +1,7 @@
-"""Three replicas on one bucket, and the routers in front of them: the shipped files with other addresses."""
+"""Three replicas on one bucket, and the routers in front of them.
+
+The configurations are the shipped files with other addresses.
+"""
 
 import re
 import signal
@@ -10,12 +13,12 @@ from processes import Failed, free_port, get, post, put
 
 DEPLOY = Path(__file__).parent.parent
 REPLICAS = ("replica-1", "replica-2", "replica-3")
-# What a drained replica still waits for: clients here read at once.
+# Seconds for which a draining replica waits for its clients. They are few, because clients here read at once.
 DRAIN_SECONDS = "5"
 
 
 class Fleet:
-    """The S3 server, the replicas, and addresses of all."""
+    """The S3 server, the replicas, and the addresses of all."""
 
     def __init__(self, processes, binary):
         self.processes, self.binary = processes, binary
@@ -24,7 +27,7 @@ class Fleet:
         self.metrics_port = free_port()
 
     def start(self):
-        """Starts the store and then all replicas."""
+        """Starts the store, then all replicas."""
         port = self.store.rsplit(":", 1)[1]
         self.processes.start(
             "s3", ["moto_server", "-H", "127.0.0.1", "-p", port], ready=f"{self.store}/moto-api/data.json"
@@ -34,15 +37,15 @@ class Fleet:
             self.start_replica(name)
 
     def make_bucket(self):
-        """Makes the bucket, without anything in it."""
+        """Creates the bucket, empty."""
         put(f"{self.store}/gramian")
 
     def lose_bucket(self):
-        """Takes the bucket away with all that is in it: the store refuses writes from now on."""
+        """Deletes the bucket with its contents. The store refuses writes from then on."""
         post(f"{self.store}/moto-api/reset")
 
     def start_replica(self, name):
-        """Starts one, and waits until it is ready."""
+        """Starts a replica, and waits until it is ready."""
         variables = {
             "GRAMIAN_BIND": f"127.0.0.1:{self.ports[name]}",
             "GRAMIAN_STORE": "s3://gramian/clouds",
@@ -59,32 +62,32 @@ class Fleet:
         self.processes.start(name, [self.binary], variables, f"{self.address(name)}/health/ready")
 
     def address(self, name):
-        """Where a replica listens."""
+        """Returns the base URL of a replica."""
         return f"http://127.0.0.1:{self.ports[name]}"
 
     def kill(self, name):
-        """Ends one as a failing machine does."""
+        """Ends a replica by SIGKILL, as a failing machine does."""
         self.processes.end(name, signal.SIGKILL)
 
     def drain(self, name):
-        """Ends one in order."""
+        """Ends a replica in order."""
         status = self.processes.end(name)
         if status != 0:
             raise Failed(f"{name} ended with status {status}")
 
     def total(self, family, labels=""):
-        """The sum of a counter over all replicas that answer."""
+        """Returns the sum of a metric over all replicas. All must answer."""
         return sum(metric(get(f"{self.address(name)}/metrics"), family, labels) for name in REPLICAS)
 
     def placed(self, text):
-        """A shipped file, with the addresses of this machine."""
+        """Returns the text of a shipped file with the addresses of this machine."""
         for name, port in self.ports.items():
             text = text.replace(f"address: {name}, port_value: 8080", f"address: 127.0.0.1, port_value: {port}")
             text = text.replace(f"{name}:8080", f"127.0.0.1:{port}")
         return text
 
     def write(self, file, replacements):
-        """Puts a shipped file into the directory of this run; every replacement has to apply."""
+        """Writes a shipped file into the directory of this run. Every replacement has to apply."""
         text = self.placed((DEPLOY / file).read_text())
         for old, new in replacements.items():
             if old not in text:
@@ -96,13 +99,16 @@ class Fleet:
 
 
 def store_required():
-    """Whether the shipped fleet is ready only while the store takes what it is given."""
+    """Returns GRAMIAN_STORE_REQUIRED of the shipped fleet.
+
+    It decides whether a replica is ready only while the store accepts writes.
+    """
     services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
     return services[REPLICAS[0]]["environment"]["GRAMIAN_STORE_REQUIRED"]
 
 
 def wait_until(holds, what):
-    """Waits until something holds; `Failed` if it does not for twenty seconds."""
+    """Waits until a condition holds. Raises `Failed` if it does not hold within twenty seconds."""
     until = time.monotonic() + 20
     while not holds():
         if time.monotonic() > until:
@@ -111,15 +117,16 @@ def wait_until(holds, what):
 
 
 def metric(text, family, labels=""):
-    """The sum of the samples of a family in the text format, of those whose labels contain `labels`."""
+    """Returns the sum of the samples of a family, in the text format, whose labels contain `labels`."""
     pattern = rf"^{family}(?:\{{([^}}]*)\}})? (\S+)$"
     return sum(float(value) for has, value in re.findall(pattern, text.decode(), re.MULTILINE) if labels in has)
 
 
 class Router:
-    """What the three have in common.
+    """The common part of the three routers.
 
-    `counts_kept_connections`: whether a try on a connection that was kept from a request before counts as one.
+    `counts_kept_connections` is true if a failed try on a connection kept from an earlier request counts as a
+    try.
     """
 
     counts_kept_connections = True
@@ -129,12 +136,12 @@ class Router:
         self.url = f"http://127.0.0.1:{self.port}"
 
     def n_repeated(self):
-        """The requests that it has sent again, if it counts them."""
+        """Returns the number of requests that the router has sent again, if it counts them."""
         return "not counted"
 
 
 class Haproxy(Router):
-    """The router that compose.yaml and the chart have."""
+    """HAProxy, the router of compose.yaml and of the chart."""
 
     name = "haproxy"
 
@@ -153,19 +160,19 @@ class Haproxy(Router):
         self.fleet.processes.start(self.name, ["haproxy", "-db", "-f", file], ready=f"{self.url}/router/health")
 
     def wait_for(self, replica):
-        """Waits until it sends requests to a replica again."""
+        """Waits until HAProxy sends requests to a replica again."""
         address = f"http://127.0.0.1:{self.metrics_port}/metrics"
         labels = f'proxy="by_cloud",server="{replica}",state="UP"'
         wait_until(lambda: metric(get(address), "haproxy_server_status", labels) == 1, f"haproxy takes {replica}")
 
     def n_repeated(self):
-        """The requests that it has sent again, to the same replica or another one."""
+        """Returns the number of requests sent again, to the same replica or to another one."""
         text = get(f"http://127.0.0.1:{self.metrics_port}/metrics")
         return round(sum(metric(text, f"haproxy_backend_{how}_warnings_total") for how in ("retry", "redispatch")))
 
 
 class Nginx(Router):
-    """The router for those who have nginx."""
+    """nginx, an alternative router."""
 
     name = "nginx"
     counts_kept_connections = False
@@ -183,13 +190,13 @@ class Nginx(Router):
         self.fleet.processes.start(self.name, command, ready=f"{self.url}/health/live")
 
     def wait_for(self, replica):
-        """It has no checks: it asks a replica that failed again after fail_timeout, 5 s."""
+        """Waits 6 s. nginx has no checks, and tries a failed replica again after fail_timeout, 5 s."""
         del replica
         time.sleep(6)
 
 
 class Envoy(Router):
-    """The router for those who have Envoy."""
+    """Envoy, an alternative router."""
 
     name = "envoy"
 
@@ -211,7 +218,7 @@ class Envoy(Router):
         self.wait_for(REPLICAS[-1])
 
     def wait_for(self, replica):
-        """Until it has found all to be well, with a second for its ring to be made anew."""
+        """Waits until Envoy finds all replicas healthy, and another second for it to rebuild its ring."""
         del replica
         address = f"http://127.0.0.1:{self.admin_port}/stats?filter=replicas.membership_healthy"
         wait_until(lambda: f": {len(REPLICAS)}" in get(address).decode(), "envoy takes all replicas")

@@ -1,4 +1,4 @@
-"""Clients at once, and what became of their requests."""
+"""Concurrent clients, and the outcomes of their requests."""
 
 import http.client
 import itertools
@@ -15,7 +15,7 @@ import numpy as np
 
 N_CLIENTS = 8
 N_POINTS, N_MANY_POINTS = 120, 1500
-# Seconds of work, a quarter of the memory of a replica here.
+# Number of points of a request that takes seconds of work, and a quarter of the memory of a replica here.
 N_LONG_POINTS = 8000
 FIT = {"kernel": gramian.Kernel("matern", length_scale=0.4), "alpha": 1e-6}
 FIT_IN_JSON = {"kernel": {"family": "matern", "length_scale": 0.4}, "alpha": 1e-6}
@@ -23,7 +23,7 @@ GOLDEN = math.pi * (1 + math.sqrt(5))
 
 
 def new_seeds():
-    """Seeds of clouds that no other part of the run has."""
+    """Returns the first of a range of seeds that no other part of the run uses."""
     return next(_MILLIONS) * 999_999
 
 
@@ -31,7 +31,10 @@ _MILLIONS = itertools.count(1)
 
 
 def points(seed, n=None):
-    """A sphere that no other seed has. Every third one takes a moment to factorize: so something is under way."""
+    """Returns points on a sphere that is unique to the seed.
+
+    Every third sphere is larger and takes a moment to factorize, so that work is always under way.
+    """
     n = n or (N_POINTS if seed % 3 else N_MANY_POINTS)
     z = 1 - (2 * np.arange(n) + 1) / n
     angles = GOLDEN * np.arange(n)
@@ -40,12 +43,12 @@ def points(seed, n=None):
 
 
 def values(cloud_points):
-    """Something to interpolate."""
+    """Returns values to interpolate."""
     return np.sin(3 * cloud_points[:, 0]) + cloud_points[:, 2]
 
 
 class Long:
-    """A request that a replica works on for seconds, of a client that repeats nothing."""
+    """A request on which a replica works for seconds. Its client does not retry."""
 
     def __init__(self, url):
         cloud_points = points(new_seeds(), N_LONG_POINTS)
@@ -60,11 +63,11 @@ class Long:
         self._connection.request("POST", "/v1/interpolation", json.dumps(request), headers)
 
     def leave(self):
-        """Ends the connection, without waiting for an answer."""
+        """Closes the connection without waiting for an answer."""
         self._connection.close()
 
     def wait(self):
-        """Waits for the answer; `outcome` is its status, or why there is none."""
+        """Waits for the answer. `outcome` is then its status, or the name of the error."""
         try:
             self.outcome = self._connection.getresponse().status
         except (OSError, http.client.HTTPException) as error:
@@ -72,7 +75,7 @@ class Long:
 
 
 class Load:
-    """Counts what clients see: answers, those that found a factor, answers that they did not want, and failures."""
+    """Clients under load, and counts of their answers, cache outcomes, refusals and failures."""
 
     def __init__(self, url, retries):
         self.url, self.retries = url, retries
@@ -85,7 +88,7 @@ class Load:
         self._threads = []
 
     def client(self):
-        """A client of the package; every attempt is counted, also those that it repeats itself."""
+        """Returns a client of the package. Every attempt counts, including the client's own retries."""
         client = gramian.Client(self.url, retries=self.retries, max_wait=60, timeout=60)
         hooks = client.rest.get_httpx_client().event_hooks
         hooks["request"].append(self._count_attempt)
@@ -104,19 +107,22 @@ class Load:
                 self.cached[response.headers["cache-status"]] += 1
 
     def n_repeated(self):
-        """The attempts that did not end well, by status and without one: each was repeated, or is a failure."""
+        """Returns the numbers of attempts that ended with an error status, and that ended without a status.
+
+        Each of these attempts was repeated, or is a failure.
+        """
         refused = sum(count for status, count in self.statuses.items() if status >= 400)
         return refused, self.n_attempts - self.statuses.total()
 
     def register(self, client, seed):
-        """Registers a cloud and notes that the service has said that it has it."""
+        """Registers a cloud, and records that the service acknowledged it."""
         cloud = client.cloud(points(seed))
         with self.lock:
             self.acknowledged[seed] = cloud.id
         return cloud
 
     def ask(self, cloud):
-        """One computation; whether its answer is right is seen by its residual: values at the points themselves."""
+        """Interpolates values at the points of a cloud, and checks the answer against them."""
         known = values(cloud.points)
         answer = cloud.interpolate(known, cloud.points[:20], **FIT)
         if not np.allclose(answer.values, known[:20], atol=1e-3):
@@ -125,7 +131,7 @@ class Load:
             self.n_answers += 1
 
     def attempt(self, action, *arguments):
-        """Does something as a client; what it raises is a failure."""
+        """Runs an action of a client. Errors that it raises count as failures."""
         try:
             return action(*arguments)
         except (gramian.Problem, httpx.TransportError, ValueError) as error:
@@ -135,7 +141,7 @@ class Load:
             return None
 
     def work(self, work):
-        """Runs `work(client, source)` in as many threads as there are clients."""
+        """Starts `work(client, source)` in one thread per client."""
 
         def run(number):
             with self.client() as client:
@@ -151,7 +157,7 @@ class Load:
             thread.join()
 
     def __enter__(self):
-        """Clients ask for clouds that are there, and register new ones now and then, until the block ends."""
+        """Starts clients, which ask about clouds and at times register new ones, until the block ends."""
         self.work(self._keep_asking)
         return self
 
@@ -171,7 +177,7 @@ class Load:
 
 
 def repeat(url, n_clouds, n_requests):
-    """Asks for each of some clouds as often, in random order, by all clients at once."""
+    """Sends n_requests requests for each of n_clouds clouds, in random order, by all clients concurrently."""
     load = Load(url, retries=4)
     with load.client() as client:
         clouds = [load.register(client, new_seeds() + 1) for _ in range(n_clouds)]

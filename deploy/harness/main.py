@@ -1,4 +1,4 @@
-"""Runs everything that deploy/test tests; see there."""
+"""Runs all the tests of deploy/test, which describes them."""
 
 import shutil
 import signal
@@ -12,7 +12,8 @@ from processes import Failed, Processes
 
 
 def main(binary):
-    # Whoever ends this program ends all that it started; shells have programs in their background ignore SIGINT.
+    # When this program is ended, it ends all that it started. Both signals are set explicitly: a shell makes
+    # programs in its background ignore SIGINT.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: sys.exit("ended"))
     report, processes = Report(), Processes()
@@ -30,7 +31,7 @@ def main(binary):
 
 
 def run(report, processes, binary):
-    """All of it."""
+    """Runs all phases."""
     chart.check(report)
     fleet = Fleet(processes, binary)
     prometheus = observed.Prometheus(fleet)
@@ -48,7 +49,7 @@ def run(report, processes, binary):
 
 
 def behind(report, fleet, router):
-    """What holds behind every router."""
+    """Runs the phases that every router has to pass."""
     smoke(report, router)
     leave(report, fleet, router)
     hit_rate(report, fleet, router)

@@ -1,4 +1,4 @@
-"""What Prometheus is asked: by the dashboard, and by the alerts."""
+"""Checks of the dashboard's queries and of the alerts, against a real Prometheus."""
 
 import json
 import math
@@ -15,20 +15,20 @@ from processes import Failed, free_port, get
 sys.path.insert(0, str(DEPLOY / "grafana"))
 from panels import queries
 
-# What Grafana puts in their place.
+# Values that Grafana substitutes for its variables.
 VARIABLES = {"$__rate_interval": "1m", "$__range": "5m", "$instance": ".*"}
 FAMILY = re.compile(r"\b(?:gramian|haproxy|process)_\w+|\bup\b")
 
 
 class Prometheus:
-    """A Prometheus with the shipped configuration, which looks every second."""
+    """A Prometheus with the shipped configuration, except that it scrapes every second."""
 
     def __init__(self, fleet):
         self.fleet = fleet
         self.url = f"http://127.0.0.1:{free_port()}"
 
     def start(self):
-        """Starts it."""
+        """Starts Prometheus."""
         directory = self.fleet.processes.directory
         self.fleet.write("prometheus/alerts.yaml", {})
         file = self.fleet.write(
@@ -41,7 +41,7 @@ class Prometheus:
         self.fleet.processes.start("prometheus", command, ready=f"{self.url}/-/ready")
 
     def ask(self, path, **parameters):
-        """What it answers; `Failed` with its own words if it refuses."""
+        """Returns the data that Prometheus answers. Raises `Failed` with its message if it refuses."""
         try:
             body = get(f"{self.url}/api/v1/{path}?{urllib.parse.urlencode(parameters)}")
         except urllib.error.HTTPError as error:
@@ -49,14 +49,14 @@ class Prometheus:
         return json.loads(body)["data"]
 
     def numbers(self, query):
-        """The numbers of the series that a query has."""
+        """Returns the finite values of the series of a query."""
         result = self.ask("query", query=query)["result"]
         values = [float(series["value"][1]) for series in result]
         return [value for value in values if math.isfinite(value)]
 
 
 def dashboard(report, prometheus):
-    """Every query of every panel has at least one series with a number."""
+    """Checks that every query of every panel has a number, and that dashboard.json is up to date."""
     silent, asked = [], queries()
     for title, query in asked:
         for name, value in VARIABLES.items():
@@ -72,7 +72,7 @@ def dashboard(report, prometheus):
 
 
 def alerts(report, prometheus):
-    """Every expression is evaluated, every family in it is there, and the tests of when they fire pass."""
+    """Checks that all alerts are evaluated, that the metrics in them exist, and that their tests pass."""
     rules = [rule for group in prometheus.ask("rules")["groups"] for rule in group["rules"]]
     ill = [f"{rule['name']}: {rule.get('lastError')}" for rule in rules if rule["health"] != "ok"]
     text = (DEPLOY / "prometheus/alerts.yaml").read_text()

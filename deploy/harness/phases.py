@@ -1,4 +1,4 @@
-"""What is done to the fleet, and what has to hold."""
+"""Phases of the test: each does something to the fleet, and checks what has to hold."""
 
 import contextlib
 import threading
@@ -9,12 +9,13 @@ from fleet import REPLICAS, metric, wait_until
 from load import FIT, FIT_IN_JSON, N_POINTS, Load, Long, new_seeds, points, repeat, values
 from processes import get
 
-# Under load before and after something happens.
+# Seconds of load before and after an event.
 SECONDS_BEFORE, SECONDS_AFTER = 4, 6
-# Longer than a router waits until a replica that is not ready loses its clouds.
+# Seconds without store. Longer than a router waits before it takes the clouds away from a replica that is not
+# ready.
 SECONDS_REFUSING = 15
-# A cloud in memory is taken to be in the store for so long. Then that has five seconds for an answer to each of a few
-# questions.
+# SECONDS_TRUSTED: how long a cloud in memory is assumed to be in the store as well. SECONDS_SILENT: the
+# longest answer allowed afterwards. The store gets a few questions, with five seconds for each answer.
 SECONDS_TRUSTED, SECONDS_SILENT = 11, 25
 PREPARED = "gramian_solvers_prepared_total"
 REQUESTS = "gramian_http_requests_total"
@@ -24,25 +25,25 @@ N_LARGE_POINTS = 20_000
 
 
 class Report:
-    """The figures of a run, and whether all are within their bounds."""
+    """Prints the figures of a run, and counts those that miss their bounds."""
 
     def __init__(self):
         self.began = time.monotonic()
         self.n_missed = 0
 
     def line(self, what, figure, holds):
-        """One figure."""
+        """Prints a figure, and counts it if its bound does not hold."""
         self.n_missed += not holds
         print(f"{time.monotonic() - self.began:6.0f} s  {'ok  ' if holds else 'FAIL'}  {what}: {figure}", flush=True)
 
     def failures(self, load):
-        """What clients were told, if it should not have been."""
+        """Prints the first five failures of a load."""
         for failure in load.failures[:5]:
             print(f"            {failure}")
 
 
 def smoke(report, router):
-    """A large body, one request with points, what is not for everybody, and the router's way by a path."""
+    """Sends a large body, a request routed by its path, inline points, and /metrics, which is not public."""
     with httpx.Client(base_url=router.url, timeout=60) as http:
         rows = points(new_seeds(), N_LARGE_POINTS).tolist()
         large = http.post("/v1/clouds", json={"points": rows})
@@ -60,11 +61,11 @@ def smoke(report, router):
 
 
 def leave(report, fleet, router):
-    """A client leaves while a large cloud is factorized: the replica is told, and has its place for others again."""
+    """A client leaves while a large cloud is factorized. The replica learns of it, and frees the place."""
     before = fleet.total(REQUESTS, 'status="499"')
     request = Long(router.url)
     wait_until(lambda: fleet.total(RUNNING) > 0, "somebody computes")
-    # In the middle of it: it takes several seconds in all.
+    # The client leaves midway: the whole work takes several seconds.
     time.sleep(0.5)
     n_running = fleet.total(RUNNING)
     request.leave()
@@ -78,7 +79,7 @@ def leave(report, fleet, router):
 
 
 def deadly(report, fleet, router):
-    """A request ends every replica that computes it: that is one and one more, not the whole fleet."""
+    """A request crashes every replica that computes it. At most two may be lost, not the whole fleet."""
     ended = []
     request = Long(router.url)
     client = threading.Thread(target=request.wait, daemon=True)
@@ -98,7 +99,7 @@ def deadly(report, fleet, router):
 
 
 def refusing_store(report, fleet, router):
-    """The store takes nothing for a while: memory answers, and the router loses no replica over it."""
+    """The store refuses writes for a while. Memory answers, and the router drops no replica because of it."""
     fleet.lose_bucket()
     with Load(router.url, retries=0) as load:
         wait_until(lambda: fleet.total(UP_TO_DATE) == 0, "no replica is up to date")
@@ -115,7 +116,7 @@ def refusing_store(report, fleet, router):
 
 
 def silent_store(report, fleet, router):
-    """The store does not answer for a while: what is in memory is served from there, known clouds and new ones."""
+    """The store does not answer for a while. Known and new clouds are served from memory."""
     known, new = (points(new_seeds(), N_POINTS).tolist() for _ in range(2))
     with httpx.Client(base_url=router.url, timeout=60) as client:
 
@@ -139,7 +140,7 @@ def silent_store(report, fleet, router):
 
 
 def hit_rate(report, fleet, router, n_clouds=40, n_requests=30):
-    """Repeated requests find their factor, which is made once in the whole fleet."""
+    """Clients repeat requests. These find their factor, which is made once in the whole fleet."""
     before = fleet.total(PREPARED)
     load = repeat(router.url, n_clouds, n_requests)
     n_made = fleet.total(PREPARED) - before
@@ -153,7 +154,10 @@ def hit_rate(report, fleet, router, n_clouds=40, n_requests=30):
 
 
 def kill(report, fleet, router):
-    """A replica is killed under load and comes back: no request fails after retries, no acknowledged cloud is lost."""
+    """A replica is killed under load and restarted.
+
+    No request fails after retries, and no acknowledged cloud is lost.
+    """
     victim = REPLICAS[1]
     with Load(router.url, retries=4) as load:
         time.sleep(SECONDS_BEFORE)
@@ -177,7 +181,7 @@ def kill(report, fleet, router):
 
 
 def lost(load):
-    """How many clouds that were acknowledged cannot be asked for by their id alone."""
+    """Counts the acknowledged clouds that can no longer be used by their id alone."""
     n_lost = 0
     with httpx.Client(base_url=load.url, timeout=60) as http:
         for seed, cloud in load.acknowledged.items():
@@ -191,7 +195,7 @@ def lost(load):
 
 
 def rolling_restart(report, fleet, router):
-    """All replicas are replaced one after the other under load: no request fails, without retries of the clients."""
+    """All replicas are replaced in turn under load. No request fails, without retries of the clients."""
     with Load(router.url, retries=0) as load:
         time.sleep(SECONDS_BEFORE)
         for name in REPLICAS:
@@ -208,7 +212,7 @@ def rolling_restart(report, fleet, router):
 
 @contextlib.contextmanager
 def running(fleet, router):
-    """A router, for as long as the block takes."""
+    """Runs a router until the block ends."""
     router.start()
     yield router
     fleet.processes.end(router.name)

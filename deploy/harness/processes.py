@@ -1,4 +1,4 @@
-"""Processes on ports of their own, in a directory of their own, all of which end with this one."""
+"""Child processes with separate ports, in a temporary directory. All end with this process."""
 
 import contextlib
 import os
@@ -13,16 +13,16 @@ from pathlib import Path
 
 SECONDS_TO_START = 30
 SECONDS_TO_END = 40
-# The kernel ends them if this process is killed: then it cannot do so itself.
+# The kernel ends the children if this process is killed and cannot end them itself.
 WITH_PARENT = ["setpriv", "--pdeathsig", "KILL"]
 
 
 class Failed(Exception):
-    """Something does not work at all, so that the rest means nothing."""
+    """Raised when something does not work at all, so that the rest of the run has no meaning."""
 
 
 def free_port():
-    """A port that nobody listens on; ports of a run differ."""
+    """Returns a port that no process listens on. Ports of a run differ."""
     while True:
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]
@@ -35,11 +35,11 @@ _given = set()
 
 
 class Processes:
-    """Those of a run, by name, with their logs."""
+    """The processes of a run, by name, with their logs."""
 
     def __init__(self):
         self.directory = Path(tempfile.mkdtemp(prefix="gramian-deploy-"))
-        # The workers of nginx are somebody else.
+        # The workers of nginx run as another user.
         self.directory.chmod(0o711)
         self._running = {}
 
@@ -54,7 +54,7 @@ class Processes:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                process_group=0,  # Ctrl-C is for this program, which ends them in order
+                process_group=0,  # Ctrl-C reaches only this program, which ends the others in order
             )
         self._running[name] = process
         if ready:
@@ -70,7 +70,7 @@ class Processes:
             time.sleep(0.05)
 
     def end(self, name, how=signal.SIGTERM):
-        """Ends a process and waits until it has; returns its status."""
+        """Ends a process, waits for it, and returns its status."""
         process = self._running.pop(name)
         with contextlib.suppress(ProcessLookupError):
             process.send_signal(how)
@@ -82,7 +82,7 @@ class Processes:
 
     @contextlib.contextmanager
     def halted(self, name):
-        """Stops a process for a while: connections to it are made, and nothing comes."""
+        """Stops a process until the block ends. It still accepts connections, but does not answer."""
         process = self._running[name]
         process.send_signal(signal.SIGSTOP)
         try:
@@ -91,7 +91,7 @@ class Processes:
             process.send_signal(signal.SIGCONT)
 
     def end_all(self):
-        """Ends what still runs, at once, with the workers of each."""
+        """Kills all running processes and their workers."""
         for process in self._running.values():
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -100,11 +100,11 @@ class Processes:
         self._running.clear()
 
     def log(self, name):
-        """The file with what a process says."""
+        """Returns the log file of a process."""
         return self.directory / f"{name}.log"
 
     def last_words(self):
-        """The ends of all logs."""
+        """Yields the last lines of all logs."""
         for path in sorted(self.directory.glob("*.log")):
             lines = path.read_text(errors="replace").splitlines()[-4:]
             yield f"--- {path.name}"
@@ -112,13 +112,13 @@ class Processes:
 
 
 def get(address, timeout=5.0):
-    """The body at an address."""
+    """Returns the body at an address."""
     with urllib.request.urlopen(address, timeout=timeout) as response:
         return response.read()
 
 
 def answers(address):
-    """Whether it answers with success."""
+    """Returns true if the address answers with success."""
     try:
         get(address, timeout=1.0)
     except (OSError, urllib.error.URLError):
@@ -127,10 +127,10 @@ def answers(address):
 
 
 def put(address):
-    """Makes what is at an address."""
+    """Sends a PUT without a body."""
     urllib.request.urlopen(urllib.request.Request(address, method="PUT"), timeout=10).close()
 
 
 def post(address):
-    """Has done what is at an address."""
+    """Sends a POST without a body."""
     urllib.request.urlopen(urllib.request.Request(address, method="POST"), timeout=10).close()

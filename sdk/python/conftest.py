@@ -16,7 +16,7 @@ def _names_of_doctests(doctest_namespace: dict[str, object]) -> None:
 
 @pytest.fixture
 def client() -> Iterator[gramian.Client]:
-    """The server under test, at GRAMIAN_URL."""
+    """A client of the server under test, at GRAMIAN_URL."""
     with gramian.Client() as client:
         yield client
 

@@ -1,4 +1,4 @@
-"""What can be measured: name, title, and the function that answers with rows."""
+"""Groups of measurements: name, title, and the function that yields the rows."""
 
 from collections.abc import Callable, Iterable
 

@@ -1,4 +1,8 @@
-"""Bodies: numbers parsed and written, and a large matrix as npy, JSON and zstd beside copying and sending its bytes."""
+"""Bodies of requests and answers: parsing, writing and sending numbers.
+
+In the process: rates at which JSON numbers are read and written. Over HTTP: a large matrix in each format
+beside copying and sending its bytes.
+"""
 
 import re
 from collections.abc import Iterable
@@ -16,10 +20,10 @@ KERNEL = {"family": "matern", "nu": 2.5, "length_scale": 0.2}
 
 UNIT = "MB/s"
 
-#: Smallest rates by the first word of their name.
+#: Smallest acceptable rates in MB/s, by the first word of the benchmark's name.
 BOUNDS = {"read": 350.0, "write": 500.0}
 
-#: How the benchmark names what it compares with.
+#: First words of a line that the benchmark prints for its reference.
 SAME = "the same"
 
 FORMATS = {
@@ -36,7 +40,10 @@ def measure(setting: Setting) -> Iterable[Row]:
 
 
 def in_process(setting: Setting) -> Iterable[Row]:
-    """What `cargo bench --bench bodies` prints in MB/s; a line `the same by …` is the reference of the line before."""
+    """Yields the rates in MB/s that `cargo bench --bench bodies` prints.
+
+    A line `the same by …` is the reference of the line before it.
+    """
     if "bodies" not in setting.benches:
         for word, limit in BOUNDS.items():
             yield Row(f"JSON, one core: {word}", None, None, Bound("figure", "≥", limit), "there is no benchmark `bodies`")
@@ -53,7 +60,7 @@ def in_process(setting: Setting) -> Iterable[Row]:
 
 
 def parse(output: str) -> list[tuple[str, float]]:
-    """The lines `name  rate` below a heading in MB/s."""
+    """Returns the lines `name  rate` below a heading in MB/s."""
     rates = []
     is_rate = False
     for line in output.splitlines():
@@ -71,7 +78,7 @@ def over_http(setting: Setting) -> Iterable[Row]:
     with setting.gramian() as server:
         client = server.client()
         request = {"cloud": {"points": sphere(n)}, "kernel": KERNEL, "alpha": 1e-6}
-        # Two rows are as good as all to make the factor and the surface.
+        # Two rows suffice to make the factor and the surface.
         first = client.post(PATH, {**request, "queries": sphere(2)})
         request["cloud"] = {"id": first.json()["diagnostics"]["cloud_id"]}
         for name, headers in FORMATS.items():

@@ -1,4 +1,8 @@
-"""The factorization against the matrix product and LAPACK; operators against a factorization with its solves."""
+"""Factorization and operators.
+
+The factorization is compared with the matrix product and with LAPACK. Operators are compared with a
+factorization and its solves.
+"""
 
 from collections.abc import Iterable
 
@@ -8,7 +12,7 @@ from ..timing import Times, fastest
 
 LENGTH_SCALE, ALPHA = 0.2, 1e-6
 
-#: OpenBLAS on small matrices is sometimes faster on one thread.
+#: Numbers of threads to try: OpenBLAS is sometimes faster on one thread for small matrices.
 THREADS = (1, 2)
 
 
@@ -92,7 +96,7 @@ def operators(setting: Setting) -> Iterable[Row]:
 
 
 def collect(rounds: list[dict[str, float]]) -> dict[str, Times]:
-    """Times by part; the first round warmed up."""
+    """Collects times by part over all rounds but the first, which warmed up."""
     return {part: Times(tuple(spent[part] for spent in rounds[1:])) for part in rounds[0]}
 
 

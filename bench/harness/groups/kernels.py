@@ -9,13 +9,16 @@ from ..setting import Setting
 
 UNIT = "G pairs/s"
 
-#: Smallest rates by family and quantity; those of the Hessian are asked for with AVX-512 only.
+#: Smallest acceptable rates by family and quantity. Those of the Hessian apply with AVX-512 only.
 BOUNDS = {("gauss", "gram"): 0.8, ("laplace", "hessian"): 0.45, ("gauss", "hessian"): 0.7}
 
 
 @dataclass(frozen=True)
 class Rate:
-    """`instruction_set` is empty where the benchmark ran on the best one only."""
+    """A rate that the benchmark printed, in G pairs/s.
+
+    `instruction_set` is empty where the benchmark ran on the best one only.
+    """
 
     instruction_set: str
     family: str
@@ -35,7 +38,10 @@ def measure(setting: Setting) -> Iterable[Row]:
 
 
 def parse(output: str) -> list[Rate]:
-    """Tables of `family  rate…` below a heading `d = 3, SET  quantity…`, or one without title; others are left out."""
+    """Returns the rates in tables of `family  rate…` below a heading `d = 3, SET  quantity…`.
+
+    A heading may have no title. Tables with other titles are left out.
+    """
     rates: list[Rate] = []
     heading = ""
     for line in output.splitlines():
@@ -53,7 +59,10 @@ def parse(output: str) -> list[Rate]:
 
 
 def bound(rate: Rate, best_set: str, has_gram: bool) -> float | None:
-    """The bound of a rate on the best set; sums of values stand for the Gram matrix where that is not measured by itself."""
+    """Returns the bound of a rate on the best instruction set.
+
+    Where the Gram matrix is not measured separately, sums of values stand for it.
+    """
     if rate.instruction_set not in ("", best_set):
         return None
     quantity = rate.quantity.lower()

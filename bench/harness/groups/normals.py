@@ -1,4 +1,7 @@
-"""`POST /v1/normals`: cold against LAPACK's factorization alone, warm against the evaluation alone; curvatures of small clouds."""
+"""`POST /v1/normals`, and curvatures of small clouds.
+
+Cold requests are compared with LAPACK's factorization alone, warm requests with the evaluation alone.
+"""
 
 from collections.abc import Iterable
 from typing import Any
@@ -26,7 +29,10 @@ def measure(setting: Setting) -> Iterable[Row]:
 
 
 def cold(setting: Setting, n: int) -> Iterable[Row]:
-    """Every round has a cloud of its own. What was computed from the one before is deleted, or kept in the cache."""
+    """Measures cold requests: every round has a new cloud.
+
+    Depending on the kind, the cloud of the last round is deleted with its results, or stays in the cache.
+    """
     kinds: dict[str, tuple[dict[str, Any] | None, bool]] = {
         "Matérn 5/2": (MATERN, True),
         "Laplace, epsilon 1": (LAPLACE, True),
@@ -63,7 +69,10 @@ def cold(setting: Setting, n: int) -> Iterable[Row]:
 
 
 def warm(setting: Setting, n: int) -> Iterable[Row]:
-    """The same request again, and new queries, beside the fused pass of value, gradient and Hessian in the process alone."""
+    """Measures a repeated request, and new queries on a known cloud.
+
+    Reference: the fused pass of value, gradient and Hessian alone, in the process.
+    """
     first = sphere(n)
     with setting.gramian() as server, setting.bench("operators", str(n)) as bench:
         client = server.client()
@@ -104,7 +113,7 @@ def warm(setting: Setting, n: int) -> Iterable[Row]:
 
 
 def small_curvatures(setting: Setting, n: int) -> Row:
-    """A cloud that costs next to nothing to factorize: what is left is what surrounds it."""
+    """Measures the overhead around the factorization, on a cloud that costs almost nothing to factorize."""
     last: list[Answer] = []
     alone: list[float] = []
     with setting.gramian() as server:
@@ -132,5 +141,5 @@ def request(n: int, angle: float, kernel: dict[str, Any] | None) -> dict[str, An
 
 
 def stages(answer: Answer) -> str:
-    """Server-Timing for a remark."""
+    """Formats Server-Timing for a remark."""
     return ", ".join(f"{name} {seconds * 1e3:.1f}" for name, seconds in answer.stages.items()) + " ms"

@@ -1,4 +1,7 @@
-"""`POST /v1/posterior` on a cached factor: latency and throughput beside an echo, and the solve for new values."""
+"""`POST /v1/posterior` on a cached factor.
+
+Latency and throughput are compared with an echo server, the solve for new values with reading the triangle.
+"""
 
 import re
 import subprocess
@@ -73,7 +76,7 @@ def throughput(setting: Setting, server: Server, echo: Server) -> Row:
 
 
 def load(port: int, path: str, script: Path, seconds: int) -> float:
-    """Requests per second; every answer must be a success."""
+    """Returns the requests per second that wrk reaches. Raises if an answer is not a success."""
     command = ["wrk", "-t1", "-c16", f"-d{seconds}s", "-s", str(script), f"http://127.0.0.1:{port}{path}"]
     output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     found = re.search(r"Requests/sec:\s+([\d.]+)", output)
@@ -83,7 +86,7 @@ def load(port: int, path: str, script: Path, seconds: int) -> float:
 
 
 def new_values(setting: Setting, server: Server, n: int) -> Row:
-    """Values that were never seen cost a solve with the factor: its triangle is read twice."""
+    """Measures new values, which cost a solve with the factor: its triangle is read twice."""
     client = server.client()
     first = one_query(client, n)
     random = np.random.default_rng(0)
@@ -107,7 +110,7 @@ def new_values(setting: Setting, server: Server, n: int) -> Row:
 
 
 def one_query(client: Client, n: int) -> dict[str, Any]:
-    """A request for one mean, sent once, so that the factor and the weights are there."""
+    """Returns a request for one mean, after sending it once so that the factor and the weights are cached."""
     points = sphere(n)
     body = {
         "cloud": {"points": points},

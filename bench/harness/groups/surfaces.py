@@ -1,6 +1,7 @@
-"""Laplace–Beltrami, normals and curvatures: robust_laplacian, Open3D and CGAL beside ours, in time and in accuracy.
+"""Laplace–Beltrami, normals and curvatures beside robust_laplacian, Open3D and CGAL, in time and accuracy.
 
-The peers are local methods, linear in n; ours solves for one function through all points, n³. On errors less is better.
+The peers are local methods, linear in n. Ours solves for one function through all points, n³. For errors,
+less is better.
 """
 
 import subprocess
@@ -17,7 +18,7 @@ from ..server import Client
 from ..setting import Setting
 from ..timing import SPIN_SECONDS, Times, alternate, timed
 
-#: Neighbours of a local fit, the customary number of each peer.
+#: Number of neighbours of a local fit, customary for each peer.
 NEIGHBOURS = 30
 
 KERNEL = {"family": "matern", "nu": 8.5, "length_scale": 0.5}
@@ -40,7 +41,7 @@ def laplacians(setting: Setting, client: Client) -> Iterable[Row]:
         return np.array(ask(client, "/v1/laplace-beltrami", request)["values"])
 
     def theirs() -> Floats:
-        # Weak and positive: Δu = −M⁻¹ L u with the lumped mass matrix M.
+        # The stiffness matrix L is weak and positive: Δu = −M⁻¹ L u with the lumped mass matrix M.
         stiffness, mass = robust_laplacian.point_cloud_laplacian(points, n_neighbors=NEIGHBOURS)
         return -(stiffness @ harmonic(points)) / mass.diagonal()
 
@@ -122,13 +123,17 @@ def curvatures(setting: Setting, client: Client) -> Iterable[Row]:
 
 
 def by_cgal(setting: Setting, points: Floats) -> tuple[Floats, float]:
-    """Principal curvatures of jet fits, ascending for outward normals, and the seconds of the fits alone."""
+    """Returns principal curvatures of jet fits and the seconds of the fits alone.
+
+    Curvatures ascend and are for outward normals.
+    """
     text = "\n".join(" ".join(f"{coordinate:.17g}" for coordinate in point) for point in points)
     command = [str(setting.build / "cgal_jets"), str(NEIGHBOURS)]
     output = subprocess.run(command, input=text, check=True, capture_output=True, text=True).stdout
     first, *lines = output.splitlines()
     found = np.array([[float(number) for number in line.split()] for line in lines])
-    # Their normals have any sign. On this torus the curvature of larger magnitude is the positive one for outward normals.
+    # CGAL's normals have arbitrary signs. On this torus, the curvature of larger magnitude is positive for
+    # outward normals.
     flipped = np.abs(found).argmax(axis=1) == found.argmin(axis=1)
     found[flipped] *= -1
     return np.sort(found, axis=1), float(first)
@@ -149,25 +154,25 @@ def contest(
 
 
 def ask(client: Client, path: str, request: dict[str, Any]) -> Any:
-    """A cold request: the cloud is deleted at once, at our expense."""
+    """Sends a cold request: deletes the cloud at once. Our time includes the deletion."""
     answer = client.post(path, request)
     client.forget(answer)
     return answer.json()
 
 
 def rows(entries: list[list[float] | None], width: int) -> Floats:
-    """A null is an answer refused: not a number."""
+    """Converts rows to an array. A null, which stands for a refused answer, becomes NaN."""
     return np.array([[np.nan] * width if entry is None else entry for entry in entries])
 
 
 def angles(found: Floats, exact: Floats) -> Floats:
-    """Degrees between lines; from the sine where the cosine has no digits left."""
+    """Returns degrees between lines by atan2, which keeps small angles precise where a cosine loses them."""
     sines = np.linalg.norm(np.cross(found, exact), axis=1)
     return np.degrees(np.arctan2(sines, np.abs(np.sum(found * exact, axis=1))))
 
 
 def deviations(found: Floats, exact: Floats) -> Floats:
-    """The larger of the two errors at each point."""
+    """Returns the larger of the two errors at each point."""
     return np.max(np.abs(found - exact), axis=1)
 
 

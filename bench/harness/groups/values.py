@@ -1,7 +1,7 @@
-"""Gaussian processes and interpolation: scikit-learn, SciPy and GPyTorch beside ours, end to end from Python.
+"""Gaussian processes and interpolation beside scikit-learn, SciPy and GPyTorch, end to end from Python.
 
-Ours includes the encoding of the request, HTTP, and the decoding of the answer to arrays. What a call computed is deleted
-after it, at our expense, so that every call is cold.
+Our time includes encoding the request, HTTP, and decoding the answer to arrays. Each call deletes its results
+afterwards, so that every call is cold. Our time includes that too.
 """
 
 import importlib.util
@@ -25,10 +25,10 @@ from ..timing import SPIN_SECONDS, alternate, timed
 LENGTH_SCALE, ALPHA = 0.3, 1e-6
 MATERN = {"family": "matern", "nu": 2.5, "length_scale": LENGTH_SCALE}
 
-#: Short enough for SciPy's solver, which has no regularization to speak of.
+#: Length scale short enough for SciPy's solver, which has almost no regularization.
 GAUSS_LENGTH_SCALE, SMOOTHING = 0.15, 1e-10
 
-#: Points, values, queries → means and, for a posterior, standard deviations.
+#: Function from points, values and queries to means and, for a posterior, standard deviations.
 Method = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
 
 SAFETENSORS = "application/x-safetensors"
@@ -100,7 +100,7 @@ def interpolants(setting: Setting, client: Client) -> Iterable[Row]:
         return np.array(answer["values"]), forgotten(client, answer)
 
     def scipy(points: Floats, values: Floats, queries: Floats) -> tuple[Floats, Floats]:
-        # Degree −1: the kernel alone, as ours; the default would add a constant.
+        # Degree −1 uses the kernel alone, as ours does. The default would add a constant.
         interpolator = RBFInterpolator(
             points, values, smoothing=SMOOTHING, kernel="gaussian", epsilon=1 / GAUSS_LENGTH_SCALE, degree=-1
         )
@@ -118,7 +118,7 @@ def interpolants(setting: Setting, client: Client) -> Iterable[Row]:
 
 
 def run(n_rounds: int, methods: dict[str, Method], n: int, m: int) -> tuple[dict[str, Any], dict[str, tuple[Floats, Floats]]]:
-    """Times by method, and the results of the last round."""
+    """Returns times by method, and the results of the last round."""
     results: dict[str, tuple[Floats, Floats]] = {}
 
     def ask(name: str, method: Method, round_number: int) -> float:
@@ -178,7 +178,7 @@ def by_scikit_learn(points: Floats, values: Floats, queries: Floats) -> tuple[Fl
 
 
 def forgotten(client: Client, answer: dict[str, Any]) -> Floats:
-    """Deletes the cloud; the time of it is ours to bear."""
+    """Deletes the cloud, and returns an empty array. The time counts as ours."""
     client.request("DELETE", f"/v1/clouds/{answer['diagnostics']['cloud_id']}")
     return np.empty(0)
 

@@ -1,1 +1,4 @@
-"""What `bench/scale` measures: scans and clouds of up to a million points, beside the peers, each in a process of its own."""
+"""Measurements of `bench/scale`: scans and clouds of up to a million points.
+
+Peers do the same work. Every peer and server runs in a separate process.
+"""

@@ -80,7 +80,7 @@ def measure(name: str, work: Work, arguments: argparse.Namespace) -> Measured:
 
 
 def peers_of(work: Work) -> Iterable[Entry]:
-    """Those behind one that fails are not measured."""
+    """Yields the entries of the peers. Peers that follow a failing one are not measured."""
     try:
         yield from work.peers()
     except subprocess.CalledProcessError as error:
@@ -88,7 +88,7 @@ def peers_of(work: Work) -> Iterable[Entry]:
 
 
 def grow(setting: Setting, service: Service) -> tuple[list[growth.Row], str]:
-    """The rows of the growth, or why there are none."""
+    """Measures growth; returns its rows, or the reason why there are none."""
     print("-- growth", flush=True)
     try:
         return growth.measure(service, growth.QUICK_SIZES if setting.is_quick else growth.SIZES), ""
@@ -98,7 +98,7 @@ def grow(setting: Setting, service: Service) -> tuple[list[growth.Row], str]:
 
 
 def describe_run(setting: Setting, service: Service, dragon: Dragon, busy: list[float]) -> list[tuple[str, str]]:
-    """Machine and data."""
+    """Describes the machine and the data as names and values."""
     facts = machine.facts(setting, service.version())
     for level in (1, 2):
         scan = dragon.scan(level)
@@ -132,7 +132,7 @@ def write_json(facts: list[tuple[str, str]], rows: dict[str, Measured], grown: l
 def write_pages(
     facts: list[tuple[str, str]], rows: dict[str, Measured], grown: list[growth.Row], refusal: str, has_cached_peers: bool
 ) -> None:
-    """bench/SCALE.md, docs/scale.svg and the figures in docs/scale.md."""
+    """Writes bench/SCALE.md, docs/scale.svg and the figures in docs/scale.md."""
     holds = sum(row.verdict == "holds" for row in rows.values())
     unserved = sum(bool(row.ours.missing) for row in rows.values())
     summary = f"Of {len(rows)} rows {holds} hold, {len(rows) - holds - unserved} fall short, {unserved} are not served."
@@ -156,7 +156,7 @@ def write_pages(
 
 
 def fill(page: Path, name: str, content: str) -> None:
-    """Puts figures between the marks of a page."""
+    """Replaces the text between two marks of a page."""
     opening, closing = f"<!-- {name}: written by bench/scale -->", f"<!-- end of {name} -->"
     before, _, rest = page.read_text().partition(opening)
     _, _, after = rest.partition(closing)

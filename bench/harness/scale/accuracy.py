@@ -1,4 +1,4 @@
-"""How far answers are from the truth."""
+"""Errors of answers against the exact geometry."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,11 @@ BAND = 1.96
 
 @dataclass(frozen=True)
 class Angles:
-    """Degrees between lines, and the share of normals on the wrong side, in percent; a missing normal is 90° off."""
+    """Errors of normals: quantiles of the angle, and the share of flipped normals.
+
+    `median` and `high` (95 %) are in degrees between lines. `flipped` is in percent. A missing normal counts
+    as 90° off.
+    """
 
     median: float
     high: float
@@ -20,7 +24,10 @@ class Angles:
 
 
 def angles(found: Floats, exact: Floats, is_signed: bool) -> Angles:
-    """Where the truth is zero there is none. Without a sign that of the majority counts: some methods leave it open."""
+    """Compares normals with the exact ones, wherever these are not zero.
+
+    Some methods leave the overall sign open. Without `is_signed`, the sign of the majority is taken as right.
+    """
     known = np.linalg.norm(exact, axis=1) > 0
     found, exact = found[known], exact[known]
     sines = np.linalg.norm(np.cross(found, exact), axis=1)
@@ -34,7 +41,7 @@ def angles(found: Floats, exact: Floats, is_signed: bool) -> Angles:
 
 
 def outward(normals: Floats, curvatures: Floats, exact: Floats) -> Floats:
-    """Curvatures for the side of the true normals, which peers do not know."""
+    """Returns curvatures for the side of the true normals, which peers do not know."""
     inside = np.einsum("ni,ni->n", normals, exact) < 0
     turned = curvatures.copy()
     turned[inside] = -curvatures[inside, ::-1]
@@ -42,17 +49,17 @@ def outward(normals: Floats, curvatures: Floats, exact: Floats) -> Floats:
 
 
 def mean_errors(found: Floats, exact: Floats) -> Floats:
-    """|H − H₀|/max |κ₀| at each point, infinite where there is no answer."""
+    """Returns |H − H₀|/max |κ₀| at each point, infinite where there is no answer."""
     errors = np.abs(found.mean(axis=1) - exact.mean(axis=1)) / np.max(np.abs(exact), axis=1)
     return np.where(np.isnan(errors), np.inf, errors)
 
 
 def principal_errors(found: Floats, exact: Floats) -> Floats:
-    """max |κ − κ₀|/max |κ₀| at each point, infinite where there is no answer."""
+    """Returns max |κ − κ₀|/max |κ₀| at each point, infinite where there is no answer."""
     errors = np.max(np.abs(found - exact), axis=1) / np.max(np.abs(exact), axis=1)
     return np.where(np.isnan(errors), np.inf, errors)
 
 
 def coverage(found: Floats, deviations: Floats, exact: Floats) -> float:
-    """The percentage of bands of ±1.96 σ that hold the truth; a missing band does not."""
+    """Returns the percentage of bands ±1.96 σ that contain the truth. A missing band does not."""
     return 100 * float(np.mean(np.abs(found - exact) <= BAND * deviations))

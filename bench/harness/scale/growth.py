@@ -1,4 +1,7 @@
-"""Time and memory of local normals and curvatures from a thousand to a million points, drawn in docs/scale.svg."""
+"""Growth of time and memory of local normals and curvatures, drawn in docs/scale.svg.
+
+Sizes go from a thousand to a million points.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,11 +13,12 @@ from .service import Service
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
 QUICK_SIZES = (500, 1_000, 2_000)
-#: Of what takes less than a second, the fastest counts.
+#: Number of rounds for clouds of at most `SMALL` points, which take less than a second. The fastest counts.
 N_ROUNDS = 5
 SMALL = 30_000
 
-#: What no machine was asked for, and the points that a tile of a million has beside its own.
+#: A number of points that was extrapolated, not measured. `HALO`: the points that a tile of a million reads,
+#: the halo included, relative to its own.
 N_PAPER = 1e8
 HALO = 1.04
 
@@ -34,7 +38,10 @@ REQUESTS = {
 
 
 def measure(service: Service, sizes: Sequence[int]) -> list[Row]:
-    """A process for each size and request; milliseconds from the first byte of the cloud to the last of the answer, and bytes."""
+    """Measures each size and request in a separate process; returns milliseconds and bytes.
+
+    Time is from the first byte of the cloud sent to the last byte of the answer received.
+    """
     rows = []
     for n in sizes:
         points = torus(n).points
@@ -57,7 +64,7 @@ def slopes(rows: list[Row]) -> dict[str, float]:
 
 
 def table(rows: list[Row]) -> str:
-    """Figures against n with slopes, and what a point costs at the largest n."""
+    """Formats figures against n, their slopes, and the cost per point at the largest n."""
     steep = slopes(rows)
     lines = ["| n | " + " | ".join(f"{row['n']:,.0f}" for row in rows) + " | slope | a point |"]
     lines.append("|---|" + "---:|" * (len(rows) + 2))
@@ -71,7 +78,7 @@ def table(rows: list[Row]) -> str:
 
 
 def on_paper(row: Row) -> str:
-    """What 10⁸ points take, from what one takes at the largest n."""
+    """Extrapolates the cost of 10⁸ points from the cost per point at the largest n."""
     tiles = N_PAPER / row["n"]
     lines = [
         f"| 10⁸ points in {tiles:,.0f} tiles of {row['n']:,.0f} | time on 2 cores | with 4 % of halo | peak, one tile at a time |"

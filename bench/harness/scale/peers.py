@@ -1,7 +1,8 @@
-"""The peers, each in a process of its own: `python -m harness.scale.peers NAME < INPUT > OUTPUT`, both npz.
+"""Peers, each run in a separate process: `python -m harness.scale.peers NAME < INPUT > OUTPUT`.
 
-Time is that of the work alone, on points in memory; the peak resident memory is that of the process, Python included. What a
-method was measured with is in its arguments, customary numbers unless the table says otherwise.
+INPUT and OUTPUT are npz. Time is that of the work alone, on points in memory. The peak resident memory is
+that of the process, Python included. Arguments of a method are customary numbers unless the table says
+otherwise.
 """
 
 import hashlib
@@ -26,7 +27,10 @@ Arrays = dict[str, Floats]
 
 @dataclass(frozen=True)
 class Done:
-    """What somebody answered, in how many seconds and bytes, idle ones included."""
+    """Arrays that a peer or the service answered, with seconds and peak bytes.
+
+    Peak bytes include those of the idle process.
+    """
 
     seconds: float
     peak_bytes: int
@@ -34,7 +38,7 @@ class Done:
 
 
 class Peers:
-    """Runs peers, or answers what they did for the same input before, where that is allowed."""
+    """Runs peers, or reads their earlier results for the same input where `uses_cache` allows it."""
 
     def __init__(self, setting: Setting, uses_cache: bool) -> None:
         self._setting = setting
@@ -43,7 +47,10 @@ class Peers:
         self._folder.mkdir(parents=True, exist_ok=True)
 
     def cgal(self, what: str, points: Floats, *arguments: int, rounds: int = 1) -> Done:
-        """`normals`, `oriented` or `curvatures` by bench/peers/cgal_surface.cpp; the fastest of several rounds."""
+        """Runs bench/peers/cgal_surface.cpp; returns the fastest of several rounds.
+
+        `what` is `normals`, `oriented` or `curvatures`.
+        """
         command = [str(self._setting.build / "cgal_surface"), what, *map(str, arguments)]
 
         def run() -> Done:
@@ -59,7 +66,7 @@ class Peers:
         return self._once(["cgal", what, *arguments], source.read_text(), {"points": points}, fastest)
 
     def python(self, name: str, arrays: Arrays, **arguments: int) -> Done:
-        """One of `METHODS`."""
+        """Runs one of `METHODS`."""
         command = [str(self._setting.python), "-m", "harness.scale.peers", name, json.dumps(arguments)]
 
         def run() -> Done:
@@ -137,7 +144,10 @@ METHODS: dict[str, Callable[..., Arrays]] = {
 
 
 def peak_bytes() -> int:
-    """Of this process; unlike `getrusage`, not that of the process that started it."""
+    """Returns the peak resident memory of this process.
+
+    Unlike that of `getrusage`, it does not include the process that started this one.
+    """
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
 
@@ -145,7 +155,7 @@ def peak_bytes() -> int:
 def main() -> None:
     method, arguments = METHODS[sys.argv[1]], json.loads(sys.argv[2])
     arrays = dict(np.load(io.BytesIO(sys.stdin.buffer.read())))
-    # Imports are not work: a first call on a few points has them done.
+    # Imports do not count as work: a first call on a few points does them.
     few = {name: array[:200] for name, array in arrays.items()}
     method(**few, **arguments)
     found, seconds = timed(lambda: method(**arrays, **arguments))

@@ -1,4 +1,4 @@
-"""Rows of the table: pieces of work, who did them, and what is asked of gramian."""
+"""Rows of the table of `bench/scale`: pieces of work, who did them, and bounds on gramian."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -29,7 +29,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Bound:
-    """What is asked of a figure of gramian: a limit, or to be less than the same figure of a peer."""
+    """A bound on a figure of gramian.
+
+    `limit` is a number, or the beginning of the name of peers whose figure must be greater.
+    """
 
     figure: str
     relation: Literal["≤", "≥", "<"]
@@ -50,7 +53,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Entry:
-    """What somebody did; `missing` says why nothing is known."""
+    """The figures of gramian or of a peer. `missing` says why there are none."""
 
     who: str
     figures: Mapping[str, Figure] = field(default_factory=dict)
@@ -60,7 +63,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Work:
-    """A row. `ours` answers with the entry of gramian, `peers` with those beside it; `units` are those of bounded figures."""
+    """A row of the table that is still to be measured.
+
+    `ours` returns the entry of gramian, `peers` those of the peers. `units` are the units of bounded figures.
+    """
 
     what: str
     bounds: tuple[Bound, ...]
@@ -74,7 +80,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Measured:
-    """A row with its entries."""
+    """A measured row with its entries."""
 
     work: Work
     ours: Entry
@@ -86,7 +92,7 @@ class Measured:
 
     @property
     def short(self) -> list[str]:
-        """Names of the figures whose bounds do not hold."""
+        """Returns the names of the figures whose bounds do not hold."""
         bounds = () if self.ours.missing else self.work.bounds
         return list(dict.fromkeys(bound.figure for bound in bounds if not bound.holds(self.ours, self.peers)))
 
@@ -101,7 +107,7 @@ COLUMNS = ("work", "", "time", "peak memory", "accuracy", "verdict")
 
 
 def lines(measured: Measured) -> list[tuple[str, ...]]:
-    """What is asked, then gramian, then the peers."""
+    """Returns the lines of a row: the bounds, then gramian, then the peers."""
     work = measured.work
     limits = {name: [b.text(work.unit(name)) for b in work.bounds if b.figure == name] for name in ("time", "memory")}
     others = [bound.text(work.unit(bound.figure)) for bound in work.bounds if bound.figure not in limits]
@@ -122,7 +128,7 @@ def _cells(entry: Entry) -> tuple[str, str, str]:
 
 
 def markdown(rows: Iterable[Measured]) -> str:
-    """One table of all rows."""
+    """Formats all rows as a Markdown table."""
     table = [COLUMNS, ("---", "---", "---:", "---:", "---", "---")]
     for row in rows:
         table += [(_strong(line[0]), *line[1:]) for line in lines(row)]
@@ -130,7 +136,7 @@ def markdown(rows: Iterable[Measured]) -> str:
 
 
 def plain(row: Measured) -> str:
-    """The same for a terminal."""
+    """Formats a row for a terminal."""
     first, *others = lines(row)
     text = [f"-- {first[0]}"]
     for _, who, time, memory, accuracy, verdict in (first, *others):

@@ -1,4 +1,4 @@
-"""What gramian answers, over HTTP, from a fresh process for each piece of work."""
+"""Answers of gramian over HTTP, from a new process for each piece of work."""
 
 import http.client
 import io
@@ -19,31 +19,32 @@ from ..setting import Setting
 from .peers import Done
 
 SAFETENSORS = "application/x-safetensors"
-#: Requests may take longer than the default, so that a slow answer is measured and not cut.
+#: Deadline of the server in seconds. It exceeds the default, so that a slow answer is measured and not cut
+#: off.
 DEADLINE_SECONDS = 600
 
 
 class NotServed(Exception):
-    """A refusal, or no answer at all."""
+    """Raised when the service refuses a request or does not answer."""
 
 
 @dataclass(frozen=True)
 class Answered(Done):
-    """With the other members of the answer and the bytes of the idle process."""
+    """An answer of gramian, with its members that are no arrays and the bytes of the idle process."""
 
     members: Mapping[str, Any] = field(default_factory=dict)
     idle_bytes: int = 0
 
     def member(self, name: str) -> Any:
-        """An array, or the list that stands for it."""
+        """Returns an array, or the list that stands for it."""
         return self.arrays[name] if name in self.arrays else self.members[name]
 
 
 class Service:
-    """Starts servers and asks them."""
+    """Starts servers and sends them requests."""
 
     def __init__(self, setting: Setting, binary: Path, fields: Mapping[str, Any]) -> None:
-        """`fields` are added to every request of a fit, such as a solver; none by default."""
+        """Takes `fields`, such as a solver, which are added to every request."""
         self._environment = {**setting.environment, "GRAMIAN_DEADLINE_SECONDS": str(DEADLINE_SECONDS)}
         self._binary = binary
         self._fields = dict(fields)
@@ -60,9 +61,10 @@ class Service:
         tensors: Mapping[str, Floats] | None = None,
         n_rounds: int = 1,
     ) -> Answered:
-        """Posts the cloud and the request to a new process; time is from the first byte of the cloud to the last of the answer.
+        """Posts the cloud and the request to a new process; returns the fastest of several rounds.
 
-        Of several rounds the fastest; the cloud is deleted in between, and with it all that was computed.
+        Time is from the first byte of the cloud to the last byte of the answer. After each round the cloud is
+        deleted, together with everything computed from it.
         """
         try:
             with self._server() as server:
@@ -100,13 +102,13 @@ class Service:
 
 
 def members_of(body: bytes) -> dict[str, Any]:
-    """What an answer holds beside its arrays."""
+    """Returns the members of an answer that are no arrays."""
     header = json.loads(body[8 : 8 + int.from_bytes(body[:8], "little")])
     return json.loads(header.get("__metadata__", {}).get("response", "{}"))
 
 
 def refusal(status: int, body: bytes) -> str:
-    """Status and problem in a line."""
+    """Formats status and problem in a line."""
     try:
         problem = json.loads(body)
         slug = str(problem.get("type", "")).rpartition("/")[2]
@@ -119,7 +121,7 @@ def refusal(status: int, body: bytes) -> str:
 
 
 def use_cores(n: int) -> None:
-    """Keeps this process and all that it starts on so many cores."""
+    """Restricts this process, and all that it starts, to n cores."""
     available = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, set(available[:n]))
 

@@ -1,4 +1,4 @@
-"""The rows: what is asked of gramian, how its answers are judged, and which peers do the same work."""
+"""Rows of the table: the request to gramian, the judgement of its answer, and peers for the same work."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,17 +15,18 @@ from .peers import Done, Peers
 from .report import OURS, Bound, Entry, Figure, Work
 from .service import Answered, Service
 
-#: 0.1 % of the radius of the torus about its centre, 2.5: 0.4 of the side of the square that a point of a million has for itself.
+#: Noise of 0.1 % of the outer radius of the torus, 2.5. It is 0.4 spacings, where a spacing is the side of a
+#: square with the area per point when there are a million.
 NOISE = 2.5e-3
 N_TORUS = 1_000_000
 N_CUBE = 1_000_000
 N_QUERIES = 100_000
-#: Where the dense posterior runs as well.
+#: Number of points at which the dense posterior runs as well.
 N_DENSE = 8_000
 MATERN = {"family": "matern", "nu": 1.5, "length_scale": 0.3}
-#: Noise of the values, 1 % of the deviation of the prior.
+#: Noise variance of the values: their noise is 1 % of the standard deviation of the prior.
 ALPHA = 1e-4
-#: Rounds of what takes milliseconds.
+#: Number of rounds for work that takes milliseconds.
 N_ROUNDS = 9
 
 DEVIATIONS = {"include": ["deviations"]}
@@ -35,7 +36,7 @@ CURVATURES = {"median": "%", "95 %": "%", "unflagged": "%", "bands cover": "%"}
 
 @dataclass(frozen=True)
 class Table:
-    """What the rows are measured with."""
+    """The tools and data with which the rows are measured."""
 
     setting: Setting
     service: Service
@@ -43,7 +44,7 @@ class Table:
     dragon: Dragon
 
     def works(self) -> dict[str, Callable[[], Work]]:
-        """The rows by name; a row makes its cloud when it is called for."""
+        """Returns the rows by name. A row makes its cloud only when it is called."""
         exact = (Bound("median", "≤", 0.1), Bound("95 %", "≤", 1))
         noisy = (Bound("median", "≤", 15), Bound("bands cover", "≥", 90), Bound("bands cover", "≤", 99.5))
         return {
@@ -113,7 +114,7 @@ class Table:
 
     def torus(self, noise: float, bounds: tuple[Bound, ...]) -> Work:
         n = self.setting.size(N_TORUS, 2_000)
-        # As large beside the distance of the points where a quick run has fewer.
+        # A quick run has fewer points: the noise keeps its ratio to their spacing.
         cloud = torus(n, noise * np.sqrt(N_TORUS / n))
 
         def ours() -> Entry:
@@ -127,7 +128,7 @@ class Table:
         return Work(what, bounds, CURVATURES, ours, lambda: self._curvature_peers(cloud, fits))
 
     def _curvature_peers(self, cloud: Cloud, fits: list[tuple[int, int]]) -> Iterable[Entry]:
-        """CGAL with degrees and numbers of neighbours, the last of degree 2 also by NumPy."""
+        """Yields CGAL for each (degree, neighbours), and NumPy for the last pair of degree 2."""
         for degree, n_neighbours in fits:
             work = self.peers.cgal("curvatures", cloud.points, n_neighbours, degree)
             figures = {**curved(work, cloud), **normals_of(work, cloud)}
@@ -167,7 +168,10 @@ class Table:
         )
 
     def _beside_dense(self, n: int, request: Mapping[str, Any]) -> dict[str, Figure]:
-        """Root mean squares in percent of the dense deviation, on values drawn from the prior, where both solvers run."""
+        """Compares the local with the dense posterior on n points, with values drawn from the prior.
+
+        Figures are root mean squares in percent of the dense standard deviation.
+        """
         points, queries = cube(n, 3), cube(1_000, 4)
         values = draw(points, 5) + np.sqrt(ALPHA) * np.random.default_rng(6).standard_normal(n)
         tensors = {"values": values, "queries": queries}
@@ -220,7 +224,8 @@ class Table:
 
         def others() -> Iterable[Entry]:
             for degree, n_neighbours in ((2, 12), (2, 18), (4, 30)):
-                # Bounds are on those that answer the same: without signs half of the normals point inward.
+                # Bounds apply only to peers that answer the same. Without signs half of the normals point
+                # inward.
                 for what, who in (("oriented", "CGAL"), ("normals", "without signs: CGAL")):
                     work = self.peers.cgal(what, cloud.points, n_neighbours, degree, rounds=N_ROUNDS)
                     yield entry(f"{who} jets, degree {degree}, {n_neighbours} neighbours", work, angles(work, cloud))
@@ -238,7 +243,7 @@ class Table:
         )
 
     def _part(self, cloud: Cloud) -> Cloud:
-        """Every point; a few of them in a quick run."""
+        """Returns every point, or about 2,000 of them in a quick run."""
         kept = slice(None, None, max(1, len(cloud.points) // 2_000) if self.setting.is_quick else 1)
         return Cloud(cloud.points[kept], cloud.normals[kept])
 
@@ -252,21 +257,21 @@ def entry(who: str, work: Done, figures: Mapping[str, Figure], remark: str = "")
 
 
 def angles(work: Done, cloud: Cloud, is_signed: bool = False) -> dict[str, Figure]:
-    """Of lines; peers may choose the inside for the outside."""
+    """Returns errors of the normals as lines. Without `is_signed`, the overall sign is left open."""
     found = accuracy.angles(work.arrays["normals"], cloud.normals, is_signed)
     figures = (found.median, found.high, found.flipped)
     return {name: Figure(figure, unit) for (name, unit), figure in zip(ANGLES.items(), figures, strict=True)}
 
 
 def normals_of(work: Done, cloud: Cloud, is_signed: bool = False) -> dict[str, Figure]:
-    """What answers with curvatures say of normals; peers give no signs there."""
+    """Returns errors of the normals in an answer with curvatures. Peers give no signs there."""
     found = accuracy.angles(work.arrays["normals"], cloud.normals, is_signed)
     figures = {"normals": Figure(found.median, "°")}
     return {**figures, "flipped": Figure(found.flipped, "%")} if is_signed else figures
 
 
 def curved(work: Done, cloud: Cloud) -> dict[str, Figure]:
-    """Errors of the mean curvature, and the median of the worse principal one."""
+    """Returns errors of the mean curvature, and the median error of the worse principal curvature."""
     found, exact, _ = _curvatures(work, cloud)
     median, high = np.quantile(accuracy.mean_errors(found, exact), [0.5, 0.95], method="higher")
     principal = np.quantile(accuracy.principal_errors(found, exact), 0.5, method="higher")
@@ -274,14 +279,14 @@ def curved(work: Done, cloud: Cloud) -> dict[str, Figure]:
 
 
 def bands(work: Done, cloud: Cloud) -> dict[str, Figure]:
-    """How often those of the mean curvature hold the truth."""
+    """Returns the percentage of error bands of the mean curvature that contain the truth."""
     found, exact, known = _curvatures(work, cloud)
     deviations = work.arrays["mean_curvature_deviations"][known]
     return {"bands cover": Figure(accuracy.coverage(found.mean(axis=1), deviations, exact.mean(axis=1)), "%")}
 
 
 def _curvatures(work: Done, cloud: Cloud) -> tuple[Floats, Floats, Floats]:
-    """Principal curvatures and their truth for the outer side, and where there is truth."""
+    """Returns principal curvatures, the true ones for the outer side, and a mask of known points."""
     assert cloud.curvatures is not None
     known = np.isfinite(cloud.curvatures).all(axis=1)
     if "principal_curvatures" in work.arrays:
@@ -300,7 +305,7 @@ def n_flagged(work: Answered) -> int:
 
 
 def notes(work: Answered) -> str:
-    """What the answer says of itself: solver, kernel, warnings, flagged queries."""
+    """Formats diagnostics of the answer: solver, kernel, flagged queries, warnings."""
     diagnostics = work.members.get("diagnostics", {})
     words = [f"solver {diagnostics.get('solver')}"]
     if kernel := diagnostics.get("kernel"):
@@ -311,7 +316,7 @@ def notes(work: Answered) -> str:
 
 
 def zonal(points: Floats) -> tuple[Floats, Floats]:
-    """f = sin(π(1 + 2z)) on the unit sphere and its Laplace–Beltrami, (1 − z²)f″ − 2z f′."""
+    """Evaluates f = sin(π(1 + 2z)) on the unit sphere, and its Laplace–Beltrami (1 − z²)f″ − 2z f′."""
     z = points[:, 2]
     phase = np.pi * (1 + 2 * z)
     first, second = 2 * np.pi * np.cos(phase), -4 * np.pi**2 * np.sin(phase)
@@ -319,7 +324,7 @@ def zonal(points: Floats) -> tuple[Floats, Floats]:
 
 
 def draw(points: Floats, seed: int) -> Floats:
-    """A function of the prior of `MATERN` at some points."""
+    """Draws a function from the prior of `MATERN`, at the given points."""
     squares = np.sum(points**2, axis=1)
     distances = np.sqrt(np.maximum(squares[:, None] + squares[None, :] - 2 * points @ points.T, 0))
     s = np.sqrt(3) * distances / float(MATERN["length_scale"])

@@ -1,4 +1,4 @@
-"""What is sent for a call, without a service."""
+"""Bodies that calls send, captured without a service."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DESCRIPTION = {
     "created_at": "2026-01-01T00:00:00Z",
 }
 
-# Every method that computes, with what it cannot do without.
+# Every method that computes, with its required arguments.
 METHODS: dict[str, dict[str, Any]] = {
     "interpolate": {"values": VALUES},
     "posterior": {"values": VALUES},
@@ -48,7 +48,7 @@ OPERATORS = [method for method in METHODS if "surface_gradient" in method or "la
 
 
 class Sent(Exception):
-    """A request that got as far as the network."""
+    """Raised instead of sending a request. Carries its body."""
 
     def __init__(self, request: httpx.Request) -> None:
         super().__init__(request.url.path)
@@ -64,12 +64,12 @@ def client() -> Any:
 
 
 def cloud() -> Any:
-    """A cloud of eight points in the plane, of a service that raises what it is sent."""
+    """Returns a cloud of eight points in the plane, whose service raises `Sent` with what it is sent."""
     return gramian.Cloud(client()._connection, models.Cloud.from_dict(DESCRIPTION))
 
 
 def sent(method: str, **arguments: object) -> Any:
-    """The body that a call of a method sends, beside the cloud."""
+    """Returns the body that a call of a method sends, without the cloud."""
     with pytest.raises(Sent) as caught:
         getattr(cloud(), method)(**{**METHODS[method], **arguments})
     assert caught.value.body.pop("cloud") == {"id": ID}
@@ -77,7 +77,7 @@ def sent(method: str, **arguments: object) -> Any:
 
 
 def posted(points: object, normals: object = None) -> Any:
-    """The body that registering points sends."""
+    """Returns the body that registering points sends."""
     with pytest.raises(Sent) as caught:
         client().cloud(points, normals)
     return caught.value.body

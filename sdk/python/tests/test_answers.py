@@ -1,4 +1,4 @@
-"""Answers: what they say can be sent back, and they show themselves readably."""
+"""Answers: the fit that they report can be sent back, and their `repr` is readable."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ every_operator = pytest.mark.parametrize("method", OPERATORS)
 NOISE = np.linspace(0.01, 0.02, 8)
 QUERIES = [[1.0, 0.0], [0.6, 0.8]]
 
-# With all that a fit may have; the service chooses what is absent.
+# Fits with all options. The service chooses absent ones.
 FITS: dict[str, dict[str, Any]] = {
     "nothing": {},
     "word": {"kernel": "gauss"},
@@ -54,7 +54,7 @@ def ask(cloud: Any, method: str, **arguments: object) -> Any:
 
 
 def sparse(value: Any) -> list[Any]:
-    """The sparse matrices in a member."""
+    """Returns the sparse matrices in a member."""
     return [matrix for matrix in (value if isinstance(value, list) else [value]) if hasattr(matrix, "tocsr")]
 
 
@@ -109,7 +109,7 @@ def test_a_forgotten_cloud_of_a_geometry_is_posted_again(cloud: Any, method: str
     ask(cloud, method, geometry={"cloud": other} if as_mapping else other)
 
 
-# Eight points are too few for what is local.
+# A cloud for local solvers, for which eight points are too few.
 MANY = 1.5 * np.column_stack([np.cos(np.arange(40) * np.pi / 20), np.sin(np.arange(40) * np.pi / 20)])
 
 
@@ -141,7 +141,7 @@ def test_so_it_does_where_nothing_but_neighbours_is_fitted(method: str) -> None:
 def test_the_diagnostics_of_an_answer_can_be_sent_back(cloud: Any, method: str) -> None:
     answer = ask(cloud, method, kernel="matern", alpha=1e-4)
     said = answer.diagnostics
-    # Sparse matrices have no fit but that of the surface.
+    # Sparse matrices have only the fit of the surface.
     geometry = {"geometry": said.geometry or said} if method in OPERATORS else {}
     again = ask(cloud, method, kernel=said.kernel, alpha=said.alpha, solver=said.solver, **geometry)
     assert again.diagnostics.to_dict() == said.to_dict()
@@ -160,7 +160,7 @@ def test_the_diagnostics_of_a_fit_with_noise_do_not_say_all(cloud: Any, method: 
         ask(cloud, method, kernel=said.kernel, alpha=said.alpha)
 
 
-# What a search may begin with.
+# Starts of a search.
 SEARCHES: dict[str, dict[str, Any]] = {
     **{name: fit for name, fit in FITS.items() if name != "merged"},
     "mean": {"mean": "linear"},
@@ -184,7 +184,7 @@ def test_the_fit_of_a_selection_is_what_was_selected(cloud: Any, fit: dict[str, 
             mean = selected.mean_coefficients
             np.testing.assert_allclose(answer.diagnostics.mean_coefficients, mean, rtol=1e-6, atol=1e-9)
         assert_same(answer, cloud.posterior(VALUES, QUERIES, **answer.fit))
-    further = cloud.select_model(VALUES, **selected.fit)  # the search may go on from there
+    further = cloud.select_model(VALUES, **selected.fit)  # the search may continue from there
     assert further.score > selected.score - 1e-6 * abs(selected.score)
 
 
@@ -236,4 +236,4 @@ def test_representations_are_as_one_writes_them(cloud: Any) -> None:
     with pytest.raises(gramian.Problem) as caught:
         cloud.normals(alpha=-1)
     assert "unset" not in repr(caught.value).lower()
-    assert repr(Unset()) == "UNSET"  # where somebody asks for it
+    assert repr(Unset()) == "UNSET"  # on its own it is shown

@@ -1,4 +1,4 @@
-"""What callers may write: for every field of every method, all forms that are accepted, and what is refused by name."""
+"""Arguments of callers: for every field of every method, all accepted forms, and refusals by name."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Foreign:
 
 
 class Broken:
-    """An array that another library does not give away."""
+    """An array of another library that refuses to be converted."""
 
     def __array__(self, dtype: object = None, copy: bool | None = None) -> npt.NDArray[Any]:
         raise RuntimeError("detach it first")
@@ -216,7 +216,7 @@ def test_rows_of_all_kinds_are_points(rows: object) -> None:
 
 
 def test_data_frames_are_arrays() -> None:
-    # What they are here: columns of one type are an array of it, those of several an array of objects.
+    # Columns of one type become an array of that type, columns of several types an array of objects.
     table = np.column_stack([CIRCLE, VALUES]).astype(object)
     table[:, 2] = list("abcdefgh")
     assert posted(Foreign(CIRCLE)) == {"points": CIRCLE.tolist()}
@@ -432,7 +432,7 @@ QUANTITIES = [
 
 
 class Spelling(enum.Enum):
-    """Somebody else's enumeration."""
+    """An enumeration of the caller."""
 
     MERGE = "merge"
 
@@ -664,7 +664,7 @@ def test_length_scales_are_part_of_what_a_kernel_is() -> None:
         Kernel("gauss", lengthscales=[1, 2])  # type: ignore[call-arg]
 
 
-# What is free
+# Free parameters
 
 FREE = [{"parameter": "length_scales", "min": 0.1, "max": 10.0}, {"parameter": "alpha", "min": 1e-6, "max": 1.0}]
 OF_ONE_AXIS = {"parameter": "length_scales", "axis": 1, "min": 0.1, "max": 10.0}

@@ -1,4 +1,4 @@
-"""What goes wrong on the way, with sockets: no server, one that dies or is another, pages of proxies, large answers."""
+"""Failures on the way, with real sockets: no server, a dying or foreign one, proxy pages, large answers."""
 
 from __future__ import annotations
 
@@ -51,7 +51,10 @@ def http(status: str, body: bytes, *headers: str, length: int | None = None) -> 
 
 @contextmanager
 def server(*answers: bytes | None) -> Iterator[tuple[str, list[int]]]:
-    """Gives these bytes in turn, one to a connection, which it then closes; None is silence. Counts the connections."""
+    """Runs a server that answers each connection with the next of these bytes, then closes it.
+
+    None means silence. Yields the address and a list with the number of connections.
+    """
     listener = socket.create_server(("127.0.0.1", 0))
     connections = [0]
     silent = threading.Event()
@@ -82,7 +85,7 @@ def server(*answers: bytes | None) -> Iterator[tuple[str, list[int]]]:
 
 
 def read_request(connection: socket.socket) -> None:
-    """Reads all of it: who closes before that breaks the connection."""
+    """Reads a whole request. Closing before its end would break the connection."""
     with connection.makefile("rb") as stream:
         length = 0
         while (line := stream.readline().lower()) not in (b"\r\n", b""):
@@ -124,7 +127,7 @@ def test_an_answer_that_does_not_come_says_which_timeout() -> None:
         with pytest.raises(httpx.ReadTimeout) as caught:
             gramian.Client(address, timeout=np.float32(0.2)).version()
         assert caught.value.__notes__ == [f"{address} has not answered in time, see Client(timeout=…)."]
-        assert connections == [1]  # the service is busy with it still
+        assert connections == [1]  # no repetition: the service is still busy with the request
 
 
 PAGES: dict[str, tuple[str, bytes, str, int, str]] = {

@@ -1,4 +1,4 @@
-"""Clouds in tiles, against one request for all of their points."""
+"""Clouds in tiles, compared with one request for all of their points."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NOWHERE = "http://127.0.0.1:9"
 
 
 def torus(n: int, seed: int = 0) -> Array:
-    """Random points, even by area, radii 2 and 0.5."""
+    """Returns random points on a torus of radii 2 and 0.5, uniform by area."""
     random = np.random.default_rng(seed)
     v = random.uniform(0, 2 * np.pi, 4 * n)
     v = v[random.uniform(0, 2.5, 4 * n) < 2 + np.cos(v) / 2][:n]
@@ -55,7 +55,7 @@ def service() -> gramian.dask.Service:
 
 @pytest.fixture
 def another() -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A second server, with its address."""
+    """Starts a second server; yields its address and process."""
     binary = os.environ.get("GRAMIAN_BINARY")
     if not binary:
         pytest.skip("tests/with_server.py says which binary to start")
@@ -69,7 +69,7 @@ def another() -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 
 def assert_same(found: Any, single: gramian.Normals | gramian.Curvatures) -> None:
-    """All numbers and flags are equal, but for rounding."""
+    """Asserts that all numbers and flags are equal up to rounding."""
     for name, array in vars(found).items():
         if name == "reasons":
             flagged = {entry.query: entry.reason.value for entry in single.degenerate}
@@ -127,7 +127,7 @@ def test_tiles_without_a_surface_have_no_normals(service: gramian.dask.Service) 
 
 def test_coarse_and_open_clouds_have_one_side(service: gramian.dask.Service, client: gramian.Client) -> None:
     x, y = np.random.default_rng(2).uniform(-1, 1, (2, 4000))
-    points = np.column_stack([x, y, np.sin(3 * x) * np.cos(3 * y) / 3])  # a sheet: its sides are a matter of choice
+    points = np.column_stack([x, y, np.sin(3 * x) * np.cos(3 * y) / 3])  # a sheet: its side is arbitrary
     normals = service.tiles(points, n_tiles=6).normals().normals.compute()
     expected = client.cloud(points).normals(solver="local").normals
     cosines = (normals * expected).sum(axis=1)
@@ -162,7 +162,7 @@ def test_a_kernel_is_learned_where_none_is_given(service: gramian.dask.Service) 
 
 
 def test_tiles_are_tasks_of_a_cluster(client: gramian.Client, points: Array) -> None:
-    urls = [NOWHERE, str(client._connection.http.base_url)]  # the first tile asks where nobody is, and then the next
+    urls = [NOWHERE, str(client._connection.http.base_url)]  # no service at the first, then the next is asked
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, protocol="inproc://"
@@ -178,7 +178,7 @@ def test_tiles_are_tasks_of_a_cluster(client: gramian.Client, points: Array) -> 
 def test_a_replica_may_die(another: tuple[str, subprocess.Popen[str]], client: gramian.Client, points: Array) -> None:
     url, process = another
     tiles = gramian.dask.connect([url, str(client._connection.http.base_url)]).tiles(points, n_tiles=4)
-    normals = tiles.normals()  # the first replica has been asked what the sample says
+    normals = tiles.normals()  # the first replica has already answered for the sample
     process.kill()
     process.wait()
     (found,) = dask.compute(normals)
@@ -205,7 +205,7 @@ def test_replicas_are_asked_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     asked.clear()
     with pytest.raises(gramian.Problem, match="dimension 2 or more"):
         gramian.dask.connect().replicas.ask(0, refuses)
-    assert asked == [""]  # another one would say the same
+    assert asked == [""]  # another replica would refuse it too
 
 
 def test_every_point_finds_its_nearest_in_its_tile() -> None:

@@ -1,4 +1,4 @@
-"""What clouds in tiles are given, and by whom they are answered."""
+"""Arguments of clouds in tiles, and the replicas that answer."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_values_that_are_no_numbers_are_refused_by_their_place(
 def test_blocks_may_be_empty(service: gramian.dask.Service, client: gramian.Client) -> None:
     points = POINTS[np.argsort(POINTS[:, 0])]
     chosen = da.from_array(points, chunks=(100, 3))
-    chosen = chosen[chosen[:, 0] > 0.5]  # the first blocks have nothing of it
+    chosen = chosen[chosen[:, 0] > 0.5]  # the first blocks have none of these points
     found = service.tiles(chosen, n_tiles=2).normals().normals.compute()
     expected = client.cloud(points[points[:, 0] > 0.5]).normals(solver="local").normals
     np.testing.assert_allclose(np.abs((found * expected).sum(axis=1)), 1, atol=1e-9)
@@ -152,6 +152,6 @@ def test_a_lost_machine_is_waited_for_seconds_and_then_asked_last(monkeypatch: p
     both = replicas.Replicas(("http://lost:1", "http://here:1"))
     assert [both.ask(0, call) for _ in range(3)] == ["here"] * 3
     assert asked == ["lost", "here", "here", "here"]
-    monkeypatch.setattr(replicas, "_silent", {"http://lost:1": 0.0})  # its time is over
+    monkeypatch.setattr(replicas, "_silent", {"http://lost:1": 0.0})  # the replica may be asked again
     both.ask(0, call)
     assert asked[-2:] == ["lost", "here"]

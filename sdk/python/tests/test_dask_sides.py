@@ -31,14 +31,14 @@ def sphere(n: int, seed: int = 0) -> Array:
 
 
 def ring(n: int, tube: float, seed: int = 0) -> tuple[Array, Array]:
-    """Random points of a torus of radius 1, and the normals there."""
+    """Returns random points of a torus of radius 1, and their normals."""
     u, v = np.random.default_rng(seed).uniform(0, 2 * np.pi, (2, n))
     normals = np.column_stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)])
     return np.column_stack([np.cos(u), np.sin(u), np.zeros(n)]) + tube * normals, normals
 
 
 def grains(n_of_each: int, per_axis: int) -> tuple[Array, Array]:
-    """Small spheres on a grid, in random order, and the normals there."""
+    """Returns points of small spheres on a grid, in random order, and their normals."""
     random = np.random.default_rng(7)
     centres = np.stack(np.meshgrid(*[np.arange(per_axis)] * 3), axis=-1).reshape(-1, 3)
     outward = random.normal(size=(len(centres) * n_of_each, 3))
@@ -50,7 +50,7 @@ def grains(n_of_each: int, per_axis: int) -> tuple[Array, Array]:
 def sides(
     points: Array, normals: Array, directions: Array, coarse: Ints | None = None, cells: Ints | None = None
 ) -> tuple[Array, Truths]:
-    """The signs of normals in tiles, and which are doubtful; tiles have halos of a tenth of the cloud."""
+    """Finds signs of normals in tiles, and the doubtful ones. Tiles have halos of a tenth of the cloud."""
     n = len(points)
     cells = np.zeros(n, dtype=np.int64) if cells is None else cells
     rows = np.arange(0, n, 50, dtype=np.int64) if coarse is None else coarse
@@ -106,7 +106,7 @@ def test_sides_that_few_coarse_points_choose_are_doubtful(n_coarse: int, are_dou
     rows = np.linspace(0, 3999, n_coarse).astype(np.int64)
     for side in (1, -1):
         signs, doubtful = sides(points, side * outward, side * outward, rows)
-        assert (signs == 1).all()  # as the function has it: so slim a ring has next to no volume
+        assert (signs == 1).all()  # as the function says: so slim a ring has almost no volume
         assert (doubtful == are_doubtful).all()
 
 
@@ -137,7 +137,8 @@ def test_a_few_points_on_a_surface_are_not_doubtful() -> None:
 
 
 def test_surfaces_that_touch_keep_their_sides() -> None:
-    # One above the other: where they touch, their normals are opposite, and joined so one of them would be inside out.
+    # One sphere lies above the other. Where they touch their normals are opposite: joined there, one of them
+    # would be inside out.
     upper, lower = sphere(3000), sphere(3000, seed=1)
     points, normals = np.concatenate([upper, lower + np.array([0, 0, 2.0])]), np.concatenate([upper, lower])
     signs, are_doubtful = sides(points, normals, normals)

@@ -1,4 +1,4 @@
-"""Computations as jobs: against a service of a few lines, and the real one."""
+"""Computations as jobs, against a service of a few lines and against the real one."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ Answer = httpx.Response | BaseException
 
 
 class Service:
-    """Answers with what it is given, in turn, and at last always the same; notes what it is asked."""
+    """A service that gives these answers in turn, and repeats the last one. Records the requests."""
 
     def __init__(self, *answers: Answer, deleted: Answer | None = None) -> None:
         self.answers = list(answers)
@@ -79,7 +79,7 @@ class Service:
 
 
 class Clock:
-    """Goes on only while somebody sleeps."""
+    """A clock that advances only while a caller sleeps."""
 
     def __init__(self) -> None:
         self.waits: list[float] = []
@@ -227,7 +227,7 @@ def test_a_job_that_cannot_be_cancelled_is_named(deleted: Answer) -> None:
     with pytest.raises(KeyboardInterrupt) as caught:
         service.cloud(interrupt).normals()
     assert caught.value.__notes__ == [LEFT]
-    assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", f"DELETE {PLACE}"]  # once: nobody is to wait
+    assert service.asked == ["POST /v1/normals", f"GET {PLACE}/events", f"DELETE {PLACE}"]  # one attempt
     assert set(service.timeouts[-1].values()) == {5}
 
 

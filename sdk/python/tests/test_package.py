@@ -29,7 +29,7 @@ from gramian.wire.tensors import Array, Format
 
 GAUSS = Kernel(family=KernelFamily.GAUSS, length_scale=2.0)
 
-# Every operation, with all that can be asked of it; the second query has no normal. The values are x².
+# Every operation with all its options. The second query has no normal. The values are x².
 QUERIES = [[1.0, 0.0], [0.0, 0.0]]
 OPERATIONS: dict[str, Callable[[Cloud], object]] = {
     "interpolate": lambda cloud: cloud.interpolate(squares(cloud), QUERIES, derivatives=2, kernel=GAUSS),
@@ -260,7 +260,7 @@ def test_batches_are_dense(client: gramian.Client, circle: Array) -> None:
 def test_a_selection_finds_what_explains_values(client: gramian.Client) -> None:
     random = np.random.default_rng(6)
     points = random.uniform(-1, 1, size=(70, 2))
-    values = np.sin(4 * points[:, 0]) + 0.1 * random.normal(size=70)  # whatever the second coordinate is
+    values = np.sin(4 * points[:, 0]) + 0.1 * random.normal(size=70)  # independent of the second coordinate
     cloud = client.cloud(points)
     vary: gramian.Bounds = {"length_scales": (0.05, 50), "variance": (0.01, 100), "alpha": (1e-6, 1)}
     found = cloud.select_model(values, vary=vary, families=["gauss", "matern"], kernel="gauss", alpha=1e-2)
@@ -483,12 +483,12 @@ def test_a_listed_cloud_cannot_be_posted_again(client: gramian.Client, circle: A
     with pytest.raises(gramian.UnknownCloud) as caught:
         listed.normals()
     assert (caught.value.status, caught.value.pointer) == (404, "/cloud/id")
-    made.normals()  # and now it is back for both
+    made.normals()  # posts the points again, for both
     listed.normals()
 
 
 def forget(cloud: Cloud) -> None:
-    """Deletes the cloud behind its back."""
+    """Deletes the cloud in the service, without its client."""
     httpx.delete(f"{os.environ['GRAMIAN_URL']}/v1/clouds/{cloud.id}").raise_for_status()
 
 

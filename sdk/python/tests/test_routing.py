@@ -1,4 +1,4 @@
-"""Which cloud a request says it is about, so that a proxy can send it to the replica that has it. Without a service."""
+"""The header that names the cloud of a request, so that a proxy finds its replica. Without a service."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ FILE = b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n"
 
 
 def recording(*known: str) -> tuple[gramian.Client, list[tuple[str, str, str | None]]]:
-    """A client of a service that knows these clouds by their paths only, and what it was asked: about which cloud."""
+    """Returns a client, and a list that records each request: method, path and cloud header.
+
+    Its service knows only the clouds `known`, by their paths.
+    """
     asked: list[tuple[str, str, str | None]] = []
 
     def handle(request: httpx.Request) -> httpx.Response:

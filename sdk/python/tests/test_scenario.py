@@ -1,4 +1,4 @@
-"""One scenario with nothing but the generated client, as its users would write it."""
+"""A scenario with only the generated client, as its users would write it."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def test_laplace_beltrami_matrix(client: Client, cloud: CloudRef) -> None:
     for row, cosine in zip(answer.matrix, COSINES, strict=True):
         assert row is not None
         assert len(row) == 8
-        # Δ cos θ = −cos θ. Eight points and this kernel give it to 2.4e-6, as docs/walkthrough.md shows at (1, 0);
-        # its condition, 3e3, and entries of 5 leave rounding below 1e-11.
+        # Δ cos θ = −cos θ. Eight points and this kernel reproduce it to 2.4e-6, as docs/walkthrough.md shows
+        # at (1, 0). With a condition number of 3e3 and entries of 5, rounding stays below 1e-11.
         assert sum(x * y for x, y in zip(row, COSINES, strict=True)) == pytest.approx(-cosine, abs=1e-5)
 
 
@@ -105,7 +105,7 @@ def test_posterior_with_variance(client: Client, cloud: CloudRef) -> None:
     )
     answer = compute_posterior.sync(client=client, body=request)
     assert isinstance(answer, PosteriorResponse)
-    # The mean is close to the function x, which the values are samples of.
+    # The values are samples of the function x, and the mean is close to it.
     assert answer.means == pytest.approx([0.9], abs=0.05)
     assert not isinstance(answer.variances, Unset)
     [variance] = answer.variances

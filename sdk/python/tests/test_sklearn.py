@@ -44,7 +44,7 @@ every_choice = pytest.mark.parametrize("choices", CHOICES.values(), ids=CHOICES.
 
 
 def field(n: int, seed: int) -> tuple[Array, Array]:
-    """Points of a square, and values there with noise of the deviation 0.1."""
+    """Returns points of a square, and values there with noise of standard deviation 0.1."""
     random = np.random.default_rng(seed)
     points = random.uniform(size=(n, 2))
     return points, truth(points) + random.normal(scale=0.1, size=n)

@@ -1,4 +1,4 @@
-"""Retries, against services that exist only here. Nothing waits."""
+"""Retries, against mock services. Nothing waits."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def refusal(status: int = 503, retry_after: str | None = None) -> httpx.Response
 
 
 def service(*answers: Answer) -> tuple[Callable[[httpx.Request], httpx.Response], list[httpx.Request]]:
-    """Gives these answers in turn, and keeps the requests."""
+    """Returns a service that gives these answers in turn, and the list of its requests."""
     requests: list[httpx.Request] = []
     rest: Iterator[Answer] = iter(answers)
 
@@ -123,7 +123,7 @@ def test_a_connection_that_a_proxy_lost_is_tried_again() -> None:
     with pytest.raises(gramian.Problem) as caught:
         connection.post("/v1/normals", {"cloud": {"id": "a"}})
     assert (waits, len(requests)) == ([0.1, 0.2, 0.4], 4)
-    assert (caught.value.status, type(caught.value)) == (502, gramian.Problem)  # nobody said that there is no place
+    assert (caught.value.status, type(caught.value)) == (502, gramian.Problem)  # not `Overloaded`
 
 
 def test_a_request_without_arrays_needs_no_safetensors() -> None:

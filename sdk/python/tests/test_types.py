@@ -1,4 +1,4 @@
-"""The types of the generated client: no Any, no anonymous inner objects, enumerations as such, None for null."""
+"""Types of the generated client: no Any, no anonymous inner objects, real enumerations, None for null."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MODELS = [model for model in vars(models).values() if inspect.isclass(model)]
 OBJECTS = [model for model in MODELS if attrs.has(model)]
 ENUMERATIONS = [model for model in MODELS if issubclass(model, enum.Enum)]
 
-# Answers may grow: what a later version adds is kept in this dictionary, and nothing can be said of its type.
+# Answers may grow: this dictionary keeps members of later versions, whose types are unknown.
 LATER_MEMBERS = "additional_properties"
 
 # The modules import their models for type checkers only.
@@ -34,7 +34,7 @@ NAMES = {model.__name__: model for model in MODELS} | {"Unset": Unset, "File": F
 
 
 def parts(hint: Any) -> Iterator[Any]:
-    """The type and all types in it."""
+    """Yields a type and all types in it."""
     yield hint
     for part in get_args(hint):
         yield from parts(part)
@@ -82,7 +82,7 @@ def test_requests_have_no_later_members() -> None:
 
 
 def test_every_model_is_a_named_schema() -> None:
-    # The generator makes up names for anonymous ones, by their place: GeometryType0, KernelListKernelsItem.
+    # The generator names anonymous schemas by their place: GeometryType0, KernelListKernelsItem.
     document = json.loads((Path(__file__).parents[3] / "openapi" / "openapi.json").read_text())
     schemas = document["components"]["schemas"]
     named = {name for name, schema in schemas.items() if "properties" in schema or "enum" in schema}
@@ -118,7 +118,8 @@ def test_nullable_entries_are_nullable_and_nothing_else_is() -> None:
     assert fields(models.LaplaceBeltramiMatrixResponse)["matrix"] == list[row | None]
     assert fields(models.LaplaceBeltramiSparseMatrixResponse)["indices"] == list[int]
     nullable = {model.__name__ for model in OBJECTS for hint in fields(model).values() if type(None) in parts(hint)}
-    # Of what is not positive definite there is no score, of a point that the mean hangs on no prediction.
+    # A matrix that is not positive definite has no score. A point on which the mean depends has no
+    # prediction.
     others = {"PathEntry", "FamilyScore", "LeftOut"}
     assert all(name.endswith("Response") for name in nullable - others)
     assert not nullable & {"InterpolationResponse", "PosteriorResponse", "LaplaceBeltramiSparseMatrixResponse"}
@@ -152,7 +153,7 @@ def test_a_required_body_is_required_and_the_key_is_not() -> None:
 )
 def test_plain_strings_are_those_of_the_enumeration(alias: types.UnionType) -> None:
     enumeration, *used, strings = get_args(alias)
-    assert used in ([], [models.SolverUsed])  # what an answer says of its solver can be sent back
+    assert used in ([], [models.SolverUsed])  # the solver that an answer reports can be sent back
     assert typing.get_origin(strings) is Literal
     assert set(get_args(strings)) == {member.value for member in enumeration}
 

@@ -102,7 +102,7 @@ fn cloud(id: &CloudId) -> types::builder::CloudRef {
     CloudRef::builder().id(Some(id.clone()))
 }
 
-/// exp(−r²/ℓ²)
+/// Returns the Gaussian kernel exp(−r²/ℓ²).
 fn gauss(length_scale: f64) -> Kernel {
     let kernel = Kernel::builder().family(KernelFamily::Gauss).length_scale(length_scale);
     kernel.try_into().expect("a kernel needs a family only")
@@ -112,7 +112,7 @@ fn rows(points: &[[f64; 2]]) -> Vec<Vec<f64>> {
     points.iter().map(|point| point.to_vec()).collect()
 }
 
-/// The values at the points.
+/// Returns cos θ at the points, their first coordinate.
 fn cosines() -> Vec<f64> {
     POINTS.iter().map(|[x, _]| *x).collect()
 }

@@ -7,9 +7,9 @@
 >>> curvatures.mean_curvatures.shape, curvatures.mean_curvatures[0].round(1)  # 2 at the tip: axis/(other axis)²
 ((100,), np.float64(2.0))
 
-`Client` is the service, `Cloud` what it knows of your points, with a method for each operation. Answers are NumPy
-arrays in dataclasses (`gramian.answers`), refusals are exceptions (`Problem`). `gramian.rest` is the client that is
-generated from the service's OpenAPI document, with all of the interface.
+`Client` stands for the service. `Cloud` stands for a registered cloud of points, with a method for each
+operation. Answers are NumPy arrays in dataclasses (`gramian.answers`). Refusals are exceptions (`Problem`).
+`gramian.rest` is the complete client, generated from the service's OpenAPI document.
 """
 
 import copyreg
@@ -71,7 +71,8 @@ from .rest.models import (
 from .rest.types import UNSET, Unset
 from .wire.problems import NotPositiveDefinite, Overloaded, Problem, UnknownCloud
 
-# The generated code compares with this one object, which therefore must stay one when an answer is pickled or copied.
+# The generated code compares with the identity of UNSET. Pickling or copying an answer must keep that
+# identity.
 copyreg.pickle(Unset, lambda _: "UNSET")
 
 __all__ = [

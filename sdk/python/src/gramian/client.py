@@ -1,4 +1,4 @@
-"""The service at an address."""
+"""The client of a gramian service."""
 
 from __future__ import annotations
 
@@ -32,39 +32,44 @@ T = TypeVar("T", CloudList, KernelList, Version)
 DEFAULT_URL = "http://127.0.0.1:8080"
 
 DEFAULT_TIMEOUT = httpx.Timeout(150.0, connect=10.0)
-"""In seconds. Longer than the service's own deadline, 120 s if not configured, so that it can say what was too slow."""
+"""Default timeouts in seconds.
+
+They exceed the service's own deadline, 120 s by default, so that the service can say what was too slow.
+"""
 
 
 @suggest_names
 class Client:
     """A gramian service.
 
-    Keeps connections open; `close()` it, or use it in a `with` statement. May be shared by threads; cannot be pickled,
-    so every process makes its own.
+    A client keeps connections open. `close()` it, or use it in a `with` statement. Threads may share it. It
+    cannot be pickled, so every process makes its own.
 
     Parameters
     ----------
     base_url : str, optional
-        Its address; if absent the environment variable `GRAMIAN_URL`, or else `http://127.0.0.1:8080`.
+        Address of the service. If absent, the environment variable `GRAMIAN_URL`, or else
+        `http://127.0.0.1:8080`.
     api_key : str, optional
-        A key, where the service wants one; if absent the environment variable `GRAMIAN_API_KEY`.
+        Key, if the service requires one. If absent, the environment variable `GRAMIAN_API_KEY`.
     timeout : float or httpx.Timeout, optional
-        Seconds to wait for a connection, and for each next part of an answer; 10 and 150 if absent. `math.inf` for no
-        limit.
+        Seconds to wait for a connection, and for each next part of an answer. 10 and 150 if absent.
+        `math.inf` means no limit.
     retries : int, optional
-        How often a request is repeated at most, after 429, 502, 503 or a lost connection; 4 if absent.
+        Largest number of repetitions of a request after 429, 502, 503 or a lost connection. 4 if absent.
     max_wait : float, optional
-        Seconds that all waits of a request together may take; 60 if absent. `Retry-After` is honoured within them; if
-        it asks for more, `Overloaded` is raised at once, with `retry_after`.
+        Seconds that all waits of a request together may take. 60 if absent. `Retry-After` is honoured within
+        them. If it asks for more, `Overloaded` is raised at once, with `retry_after`.
     format : str, optional
-        How arrays travel, `"safetensors"` or `"json"`: the former if absent and that package is installed. The numbers
-        are the same.
+        Format of arrays in transit, `"safetensors"` or `"json"`. The numbers are the same. If absent,
+        safetensors if that package is installed.
     progress : bool or callable, optional
-        Whether computations are jobs of the service, with a progress bar for each (extra `progress`). Their deadline is
-        that of jobs, a day if not configured. A service that is away meanwhile is waited for, ten minutes at most.
-        Ctrl-C cancels them. A function instead is called with each state of a job, a `gramian.rest.models.Job`.
+        True to run computations as jobs of the service, each with a progress bar (extra `progress`). Their
+        deadline is that of jobs, a day by default. The client waits at most ten minutes for a service that is
+        unreachable meanwhile. Ctrl-C cancels the jobs. A function is called with each state of a job, a
+        `gramian.rest.models.Job`, instead of showing a bar.
     transport : httpx.BaseTransport, optional
-        Instead of the network, as in `httpx.Client`.
+        Transport to use instead of the network, as in `httpx.Client`.
 
     Examples
     --------
@@ -85,7 +90,7 @@ class Client:
         progress: bool | Callable[[Job], object] | None = None,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        """Says where the service is; nothing is sent yet."""
+        """Takes the address and the options. Nothing is sent yet."""
         seconds = None if isinstance(timeout, httpx.Timeout) else timeout
         given = {"timeout": seconds, "retries": retries, "max_wait": max_wait, "format": format}
         bounds: dict[str, Any] = normalise(given, CLIENT)
@@ -112,7 +117,7 @@ class Client:
         self.close()
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        return self  # as threads share it, so do the clones of an estimator
+        return self  # clones of an estimator share it, as threads do
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Client cannot be pickled, since it has connections: every process makes its own")
@@ -123,9 +128,10 @@ class Client:
 
     @property
     def rest(self) -> rest.Client:
-        """The generated client of this service, with the same connections, key and retries; closing it closes these.
+        """The generated client of this service, with the same connections, key and retries.
 
-        Its asyncio functions have the same key, but connections of their own and no retries.
+        Closing it closes these connections. Its asyncio functions have the same key, but separate connections
+        and no retries.
 
         >>> from gramian.rest.api.process import check_ready
         >>> check_ready.sync(client=gramian.Client().rest).status
@@ -139,16 +145,17 @@ class Client:
     def cloud(
         self, points: npt.ArrayLike | str | os.PathLike[str] | bytes, normals: npt.ArrayLike | None = None
     ) -> Cloud:
-        """Registers points, and remembers them in case the service forgets them.
+        """Registers points. The cloud keeps a copy of them, in case the service forgets them.
 
         Parameters
         ----------
         points : array_like, `[n, d]`, or str, os.PathLike or bytes
-            A row of coordinates for each, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners write it: a path
-            that ends in `.ply`, or the bytes. Its vertices are the points, with their normals. It is the service that
-            reads it, so that the cloud has no `points` here.
+            A row of coordinates for each point, also on a line: `[[0.0], [0.5]]`. Or a PLY file, as scanners
+            write it: a path that ends in `.ply`, or the bytes. Its vertices are the points, with their
+            normals. The service reads the file, so that the cloud has no `points` here.
         normals : array_like, `[n, d]`, optional
-            Of any length but 0, if known: their side is the outward one. Not beside a file, which has its own.
+            Normals of any length but 0, if known. Their side is the outward one. Not allowed with a file,
+            which has normals itself.
 
         Examples
         --------
@@ -174,14 +181,14 @@ class Client:
     def clouds(self, page_size: Whole | None = None) -> Iterator[Cloud]:
         """Yields the clouds registered with this key, oldest first, page by page.
 
-        They have no points, and so cannot be posted again.
+        These clouds have no points here, so they cannot be posted again.
 
         Parameters
         ----------
         page_size : int, optional
-            How many the service is asked for at a time; its own choice if absent.
+            Number of clouds per request. The service chooses if absent.
         """
-        asked = normalise({"page_size": page_size}, CLIENT)  # here, where the caller is: pages are asked for later
+        asked = normalise({"page_size": page_size}, CLIENT)  # now, in the caller's frame; pages come later
         return self._pages({"limit": asked["page_size"]} if asked else {})
 
     def _pages(self, parameters: dict[str, Any]) -> Iterator[Cloud]:
@@ -203,7 +210,7 @@ class Client:
         return self._get("/v1/kernels", KernelList).kernels
 
     def version(self) -> Version:
-        """Says what is running."""
+        """Returns the version of the running service."""
         return self._get("/version", Version)
 
     def _get(self, path: str, kind: type[T], parameters: Mapping[str, Any] | None = None) -> T:
@@ -211,7 +218,7 @@ class Client:
 
 
 def _ply_file(points: object) -> bytes | None:
-    """Returns the bytes of a PLY file, if that is what is given: by its path, or as they are."""
+    """Returns the bytes of a PLY file, given by path or as bytes. None if the points are something else."""
     if isinstance(points, bytes):
         return points if points.startswith(b"ply") else None
     if isinstance(points, str | os.PathLike) and str(points).lower().endswith(".ply"):
@@ -220,19 +227,19 @@ def _ply_file(points: object) -> bytes | None:
 
 
 def _own_array(name: str, rows: npt.ArrayLike, sizes: Sizes | None = None) -> Array:
-    """Returns a read-only copy of rows: the caller may change theirs, and these must stay as their id says."""
-    array: Array = np.array(normalise({name: rows}, REQUEST, sizes)[name])  # always: others hand out their own buffer
+    """Returns a read-only copy of rows. The caller may change the original, but this must match its id."""
+    array: Array = np.array(normalise({name: rows}, REQUEST, sizes)[name])  # copies the caller's buffer
     array.flags.writeable = False
     return array
 
 
 def _url(address: str) -> str:
-    """Returns an address that can be asked.
+    """Returns a checked address.
 
     Raises
     ------
     ValueError
-        If it has another scheme than HTTP, or none.
+        If its scheme is neither `http` nor `https`, or if it has no host.
     """
     try:
         url = httpx.URL(str(address).strip())
@@ -244,21 +251,21 @@ def _url(address: str) -> str:
 
 
 def _timeout(seconds: float | None) -> httpx.Timeout:
-    """Returns these seconds for each part of an exchange; httpx has no infinite ones."""
+    """Returns the timeout for each part of an exchange. Infinity becomes None, which httpx expects."""
     if seconds is None:
         return DEFAULT_TIMEOUT
     return httpx.Timeout(None if seconds == math.inf else seconds)
 
 
 def _shown(progress: bool | Callable[[Job], object] | None) -> Callable[[str], Progress] | None:
-    """Who is shown how far a job is, for each of them; nobody if there are to be none."""
+    """Returns a function that makes a progress display for a job, or None if there are to be no jobs."""
     if progress is None or isinstance(progress, bool):
         return Bar if progress else None
     return lambda _: Told(progress)
 
 
 def _key(key: str | None) -> str | None:
-    """Returns a key that a header can have; one that is blank is none."""
+    """Returns a key that a header can carry. A blank key counts as none."""
     key = (key or "").strip()
     if not (key.isascii() and key.isprintable()):
         raise ValueError("api_key has characters that no header can have")

@@ -1,4 +1,4 @@
-"""Clouds and what can be asked about them."""
+"""Clouds and their operations."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from .resources.values import ValuesOfCloud
 
 
 class Cloud(ValuesOfCloud, BatchesOnCloud, SelectionOnCloud, SurfaceOfCloud, OperatorsOnCloud):
-    """Points that the service keeps under an id, and what can be asked about them.
+    """Points that the service keeps under an id, with a method for each operation on them.
 
-    The id is a hash of the points (and normals, if given), so it is the same whenever and wherever they are posted. The
-    service forgets the clouds that were not used for longest. A cloud that was made from points or a file has a copy of
-    them, and posts them again when an operation finds them forgotten; one that was listed by `Client.clouds()` has
-    none, and raises `UnknownCloud` instead.
+    The id is a hash of the points (and normals, if given), so it is the same whenever and wherever they are
+    posted. The service forgets the least recently used clouds. A cloud made from points or a file keeps a
+    copy of them, and posts them again when an operation finds them forgotten. A cloud listed by
+    `Client.clouds()` has no copy, and raises `UnknownCloud` instead.
 
-    `gramian.normalise` describes what methods accept: numbers of NumPy are numbers, arrays may be lists or data frames,
-    words may be members of enumerations, and None is as absent. Wrong types, shapes and numbers are refused here, as
-    `TypeError` and `ValueError` with the name of the argument; all else is refused by the service, as `Problem`.
+    `gramian.arguments.normalise` describes what methods accept: numbers of NumPy are numbers, arrays may be
+    lists or data frames, words may be members of enumerations, and None means absent. The client refuses
+    wrong types, shapes and numbers, as `TypeError` and `ValueError` with the name of the argument. The
+    service refuses everything else, as `Problem`.
 
-    A cloud does not change, and may be used by several threads. It belongs to its client and cannot be pickled; its
-    points and its answers can.
+    A cloud does not change, and several threads may use it. It belongs to its client and cannot be pickled.
+    Its points and its answers can.
     """

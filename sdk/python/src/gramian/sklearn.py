@@ -1,4 +1,4 @@
-"""A regressor with the interface of scikit-learn, for which that is needed: the extra `gramian[sklearn]`."""
+"""A regressor with the interface of scikit-learn. Needs scikit-learn, the extra `gramian[sklearn]`."""
 
 from __future__ import annotations
 
@@ -31,47 +31,48 @@ except ImportError as error:
 class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]  # sklearn has no types
     """Gaussian-process regression by the service, which learns kernel, noise and mean from the values.
 
-    Predictions have the shapes and the meaning of scikit-learn's `GaussianProcessRegressor`. Each column of a `y` of
-    the shape `[n, k]` is fitted by itself. Kernels depend on distances in X: scale features of different units, or
-    give a kernel with a length scale for each.
+    Predictions have the shapes and the meaning of scikit-learn's `GaussianProcessRegressor`. If `y` has the
+    shape `[n, k]`, each column is fitted separately. Kernels depend on distances in X: scale features of
+    different units, or give a kernel with a length scale for each.
 
     Parameters
     ----------
     kernel : str, dict or Kernel, optional
-        A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)`, with `length_scales` one for
-        each feature, or as a dictionary), or `kernel_` of another regressor. If absent, learned from the values by
-        their likelihood; with one that is given nothing is learned.
+        A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a dictionary,
+        with `length_scales` for one per feature), or `kernel_` of another regressor. If absent, learned from
+        the values by their likelihood. If given, nothing is learned.
     alpha : float or array_like, `[n]`, optional
-        The variance of the noise, of all samples or of each, in the unit of `y` squared. If absent, learned where the
-        kernel is, else 1e-10.
+        Noise variance of all samples or of each, in the unit of `y` squared. If absent, learned if the kernel
+        is, else 1e-10.
     mean : str, optional
-        What the function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. A
-        constant if absent with `kernel`, else zero.
+        Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the features. If
+        absent, a constant where `kernel` is absent too, else zero.
     solver : str, optional
-        `"dense"`, `"local"` for each prediction from the samples nearest to it, or `"auto"` as if absent: dense as far
-        as the service factorizes, local beyond.
+        `"dense"`; `"local"` to predict from the nearest samples; or `"auto"` (if absent): dense up to the
+        largest size that the service factorizes, local beyond.
     duplicates : str, optional
-        What to do with samples at the same place when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+        Policy for samples at the same place when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
     client : Client or str, optional
-        The service, or its address; as `gramian.Client()` finds it if absent. Clones share a `Client`; a pickle has
-        its address only, and the key is that of `GRAMIAN_API_KEY` where it is loaded.
+        The service, or its address. If absent, as `gramian.Client()` finds it. Clones share a `Client`. A
+        pickle keeps only its address, and the key is that of `GRAMIAN_API_KEY` where the pickle is loaded.
 
     Attributes
     ----------
     kernel_ : KernelUsed, or k of them
-        The kernel, learned or given, with all its numbers.
+        The kernel, learned or given, with all its parameters.
     alpha_ : float, or array of `[n]` or `[k]`
-        The variance of the noise: of each sample if it was given so, else of each column of `y`.
+        Noise variance: of each sample if it was given so, else of each column of `y`.
     mean_coefficients_ : array of `[p]` or `[k, p]`
-        The constant, then a slope per feature; p is 0, 1 or 1 + d.
+        The constant, then a slope per feature. p is 0, 1 or 1 + d.
     log_marginal_likelihood_value_ : float or None
-        Of the values, in the sum over columns; None by the local solver, and where the matrix has no Cholesky factor.
+        Log marginal likelihood of the values, summed over columns. None with the local solver, and where the
+        matrix has no Cholesky factor.
     cloud_id_ : str
         The id of the samples in the service.
     X_train_, y_train_ : arrays
-        What was fitted, as float64. Where the service has forgotten it, predictions send it again.
+        The fitted data, as float64. If the service has forgotten it, predictions send it again.
     n_features_in_, feature_names_in_
-        As of all estimators.
+        As for all estimators.
 
     Examples
     --------
@@ -94,7 +95,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         duplicates: Duplicates | None = None,
         client: Client | str | None = None,
     ) -> None:
-        """Keeps the parameters; `fit` looks at them."""
+        """Keeps the parameters. `fit` checks them."""
         self.kernel = kernel
         self.alpha = alpha
         self.mean = mean
@@ -108,21 +109,23 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         return {**super().__getstate__(), "client": address}
 
     def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
-        """Registers the samples, learns what is not given, and pins it: predictions repeat to the last bit.
+        """Registers the samples, and learns what is not given.
+
+        Later calls use what was learned, so predictions repeat to the last bit.
 
         Parameters
         ----------
         X : array_like, `[n, d]`
-            A row of features for each sample; 16 at most, unless the service is configured otherwise.
+            A row of features for each sample. At most 16, unless the service is configured otherwise.
         y : array_like, `[n]` or `[n, k]`
             The values.
 
         Raises
         ------
         ValueError
-            If there are more features than the service takes.
+            If there are more features than the service accepts.
         Problem
-            If it refuses something else.
+            If the service refuses anything else.
         """
         points, values = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True)
         choices = self._choices(len(points))
@@ -149,17 +152,17 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     def predict(
         self, X: npt.ArrayLike, return_std: bool = False, return_cov: bool = False
     ) -> Array | tuple[Array, Array]:
-        """Returns the posterior mean, and how certain it is.
+        """Returns the posterior mean, and its standard deviations or covariances if requested.
 
         Parameters
         ----------
         X : array_like, `[m, d]`
-            Where to predict.
+            Features at which to predict.
         return_std : bool, optional
-            Whether to return standard deviations too. They are those of the function, without noise: a new observation
-            has `np.sqrt(std**2 + alpha_)`.
+            True to return standard deviations too. They are those of the function, without noise. A new
+            observation has `np.sqrt(std**2 + alpha_)`.
         return_cov : bool, optional
-            Whether to return covariances of the function too; not by the local solver.
+            True to return covariances of the function too. The local solver has none.
 
         Returns
         -------
@@ -180,16 +183,18 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     def sample_y(
         self, X: npt.ArrayLike, n_samples: int = 1, random_state: int | np.random.RandomState | None = 0
     ) -> Array:
-        """Draws functions from the posterior, and returns their values, without noise; not by the local solver.
+        """Draws functions from the posterior, and returns their values, without noise.
+
+        Not available with the local solver.
 
         Parameters
         ----------
         X : array_like, `[m, d]`
-            Where to evaluate them.
+            Features at which to evaluate the functions.
         n_samples : int, optional
-            How many.
+            Number of functions.
         random_state : int, RandomState or None, optional
-            Where randomness comes from; None for other functions at every call.
+            Source of randomness. None draws new functions at every call.
 
         Returns
         -------
@@ -219,7 +224,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         yield from self.y_train_.reshape(len(self.y_train_), -1).T
 
     def _keep(self, answers: list[Posterior]) -> None:
-        """Keeps what was fitted to each column."""
+        """Stores the fit of each column in the attributes."""
         self._fits = [answer.fit for answer in answers]
         used = [answer.diagnostics for answer in answers]
         kernels = [each.kernel for each in used]
@@ -233,7 +238,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
         self.log_marginal_likelihood_value_ = sum(likelihoods) if likelihoods else None
 
     def _posteriors(self, X: npt.ArrayLike, include: Quantity | None = None) -> list[Posterior]:
-        """Asks for the posterior of each column, of a cloud that belongs to whichever process this is."""
+        """Computes the posterior of each column, with a cloud that belongs to the client of this process."""
         check_is_fitted(self)
         queries = validate_data(self, X, dtype=np.float64, reset=False)
         cloud = Cloud(self._service()._connection, self._description, self.X_train_)
@@ -243,7 +248,7 @@ class KernelRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
 
 @cache
 def _shared_client(address: str | None, key: str | None, process: int) -> Client:  # noqa: ARG001
-    """Returns the one client of this process for an address, which keeps its connections from fit to fit."""
+    """Returns the shared client of this process for an address. It keeps its connections from fit to fit."""
     return Client(address, api_key=key)
 
 
@@ -268,7 +273,7 @@ def _registered(client: Client, points: Array) -> Cloud:
 
 
 def _pinned(cloud: Cloud, values: Array, choices: dict[str, Any]) -> Posterior:
-    """Fits values and returns the answer at one point: with the likelihood, where the solver has it."""
+    """Fits values, and returns the answer at one point, with the likelihood if the solver has it."""
     somewhere = None if cloud.points is None else cloud.points[:1]
     answer = cloud.posterior(values, somewhere, **choices)
     if answer.diagnostics.solver is SolverUsed.LOCAL:
@@ -276,11 +281,11 @@ def _pinned(cloud: Cloud, values: Array, choices: dict[str, Any]) -> Posterior:
     try:
         return cloud.posterior(values, somewhere, include="log_marginal_likelihood", **answer.fit)
     except NotPositiveDefinite:
-        # The matrix has means all the same, from the part of it that has a factor.
+        # Means exist nevertheless, from the part of the matrix that has a factor.
         return answer
 
 
 def _stacked(answers: list[Posterior], member: str) -> Array:
-    """Returns a member of the answers as an array of its own, with a last axis for columns if there are several."""
+    """Returns a member of the answers as a new array, with a last axis for columns if there are several."""
     arrays: list[Array] = [getattr(answer, member) for answer in answers]
     return np.array(arrays[0]) if len(arrays) == 1 else np.stack(arrays, axis=-1)

@@ -1,9 +1,11 @@
-"""Answers: arrays with the shapes documented here, and what the service says of them.
+"""Answers: arrays with the shapes documented here, and the service's diagnostics.
 
-n is the number of points of the cloud, d their dimension, m the number of queries and k that of lists of values; L is
-the unit of the coordinates and V that of the values. Arrays keep the order of the request, are read-only views of the
-answer's bytes (`.copy()` them to change them), and have NaN where there is no meaningful number; `degenerate` then says
-why. Answers can be pickled and used by several threads. `repr` shows arrays by their shapes.
+n is the number of points of the cloud, d their dimension, m the number of queries and k the number of lists
+of values. L is the unit of the coordinates and V the unit of the values.
+
+Arrays keep the order of the request. They are read-only views of the answer's bytes: `.copy()` them to change
+them. They have NaN where there is no meaningful number, and `degenerate` then says why. Answers can be
+pickled and used by several threads. `repr` shows arrays by their shapes.
 """
 
 from .answer import Answer

@@ -1,4 +1,4 @@
-"""What all answers have in common."""
+"""The base class of all answers."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from ..arguments.describe import described
 
 
 class Answer:
-    """What all answers have in common: they show arrays by their shapes, and leave out what is absent."""
+    """The base class of all answers. `repr` shows arrays by their shapes, and leaves out absent members."""
 
     def __repr__(self) -> str:
-        # The fit repeats the diagnostics and the request.
+        # `fit` is left out, because it repeats the diagnostics and the request.
         members = {name: value for name, value in vars(self).items() if name != "fit"}
         return described(type(self).__name__, members)

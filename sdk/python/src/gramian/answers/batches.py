@@ -13,29 +13,32 @@ from .answer import Answer
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InterpolationBatch(Answer):
-    """Functions through lists of values (close to them, if `alpha` > 0), at the queries. Deviations are those of each.
+    """Functions through lists of values (close to them, if `alpha` > 0), at the queries.
+
+    Deviations do not depend on the values, so they hold for each function.
 
     Attributes
     ----------
     values
-        `[k, m]`, V. For each list u at each query.
+        `[k, m]`, V. u of each list at each query.
     gradients
-        `[k, m, d]`, V/L. For each list ∇u, with `derivatives` of 1 or 2.
+        `[k, m, d]`, V/L. ∇u of each list, with `derivatives` of 1 or 2.
     hessians
-        `[k, m, d, d]`, V/L². For each list D²u, with `derivatives` of 2.
+        `[k, m, d, d]`, V/L². D²u of each list, with `derivatives` of 2.
     value_deviations
         `[m]`, V. Standard deviation of any of the functions given its values, with `deviations`.
     gradient_deviations
-        `[m, d]`, V/L. Of the components of any ∇u.
+        `[m, d]`, V/L. Standard deviations of the components of any ∇u.
     hessian_deviations
-        `[m, d, d]`, V/L². Of the entries of any D²u.
+        `[m, d, d]`, V/L². Standard deviations of the entries of any D²u.
     mean_coefficients
-        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
-        if it is zero.
+        `[k, p]`. Mean of each list: the constant, V, then, if the mean is linear, a slope for each
+        coordinate, V/L. None if the mean is zero.
     diagnostics
-        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+        The kernel and α used, how the system was solved, and how well. `relative_residual` is the largest of
+        all lists.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     values: Array
@@ -69,39 +72,40 @@ class InterpolationBatch(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PosteriorBatch(Answer):
-    """Gaussian processes given lists of values, at the queries. What was not asked for is None.
+    """Gaussian processes given lists of values, at the queries. Quantities that were not requested are None.
 
-    What depends on the values has a row for each list; the rest they share.
+    Quantities that depend on the values have a row for each list. The lists share all others.
 
     Attributes
     ----------
     means
-        `[k, m]`, V.
+        `[k, m]`, V. Posterior means.
     variances
-        `[m]`, V². Of any of the latent functions, no noise added; ≥ 0.
+        `[m]`, V². Variances of any of the latent functions, without noise; ≥ 0.
     observation_variances
-        `[m]`, V². Of a new, noisy observation of any of them.
+        `[m]`, V². Variances of a new, noisy observation of any of them.
     covariance
-        `[m, m]`, V². Of any of the latent functions between queries.
+        `[m, m]`, V². Covariance of any of the latent functions between queries.
     gradients
-        `[k, m, d]`, V/L. Of the means.
+        `[k, m, d]`, V/L. Gradients of the means.
     gradient_variances
-        `[m, d]`, V²/L². Of the components of any latent function's gradient.
+        `[m, d]`, V²/L². Variances of the components of any latent function's gradient.
     samples
         `[k, count, m]`, V. Joint draws of each latent function.
     quantiles
-        `[k, q, m]`, V. Of each latent function.
+        `[k, q, m]`, V. Quantiles of each latent function.
     exceedance_probabilities
-        `[k, m]`. That a new, noisy observation exceeds `threshold`.
+        `[k, m]`. Probabilities that a new, noisy observation exceeds `threshold`.
     log_marginal_likelihoods
-        `[k]`. −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π of each list.
+        `[k]`. −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π for each list.
     mean_coefficients
-        `[k, p]`. For each list its mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None
-        if it is zero.
+        `[k, p]`. Mean of each list: the constant, V, then, if the mean is linear, a slope for each
+        coordinate, V/L. None if the mean is zero.
     diagnostics
-        The kernel and α used, how the system was solved, and how well: `relative_residual` is the greatest of all.
+        The kernel and α used, how the system was solved, and how well. `relative_residual` is the largest of
+        all lists.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     means: Array

@@ -24,13 +24,15 @@ class SurfaceGradient(Answer):
     gradients
         `[m, d]`, V/L, tangent to the surface.
     gradient_deviations
-        `[m, d]`, V/L. Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
+        `[m, d]`, V/L, with `deviations`. Standard deviations given the values and, as far as it is known, the
+        surface.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+        Diagnostics of the fit of the values. `diagnostics.geometry` describes the fit of the surface.
     fit
-        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+        All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
+        fit.
     """
 
     gradients: Array
@@ -60,9 +62,10 @@ class SurfaceGradientMatrix(Answer):
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+        Diagnostics of the fit of values. `diagnostics.geometry` describes the fit of the surface.
     fit
-        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+        All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
+        fit.
     """
 
     matrices: Array
@@ -85,14 +88,15 @@ class SurfaceGradientSparseMatrix(Answer):
     Attributes
     ----------
     matrices
-        d of `scipy.sparse.csr_matrix`, `[m, n]`, 1/L, with their entries at the same places. `matrices[i] @ values` is
-        the component i at the queries. Rows of queries without a normal have no entries.
+        d matrices of type `scipy.sparse.csr_matrix`, each `[m, n]`, 1/L. All have entries at the same places.
+        `matrices[i] @ values` is component i at the queries. Rows of queries without a normal have no
+        entries.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of the surface: nothing is fitted to values.
+        Diagnostics of the fit of the surface. Nothing is fitted to values.
     fit
-        The surface: `**answer.fit` in a call repeats it.
+        All options of the fit of the surface, as used. `**answer.fit` in a call repeats it.
     """
 
     matrices: list[csr_matrix]
@@ -117,13 +121,15 @@ class LaplaceBeltrami(Answer):
     values
         `[m]`, V/L². Δu.
     value_deviations
-        `[m]`, V/L². Standard deviations given the values and, as far as it is known, the surface; with `deviations`.
+        `[m]`, V/L², with `deviations`. Standard deviations given the values and, as far as it is known, the
+        surface.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of the values; `diagnostics.geometry` is about that of the surface.
+        Diagnostics of the fit of the values. `diagnostics.geometry` describes the fit of the surface.
     fit
-        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+        All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
+        fit.
     """
 
     values: Array
@@ -152,9 +158,10 @@ class LaplaceBeltramiMatrix(Answer):
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of values; `diagnostics.geometry` is about that of the surface.
+        Diagnostics of the fit of values. `diagnostics.geometry` describes the fit of the surface.
     fit
-        All that was fitted with, surface included: `**answer.fit` in a call repeats it.
+        All options of the fit, as used, including those of the surface. `**answer.fit` in a call repeats the
+        fit.
     """
 
     matrix: Array
@@ -177,14 +184,14 @@ class LaplaceBeltramiSparseMatrix(Answer):
     Attributes
     ----------
     matrix
-        `scipy.sparse.csr_matrix`, `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric. Rows of
-        queries without a normal have no entries.
+        `scipy.sparse.csr_matrix`, `[m, n]`, 1/L². `matrix @ values` is Δu at the queries. Not symmetric. Rows
+        of queries without a normal have no entries.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
-        Of the fit of the surface: nothing is fitted to values.
+        Diagnostics of the fit of the surface. Nothing is fitted to values.
     fit
-        The surface: `**answer.fit` in a call repeats it.
+        All options of the fit of the surface, as used. `**answer.fit` in a call repeats it.
     """
 
     matrix: csr_matrix

@@ -1,4 +1,4 @@
-"""Kernels and noise that were selected."""
+"""Answers of model selection: the selected kernel and noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from .answer import Answer
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlphaPath(Answer):
-    """The criterion over alpha, all else being as it was selected. Without entries if there are `noise_variances`.
+    """The criterion over alpha, with everything else as selected.
+
+    It has no entries if there are `noise_variances`.
 
     Attributes
     ----------
@@ -28,24 +30,24 @@ class AlphaPath(Answer):
 
     @classmethod
     def read(cls, members: Members) -> Self:
-        """Reads it from the answer of `/v1/model-selection`."""
+        """Reads this part of the answer of `/v1/model-selection`."""
         return cls(alphas=members.column("path", "alpha"), scores=members.column("path", "score"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LeaveOneOut(Answer):
-    """What each value is predicted to be from all others, with what was selected.
+    """Predictions of each value from all others, with the selected kernel and noise.
 
-    NaN where the mean is not determined without the point.
+    Entries are NaN where the mean is not determined without the point.
 
     Attributes
     ----------
     means
         `[n]`, V. The predictions, in the order of the points.
     variances
-        `[n]`, V². Of the values predicted, their noise included.
+        `[n]`, V². Variances of the predicted values, including their noise.
     log_predictive_densities
-        `[n]`. Logarithms of the densities, 1/V, of the values under their predictions.
+        `[n]`. Logarithms of the densities (1/V) of the values under their predictions.
     """
 
     means: Array
@@ -54,7 +56,7 @@ class LeaveOneOut(Answer):
 
     @classmethod
     def read(cls, members: Members) -> Self:
-        """Reads it from the answer of `/v1/model-selection`."""
+        """Reads this part of the answer of `/v1/model-selection`."""
         left_out = members.within("leave_one_out")
         return cls(
             means=left_out.array("means"),
@@ -70,30 +72,31 @@ class ModelSelection(Answer):
     Attributes
     ----------
     kernel
-        The kernel that was selected.
+        The selected kernel.
     alpha
-        V². The variance of the noise that was selected; None with `noise_variances`.
+        V². The selected noise variance. None with `noise_variances`.
     mean_coefficients
-        `[p]`. The mean: the constant, V, then a slope for each coordinate, V/L, if it is linear; None if it is zero.
+        `[p]`. The mean: the constant, V, then, if the mean is linear, a slope for each coordinate, V/L. None
+        if the mean is zero.
     score
-        The criterion there; greater is better.
+        The criterion for the selected kernel and noise. Greater is better.
     gradient
-        A number for each entry of `vary`, in its order: the derivative of the score in the logarithm of what is free;
-        for `length_scales` without an axis in that of a factor of all; NaN for `nu`, which takes steps.
+        Derivatives of the score by the logarithm of each free parameter, in the order of `vary`. For
+        `length_scales` without an axis, by the logarithm of a common factor. NaN for `nu`, which is discrete.
     converged
-        Whether no slope is left to follow within the bounds.
+        True if no slope is left to follow within the bounds.
     evaluations
-        How often the criterion was evaluated.
+        Number of evaluations of the criterion.
     families
-        The families that were tried, each `nu` of `matern` by itself, with their best scores.
+        The families tried, with their best scores. Each `nu` of `matern` counts as a family.
     path
         The criterion over alpha: `path.alphas` and `path.scores`.
     leave_one_out
         Each value predicted from all others: `means`, `variances` and `log_predictive_densities`.
     diagnostics
-        Of the fit that the search began with.
+        Diagnostics of the fit with which the search began.
     fit
-        What was selected: `cloud.posterior(values, **answer.fit)` uses it.
+        Options of the selected fit: `cloud.posterior(values, **answer.fit)` uses them.
     """
 
     kernel: KernelUsed

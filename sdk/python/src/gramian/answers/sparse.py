@@ -1,4 +1,4 @@
-"""Sparse matrices, for which SciPy is needed: the extra `gramian[scipy]`."""
+"""Sparse matrices. They need SciPy, the extra `gramian[scipy]`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 
 def require_scipy() -> None:
-    """Imports SciPy, which takes a moment: here, where it is needed, and before anything is sent.
+    """Imports SciPy. Called only when it is needed, since it takes a moment, and before anything is sent.
 
     Raises
     ------
     ModuleNotFoundError
-        If it is not installed.
+        If SciPy is not installed.
     """
     try:
         import scipy.sparse  # noqa: F401

@@ -13,27 +13,27 @@ from .answer import Answer
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Normals(Answer):
-    """Unit normals of the surface at the queries. Deviations are None unless asked for.
+    """Unit normals of the surface at the queries. Deviations are None unless requested.
 
     Attributes
     ----------
     normals
-        `[m, d]`, of length 1, outward unless asked for otherwise.
+        `[m, d]`, of length 1, outward unless requested otherwise.
     gradient_norms
         `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
     levels
-        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+        `[m]`. The signature function: 1 on the surface, usually greater inside a closed one.
     surfaces
-        m entries. The function whose level surface was used.
+        m entries. The function whose level set was used.
     normal_deviations
-        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
-        where none is known.
+        `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
+        NaN where it is unknown.
     degenerate
         The queries without a normal, or with a doubtful one.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     normals: Array
@@ -63,44 +63,44 @@ class Normals(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curvatures(Answer):
-    """Curvatures of the surface at the queries: with outward normals, a sphere of radius r has +1/r everywhere.
+    """Curvatures of the surface at the queries.
 
-    Deviations are None unless asked for.
+    With outward normals, a sphere of radius r has +1/r everywhere. Deviations are None unless requested.
 
     Attributes
     ----------
     principal_curvatures
         `[m, d − 1]`, 1/L, ascending.
     principal_directions
-        `[m, d − 1, d]`, of length 1, the largest component positive; any basis where curvatures
+        `[m, d − 1, d]`, of length 1, the largest component positive. An arbitrary basis where curvatures
         coincide.
     mean_curvatures
         `[m]`, 1/L. The average of the principal curvatures.
     gaussian_curvatures
-        `[m]`, 1/L^(d − 1). Their product.
+        `[m]`, 1/L^(d − 1). The product of the principal curvatures.
     normals
         `[m, d]`, of length 1.
     gradient_norms
         `[m]`. |∇u| of the function in `surfaces`: 1/L for `signature`, about 1 for `offset`, 1 for `local`.
     levels
-        `[m]`. The signature function: 1 on the surface, usually more inside a closed one.
+        `[m]`. The signature function: 1 on the surface, usually greater inside a closed one.
     surfaces
-        m entries. The function whose level surface was used.
+        m entries. The function whose level set was used.
     normal_deviations
-        `[m]`, radians. Standard deviation of the angle of the normal: 95 % of the angles lie within 1.96 of it; NaN
-        where none is known.
+        `[m]`, radians. Standard deviation σ of the angle of the normal: 95 % of the angles are below 1.96 σ.
+        NaN where it is unknown.
     principal_curvature_deviations
         `[m, d − 1]`, 1/L. Standard deviations of the principal curvatures.
     mean_curvature_deviations
-        `[m]`, 1/L.
+        `[m]`, 1/L. Standard deviations of the mean curvatures.
     gaussian_curvature_deviations
-        `[m]`, 1/L^(d − 1).
+        `[m]`, 1/L^(d − 1). Standard deviations of the Gaussian curvatures.
     degenerate
         The queries without curvatures, or with doubtful ones.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     principal_curvatures: Array

@@ -24,11 +24,12 @@ class Interpolation(Answer):
     hessians
         `[m, d, d]`, V/L². D²u, with `derivatives` of 2.
     value_deviations, gradient_deviations, hessian_deviations
-        Standard deviations of these given the values, of the same shapes, with `deviations`.
+        Standard deviations of `values`, `gradients` and `hessians` given the data, of the same shapes, with
+        `deviations`.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     values: Array
@@ -58,34 +59,34 @@ class Interpolation(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Posterior(Answer):
-    """A Gaussian process given the values, at the queries. What was not asked for is None.
+    """A Gaussian process given the values, at the queries. Quantities that were not requested are None.
 
     Attributes
     ----------
     means
-        `[m]`, V.
+        `[m]`, V. Posterior means.
     variances
-        `[m]`, V². Of the latent function, no noise added; ≥ 0.
+        `[m]`, V². Variances of the latent function, without noise; ≥ 0.
     observation_variances
-        `[m]`, V². Of a new, noisy observation.
+        `[m]`, V². Variances of a new, noisy observation.
     covariance
-        `[m, m]`, V². Of the latent function between queries.
+        `[m, m]`, V². Covariance of the latent function between queries.
     gradients
-        `[m, d]`, V/L. Of the mean.
+        `[m, d]`, V/L. Gradients of the mean.
     gradient_variances
-        `[m, d]`, V²/L². Of the components of the latent function's gradient.
+        `[m, d]`, V²/L². Variances of the components of the latent function's gradient.
     samples
         `[count, m]`, V. Joint draws of the latent function.
     quantiles
-        `[q, m]`, V. Of the latent function.
+        `[q, m]`, V. Quantiles of the latent function.
     exceedance_probabilities
-        `[m]`. That a new, noisy observation exceeds `threshold`.
+        `[m]`. Probabilities that a new, noisy observation exceeds `threshold`.
     log_marginal_likelihood
         −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
     diagnostics
         The kernel and α used, how the system was solved, and how well.
     fit
-        All that was fitted with: `**answer.fit` in a call repeats it.
+        All options of the fit, as used. `**answer.fit` in a call repeats the fit.
     """
 
     means: Array

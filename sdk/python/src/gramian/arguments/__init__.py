@@ -1,1 +1,1 @@
-"""Arguments of calls: checked, named and made ready to be sent."""
+"""Arguments of calls: checks, names in messages, and conversion to what is sent."""

@@ -1,4 +1,4 @@
-"""Arrays as they are sent: of one shape, in float64, finite, and with nothing changed in silence on the way there."""
+"""Conversion of arrays to what is sent: the expected shape, float64, finite. Nothing is changed silently."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ..wire.tensors import Array
 
 Sizes: TypeAlias = Mapping[str, int]
-"""The lengths that are known when a request is made: n of the points, d of their coordinates."""
+"""Known lengths of axes, by name: n points, d coordinates."""
 
 AnyArray: TypeAlias = npt.NDArray[Any]
 
@@ -23,16 +23,16 @@ NUMBERS = {
     "d": "one number for each axis",
     "bounds": "the least and the greatest",
 }
-"""What the numbers of an array with one axis are."""
+"""Meaning of the numbers of an array with one axis, by the name of the axis."""
 
 ONE_FOR_ALL = {"noise_variances": "alpha", "length_scales": "length_scale"}
-"""What takes one number where these take many."""
+"""Fields that take one number for all, by the field that takes many."""
 
 ROWS = {"points": "points", "queries": "points", "sites": "points", "normals": "normals", "values": "lists of values"}
-"""What the rows of an array with two axes are."""
+"""Meaning of the rows of an array with two axes, by field."""
 
 KINDS = {"c": "complex numbers", "b": "truth values", "S": "bytes", "U": "text", "M": "dates", "m": "durations"}
-"""The kinds of NumPy that are not sent, in words."""
+"""Names of the NumPy kinds that cannot be sent."""
 
 REMEDIES = {
     "c": "send {name}.real and {name}.imag, one after the other",
@@ -42,23 +42,25 @@ REMEDIES = {
 
 
 def as_array(name: str, value: object, axes: Sequence[str], sizes: Sizes) -> Array:
-    """Returns the numbers of an argument as they are sent, without a copy if they are so already.
+    """Returns the numbers of an argument in the form that is sent.
+
+    Copies them only if they must be converted.
 
     Parameters
     ----------
     name
-        Of the argument, for the messages.
+        Name of the argument, for messages.
     value
-        Lists, tuples, buffers, arrays, and what NumPy makes arrays of, such as data frames.
+        Lists, tuples, buffers, arrays, and anything from which NumPy makes an array, such as data frames.
     axes
         The names of the axes: `["n"]`, `["n", "d"]`.
     sizes
-        The lengths of the axes, by name, as far as they are known.
+        The known lengths of axes, by name.
 
     Raises
     ------
     TypeError
-        If it holds something else than real numbers.
+        If it holds anything but real numbers.
     ValueError
         If it has another shape, or a number that is masked, not finite or not exact in float64.
     """
@@ -68,12 +70,15 @@ def as_array(name: str, value: object, axes: Sequence[str], sizes: Sizes) -> Arr
 
 
 def as_block(name: str, value: object, first: int) -> Array:
-    """Returns some rows of an array as they are sent; the first of them, which messages count from, is row `first`."""
+    """Returns rows of a larger array in the form that is sent.
+
+    Messages count rows from `first`, the number of the first of these rows.
+    """
     return _in_float64(name, read(name, value, first), first)
 
 
 def read(name: str, value: object, first: int = 0) -> AnyArray:
-    """Returns the array that NumPy sees, of real numbers, none of them masked."""
+    """Returns the array that NumPy reads. Refuses entries that are masked or no real numbers."""
     if isinstance(value, Mapping | Set | Iterator):
         raise TypeError(f"{name} is to be an array, not a {type(value).__name__}; list(…) makes one of its entries")
     array = _refuse_masked(name, value, first)
@@ -87,7 +92,7 @@ def read(name: str, value: object, first: int = 0) -> AnyArray:
 
 
 def _refuse_masked(name: str, value: object, first: int) -> AnyArray:
-    """Returns the array if nothing in it is masked: what lies under a mask is no number to compute with."""
+    """Returns the array. Refuses it if an entry is masked, because no number may be used for that."""
     rows = isinstance(value, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in value)
     try:
         array = np.ma.array(value) if rows else np.asanyarray(value)
@@ -101,7 +106,7 @@ def _refuse_masked(name: str, value: object, first: int) -> AnyArray:
 
 
 def _ragged(name: str, value: object) -> str | None:
-    """Says which row has another length than the first, if one has."""
+    """Returns a message that names the first row whose length differs from that of row 0, or None."""
     if not isinstance(value, list | tuple) or not all(isinstance(row, Sized) for row in value):
         return None
     lengths = [len(row) for row in value]
@@ -122,11 +127,12 @@ def _refuse_objects(name: str, value: object, array: AnyArray, first: int) -> No
 
 
 def _in_float64(name: str, array: AnyArray, first: int = 0) -> Array:
-    """Widens floating-point numbers, rounds longer ones; refuses integers that float64 does not have, and infinity."""
-    with np.errstate(over="ignore"):  # a long double out of range becomes infinite, and is refused as such
+    """Converts to float64, rounding longer floats. Refuses inexact integers, infinity and NaN."""
+    with np.errstate(over="ignore"):  # a long double out of range becomes infinite, and is refused below
         converted = np.asarray(array, dtype="<f8", order="C")
     if array.dtype.kind in "iu" and array.dtype.itemsize > 4:
-        # Beyond the largest integer a cast back has no meaning: what rounded up to that is not exact for sure.
+        # A cast back is undefined beyond the largest integer. A number rounded up to there is certainly
+        # inexact.
         beyond = converted >= 2.0 ** (8 * array.dtype.itemsize - (array.dtype.kind == "i"))
         back = np.where(beyond, 0, converted).astype(array.dtype)
         gaps = "which float64 does not have: beyond 2**53 it has gaps"
@@ -136,7 +142,7 @@ def _in_float64(name: str, array: AnyArray, first: int = 0) -> Array:
 
 
 def _check_shape(name: str, array: AnyArray, axes: Sequence[str], sizes: Sizes) -> None:
-    """Refuses another number of axes, other lengths, and arrays without entries."""
+    """Refuses wrong numbers of axes, wrong lengths, and arrays without entries."""
     wanted = [sizes.get(axis) for axis in axes]
     fits = array.ndim == len(axes) and all(
         want is None or want == length for want, length in zip(wanted, array.shape, strict=True)
@@ -149,7 +155,7 @@ def _check_shape(name: str, array: AnyArray, axes: Sequence[str], sizes: Sizes) 
 
 
 def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[int | None]) -> str:
-    """Says what may have been meant."""
+    """Returns the end of a message about a wrong shape: advice on what was probably meant."""
     if array.size == 0:
         return ": it is empty"
     field = name.rpartition(".")[2]
@@ -174,7 +180,7 @@ def _advice(name: str, array: AnyArray, axes: Sequence[str], wanted: Sequence[in
 
 
 def _refuse_first(name: str, bad: npt.NDArray[np.bool_], array: AnyArray | None, why: str, first: int = 0) -> None:
-    """Refuses an array by the first of its bad entries; its rows are counted from `first`."""
+    """Refuses an array if it has bad entries. Names the first of them, with rows counted from `first`."""
     if bad.any():
         place = np.unravel_index(int(np.argmax(bad)), bad.shape)
         what = "masked" if array is None else array[place]

@@ -1,4 +1,4 @@
-"""Objects in words: arrays by their shape, nothing that is absent."""
+"""`repr` of answers and options: arrays by their shape, absent members left out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..rest.types import Unset
 
 MAX_SHOWN = 3
-"""Longer tuples are shown by their first entries and their length."""
+"""Number of entries shown of a tuple. Longer tuples are shown by their first entries and their length."""
 
 
 def described(kind: str, members: Mapping[str, object]) -> str:
@@ -29,7 +29,7 @@ def in_words(value: object) -> str:
     """
     if isinstance(value, np.ndarray):
         return f"array{list(value.shape)}"
-    if hasattr(value, "tocsr"):  # of SciPy, which may not be there
+    if hasattr(value, "tocsr"):  # of SciPy, which may not be installed
         return f"{type(value).__name__}{list(cast(Any, value).shape)}"
     if isinstance(value, Enum):
         return repr(value.value)

@@ -1,4 +1,4 @@
-"""What the operations have in common: how a function is fitted to a cloud, and which surface is meant."""
+"""Options that operations share: the fit of a function to a cloud, and the surface that is meant."""
 
 from __future__ import annotations
 
@@ -34,12 +34,15 @@ if TYPE_CHECKING:
     from .registration import RegisteredCloud
 
 Number: TypeAlias = SupportsFloat | Unset
-"""A real number: of Python or NumPy, an array without axes, a fraction; what `diagnostics` has. No bool or complex."""
+"""A real number of Python or NumPy, an array without axes, a fraction, or `UNSET` as in `diagnostics`.
+
+Not a bool or a complex number.
+"""
 
 Whole: TypeAlias = int | np.integer[Any] | npt.NDArray[np.integer[Any]]
-"""A whole number: of Python or NumPy, an array without axes."""
+"""A whole number of Python or NumPy, or an array without axes."""
 
-# Every enumeration of the service may also be given as a plain string; tests/test_types.py compares the two.
+# Every enumeration of the service may also be given as a plain string. tests/test_types.py compares the two.
 Family: TypeAlias = KernelFamily | Literal["gauss", "laplace", "matern", "wendland", "inverse_multiquadric"]
 Solver: TypeAlias = SolverChoice | SolverUsed | Literal["auto", "dense", "local"]
 Duplicates: TypeAlias = DuplicatePolicy | Literal["refuse", "merge"]
@@ -63,26 +66,27 @@ Quantity: TypeAlias = (
 @suggest_names
 @dataclass(frozen=True, init=False, repr=False)
 class Kernel:
-    """A kernel `k(x, y) = variance · φ(r²)`, `r = |x − y|/length_scale` or `r² = Σ (x_c − y_c)²/length_scales_c²`.
+    """A kernel `k(x, y) = variance · φ(r²)`.
 
-    What is None is chosen by the service. `Client.kernels()` lists the families with their formulas.
+    Here `r = |x − y|/length_scale` or `r² = Σ (x_c − y_c)²/length_scales_c²`. The service chooses parameters
+    that are None. `Client.kernels()` lists the families with their formulas.
 
     Attributes
     ----------
     family
-        What determines φ.
+        The family, which determines φ.
     length_scale
-        ℓ, unit of the coordinates; chosen from the cloud if absent.
+        ℓ, unit of the coordinates. Chosen from the cloud if absent.
     length_scales
-        `[d]`, instead: a length scale for each axis, in the units of the coordinates.
+        `[d]`, instead of `length_scale`: one length scale for each axis, in the units of the coordinates.
     variance
-        The factor of φ, unit of the values squared; 1 if absent.
+        The factor of φ, unit of the values squared. 1 if absent.
     epsilon
-        Of `laplace`: φ = exp(−√(r² + epsilon)); 0 if absent.
+        Parameter of `laplace`: φ = exp(−√(r² + epsilon)). 0 if absent.
     nu
-        Of `matern`: one of 0.5, 1.5, …, 8.5; 2.5 if absent.
+        Parameter of `matern`: one of 0.5, 1.5, …, 8.5. 2.5 if absent.
     smoothness
-        Of `wendland`: 2, 4 or 6 times differentiable; 4 if absent.
+        Parameter of `wendland`, the number of derivatives: 2, 4 or 6. 4 if absent.
 
     Examples
     --------
@@ -111,7 +115,7 @@ class Kernel:
         nu: Number | None = None,
         smoothness: Whole | Unset | None = None,
     ) -> None:
-        """Takes the parameters, of which the family allows some; see the attributes."""
+        """Takes the parameters that the family allows. The attributes describe them."""
         scales = {"length_scale": length_scale, "length_scales": length_scales}
         numbers = {"variance": variance, "epsilon": epsilon, "nu": nu, "smoothness": smoothness}
         given: dict[str, Any] = normalise({"family": family, **scales, **numbers}, KERNEL, path="kernel.")
@@ -126,7 +130,7 @@ class Kernel:
 
 
 class KernelFields(TypedDict, total=False):
-    """A kernel as a dictionary: `{"family": "gauss", "length_scale": 2.0}`. `Kernel` documents the parameters."""
+    """A kernel as a dictionary: `{"family": "gauss", "length_scale": 2.0}`. `Kernel` documents the keys."""
 
     family: Required[Family]
     length_scale: Number | None
@@ -138,28 +142,29 @@ class KernelFields(TypedDict, total=False):
 
 
 KernelLike: TypeAlias = Family | Kernel | KernelUsed | KernelFields | models.Kernel | KernelDescription
-"""A kernel: a family, a dictionary, one of one's own, or what `diagnostics.kernel` or `Client.kernels()` reports."""
+"""A kernel: a family, a dictionary, a `Kernel`, or one from `diagnostics.kernel` or `Client.kernels()`."""
 
 
 class Fit(TypedDict, total=False):
-    """How a function is fitted to values at the n points of a cloud, as keywords: `cloud.normals(**fit)`.
+    """Options for fitting a function at the n points of a cloud, as keywords: `cloud.normals(**fit)`.
 
-    `fit` of an answer is one, with all that was used. Everything is optional, None is as absent.
+    The `fit` of an answer has all options as they were used. Every option may be absent, and None means
+    absent.
 
     Keys
     ----
     kernel
-        Chosen from the cloud if absent, and repeated in `diagnostics.kernel`.
+        The kernel. Chosen from the cloud if absent, and reported in `diagnostics.kernel`.
     alpha
-        Added to the diagonal of the Gram matrix, unit of the values squared: 0 interpolates, the variance of the
-        noise regresses. Absent: 1e-10 with a kernel given; without one, chosen by the noise of the values, or, for
-        surfaces, of the points.
+        Number added to the diagonal of the Gram matrix, unit of the values squared. 0 interpolates, the noise
+        variance regresses. If absent, 1e-10 where a kernel is given. Otherwise it is chosen by the noise of
+        the values or, for surfaces, of the points.
     noise_variances
-        `[n]`, the variance of the noise at each point, instead of `alpha`.
+        `[n]`, the noise variance at each point, instead of `alpha`.
     solver
-        How the linear system is solved; `"auto"` if absent.
+        The solver of the linear system. `"auto"` if absent.
     duplicates
-        What to do with points that coincide when alpha is 0: `"refuse"` them (if absent) or `"merge"` them.
+        The policy for points that coincide when alpha is 0: `"refuse"` (if absent) or `"merge"`.
     """
 
     kernel: KernelLike | None
@@ -172,22 +177,25 @@ class Fit(TypedDict, total=False):
 @suggest_names
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Geometry:
-    """The surface of an operator, where it differs from the fit of the values. What is absent is as for the values.
+    """The surface of an operator, where it differs from the fit of the values.
+
+    Absent options are those of the fit of the values.
 
     Attributes
     ----------
     cloud
-        The cloud whose level surface carries the operator, `[k, d]`, or its id; its points are the default queries.
+        The cloud whose level set carries the operator, `[k, d]`, or its id. Its points are the default
+        queries.
     kernel
         The kernel of its signature function.
     alpha
-        Added to the diagonal of its Gram matrix; the signature function has no unit.
+        Number added to the diagonal of its Gram matrix. It has no unit, as the signature function has none.
     noise_variances
-        `[k]`, instead of `alpha`.
+        `[k]`, the noise variance at each point, instead of `alpha`.
     solver
-        How its linear system is solved.
+        The solver of its linear system.
     surface
-        Which function's level surface is meant.
+        The function whose level set is the surface.
     """
 
     cloud: RegisteredCloud | str | None = None
@@ -213,23 +221,23 @@ class GeometryFields(TypedDict, total=False):
 
 
 GeometryLike: TypeAlias = "Geometry | GeometryFields | Diagnostics | RegisteredCloud"
-"""A surface: of one's own, that of another cloud, one that `diagnostics.geometry` reports, or a dictionary."""
+"""A surface: a `Geometry`, a dictionary, another cloud, or what `diagnostics.geometry` reports."""
 
 
 class ValuesFit(Fit, total=False):
-    """How a function is fitted to values, as keywords: `cloud.interpolate(values, **fit)`.
+    """Options for fitting a function to values, as keywords: `cloud.interpolate(values, **fit)`.
 
     Keys
     ----
     mean
-        What the function is made of beside the kernel: `"zero"`, `"constant"` or `"linear"`.
+        The mean, the part of the function beside the kernel: `"zero"`, `"constant"` or `"linear"`.
     """
 
     mean: Mean | None
 
 
 class OperatorFit(ValuesFit, total=False):
-    """How a function and a surface are fitted, as keywords: `cloud.laplace_beltrami(values, **fit)`.
+    """Options for fitting a function and a surface, as keywords: `cloud.laplace_beltrami(values, **fit)`.
 
     Keys
     ----
@@ -241,9 +249,9 @@ class OperatorFit(ValuesFit, total=False):
 
 
 def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
-    """Returns the fit of a surface that an answer says was used, with what only the request says."""
+    """Returns the fit of a surface as used, from an answer's diagnostics and its request."""
     fit = _numbers_used(diagnostics, request)
-    if diagnostics.solver is SolverUsed.LOCAL:  # regressions that choose these by their likelihood, and take none
+    if diagnostics.solver is SolverUsed.LOCAL:  # local regressions choose these by likelihood, and take none
         fit.pop("kernel", None)
         fit.pop("alpha", None)
         fit.pop("noise_variances", None)
@@ -251,19 +259,22 @@ def fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
 
 
 def values_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> ValuesFit:
-    """Returns that of values, with the mean if there is one; their local solver takes a kernel as the other does."""
+    """Returns the fit of values as used, with the mean if there is one.
+
+    Unlike for surfaces, the local solver for values takes a kernel, so the kernel is kept.
+    """
     mean = diagnostics.mean_coefficients
     return _with_mean(_numbers_used(diagnostics, request), 0 if isinstance(mean, Unset) else len(mean))
 
 
 def batch_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any], mean_coefficients: Array | None) -> ValuesFit:
-    """Returns that of many lists of values, whose means have a row each."""
+    """Returns the fit of many lists of values as used. `mean_coefficients` has a row for each list."""
     fit = _numbers_used(diagnostics, request)
     return _with_mean(fit, 0 if mean_coefficients is None else mean_coefficients.shape[-1])
 
 
 def selected_fit(start: ValuesFit, kernel: KernelUsed, alpha: float | None) -> ValuesFit:
-    """Returns the fit that a search ended with, from that which it began with."""
+    """Returns the fit with which a search ended, from the one with which it began."""
     fit = start.copy()
     fit["kernel"] = kernel
     if alpha is not None:
@@ -290,7 +301,7 @@ def _numbers_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> Fit:
 
 
 def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> OperatorFit:
-    """Returns the same with the surface's fit."""
+    """Returns the fit of values as used, with the fit of the surface."""
     fit, surface = values_fit_used(diagnostics, request), diagnostics.geometry
     if isinstance(surface, Unset):  # by stencils, which fit nothing to the values
         surface = diagnostics
@@ -302,7 +313,8 @@ def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> O
     cloud = None if surface.cloud_id == request["cloud"]["id"] else surface.cloud_id
     choice = SurfaceChoice(asked["surface"]) if "surface" in asked else None
     if surface.solver is SolverUsed.LOCAL:
-        # It takes no kernel, not even that of the values, which therefore was the service's choice, and will be again.
+        # A local surface takes no kernel, not even that of the values. So the service chose the kernel of the
+        # values, and will choose it again.
         fit.pop("kernel", None)
         fit.pop("alpha", None)
         return OperatorFit(**fit, geometry=Geometry(cloud=cloud, solver=surface.solver, surface=choice))
@@ -318,7 +330,7 @@ def operator_fit_used(diagnostics: Diagnostics, request: Mapping[str, Any]) -> O
 
 
 def _own_copy(numbers: npt.ArrayLike | None) -> npt.NDArray[np.float64] | None:
-    """Returns numbers that stay as they were sent, whatever the caller does to theirs."""
+    """Returns a read-only copy of numbers, which the caller cannot change."""
     if numbers is None:
         return None
     copy = np.array(numbers, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Misspelt keywords: an error that names the nearest parameter, as Python's own does from version 3.13 on."""
+"""Errors for misspelt keywords that name the nearest parameter, as Python's own do from version 3.13 on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def suggest_names(cls: C) -> C:
-    """Makes all public methods of a class, and its constructor, say which parameter was probably meant."""
+    """Makes the constructor and public methods of a class suggest the parameter that was probably meant."""
     for name, member in list(vars(cls).items()):
         if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
             setattr(cls, name, _suggesting(member))

@@ -1,20 +1,20 @@
-"""What callers may write, and what is sent for it: one function, and a rule for every field of every method.
+"""Conversion of callers' arguments to what is sent: a function, and a rule for every field of every method.
 
 | a field | may be given as |
 |---|---|
-| nothing | None, or absent; the generated `UNSET` too |
-| a number | `int`, `float`, numbers and arrays without axes of NumPy and its like; fractions and decimals if exact |
-| an array | lists, tuples, buffers, NumPy arrays of any real type and layout, and what has `__array__`: data frames |
+| nothing | None, absent, or the generated `UNSET` |
+| a number | `int`, `float`, NumPy-like numbers and arrays without axes; fractions and decimals if exact |
+| an array | lists, tuples, buffers, real NumPy arrays of any layout, objects with `__array__` (data frames) |
 | a word | a string, or a member of an enumeration |
 | words | a word, or several |
 | a truth | `bool`, of Python or NumPy |
-| a kernel | a family, a mapping, `Kernel`, or as an answer or `Client.kernels()` says it: `diagnostics.kernel` |
-| a geometry | `Geometry`, a mapping, another `Cloud`, or as an answer says it: `diagnostics.geometry` |
-| what is free | a mapping from parameters to their bounds, or a list of mappings with `parameter`, `min` and `max` |
+| a kernel | a family, a mapping, `Kernel`, or what `diagnostics.kernel` or `Client.kernels()` reports |
+| a geometry | `Geometry`, a mapping, another `Cloud`, or what `diagnostics.geometry` reports |
+| free parameters | a mapping to bounds, or a list of mappings with `parameter`, `min` and `max` |
 
-Numbers are sent as float64 and as they are: complex numbers, truth values, text, masked entries, NaN and infinity are
-refused by name and place, and so are integers that float64 does not have. What is a question of the mathematics, such
-as a negative length scale, is for the service to refuse.
+Numbers are sent unchanged, as float64. Complex numbers, truth values, text, masked entries, NaN and infinity
+are refused by name and place. So are integers that float64 cannot represent. The service refuses what is
+mathematically wrong, such as a negative length scale.
 """
 
 from __future__ import annotations
@@ -46,31 +46,31 @@ from .arrays import Sizes, as_array
 from .scalars import as_number, as_truth, as_whole, as_word, as_words, nearest, unwrapped
 
 Rule: TypeAlias = Callable[[str, object, Sizes], object]
-"""From a name, what was given under it, and the lengths that are known, to what is sent."""
+"""A function from a field's name, the given value and the known lengths to what is sent."""
 
 
 def normalise(
     fields: Mapping[str, object], rules: Mapping[str, Rule], sizes: Sizes | None = None, path: str = ""
 ) -> dict[str, object]:
-    """Returns fields as they are sent, without those that are absent.
+    """Returns the fields in the form that is sent, without absent ones.
 
     Parameters
     ----------
     fields
-        What was given, by name.
+        The given values, by name.
     rules
-        A rule for each field that there is: `REQUEST`, `GEOMETRIC`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
+        A rule for each existing field: `REQUEST`, `GEOMETRIC`, `BATCH`, `KERNEL`, `GEOMETRY`, `CLIENT`.
     sizes
-        The lengths of the axes of arrays, by name, as far as they are known: n points, d coordinates.
+        The known lengths of the axes of arrays, by name: n points, d coordinates.
     path
-        What stands before the names in messages: `kernel.`
+        Prefix of the names in messages: `kernel.`
 
     Raises
     ------
     TypeError
         If a field is unknown, missing, or of a wrong type.
     ValueError
-        If its value is none that can be sent.
+        If a value cannot be sent.
     """
     for name in fields:
         if name not in rules:
@@ -89,7 +89,7 @@ def _is_absent(value: object) -> bool:
 
 
 def _check_alpha(fields: Mapping[str, object], path: str) -> None:
-    """Refuses the absent alpha of diagnostics: sent as nothing it would be another one by default."""
+    """Refuses the unset alpha of diagnostics. Left out, it would be replaced by the default alpha."""
     if isinstance(fields.get("alpha"), Unset) and _is_absent(fields.get("noise_variances")):
         raise ValueError(
             f"{path}alpha is absent from these diagnostics, of a fit with noise_variances: send those, or **answer.fit"
@@ -97,34 +97,34 @@ def _check_alpha(fields: Mapping[str, object], path: str) -> None:
 
 
 def array(*axes: str) -> Rule:
-    """The rule for arrays with these axes."""
+    """Makes the rule for arrays with these axes."""
     return lambda name, value, sizes: as_array(name, value, axes, sizes)
 
 
 def number(name: str, value: object, sizes: Sizes) -> float:  # noqa: ARG001
-    """The rule for numbers."""
+    """Applies the rule for numbers."""
     return as_number(name, value)
 
 
 def whole(name: str, value: object, sizes: Sizes) -> int:  # noqa: ARG001
-    """The rule for whole numbers."""
+    """Applies the rule for whole numbers."""
     return as_whole(name, value)
 
 
 def word(*words: str) -> Rule:
-    """The rule for one of these words."""
+    """Makes the rule for one of these words."""
     known = list(dict.fromkeys(map(str, words)))
     return lambda name, value, _: as_word(name, value, known)
 
 
 def words(*words: str) -> Rule:
-    """The rule for some of these words."""
+    """Makes the rule for any of these words."""
     known = list(map(str, words))
     return lambda name, value, _: as_words(name, value, known)
 
 
 def with_deviations(include: object, deviations: object) -> object:
-    """Returns what `include` says, with `"deviations"` where they are asked for by their own name."""
+    """Returns `include`, with `"deviations"` added if the argument `deviations` is true."""
     if _is_absent(deviations) or not as_truth("deviations", deviations):
         return include
     wanted = [] if _is_absent(include) else as_words("include", include, GeometryInclude)
@@ -132,14 +132,14 @@ def with_deviations(include: object, deviations: object) -> object:
 
 
 def samples(name: str, value: object, sizes: Sizes) -> dict[str, object]:
-    """The rule for draws: how many, or a mapping with `count` and `seed`."""
+    """Applies the rule for samples: their number, or a mapping with `count` and `seed`."""
     if not isinstance(value, Mapping):
         value = {"count": value}
     return normalise(value, {"count": whole, "seed": whole}, sizes, f"{name}.")
 
 
 def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
-    """The rule for kernels."""
+    """Applies the rule for kernels."""
     value = unwrapped(name, value)
     if isinstance(value, str | KernelDescription):
         value = {"family": value if isinstance(value, str) else value.family}
@@ -148,19 +148,19 @@ def kernel(name: str, value: object, sizes: Sizes) -> dict[str, object]:
         if not hasattr(value, "family"):
             kind = type(value).__name__
             raise TypeError(f"{name} is to be a family such as 'gauss', a mapping, or a Kernel, not of the type {kind}")
-        later = getattr(value, "additional_properties", {})  # of a service that is newer than this client
+        later = getattr(value, "additional_properties", {})  # of a service newer than this client
         value = {parameter: getattr(value, parameter, None) for parameter in KERNEL}
     return {**normalise({"family": None, **value}, KERNEL, sizes, f"{name}."), **later}
 
 
 def bounds(name: str, value: object, sizes: Sizes) -> dict[str, float]:  # noqa: ARG001
-    """The rule for the least and the greatest."""
+    """Applies the rule for bounds: the least and the greatest value."""
     least, greatest = as_array(name, value, ["bounds"], {"bounds": 2}).tolist()
     return {"min": least, "max": greatest}
 
 
 def vary(name: str, value: object, sizes: Sizes) -> list[dict[str, object]]:
-    """The rule for what is free: bounds by name, or a list of parameters."""
+    """Applies the rule for free parameters: bounds by name, or a list of parameters."""
     if isinstance(value, Mapping):
         free: Mapping[str, Any] = normalise(value, BOUNDS, sizes, f"{name}.")
         return [{"parameter": str(parameter), **limits} for parameter, limits in free.items()]
@@ -171,7 +171,7 @@ def vary(name: str, value: object, sizes: Sizes) -> list[dict[str, object]]:
 
 
 def free_parameter(name: str, value: object, sizes: Sizes) -> dict[str, object]:
-    """The rule for an entry of such a list."""
+    """Applies the rule for an entry of a list of free parameters."""
     if isinstance(value, FreeParameter):
         value = {"parameter": value.parameter, "axis": value.axis, "min": value.min_, "max": value.max_}
     if not isinstance(value, Mapping):
@@ -181,13 +181,13 @@ def free_parameter(name: str, value: object, sizes: Sizes) -> dict[str, object]:
 
 
 def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
-    """The rule for the surface of an operator."""
+    """Applies the rule for the surface of an operator."""
     if isinstance(value, Diagnostics):
-        is_local = value.solver is SolverUsed.LOCAL  # which takes neither, but chooses them by its likelihood
+        is_local = value.solver is SolverUsed.LOCAL  # takes neither, but chooses them by its likelihood
         fit = {} if is_local else {"kernel": value.kernel, "alpha": value.alpha}
         value = {"cloud": value, **fit, "solver": value.solver}
     elif isinstance(value, GeneratedGeometry):
-        # Its UNSET is what nobody has said, not what diagnostics lack.
+        # UNSET here means that the caller gave nothing, not that diagnostics have none.
         value = {field: None if _is_absent(said := getattr(value, field)) else said for field in GEOMETRY}
     elif hasattr(value, "surface"):
         value = {field: getattr(value, field) for field in GEOMETRY}
@@ -200,9 +200,9 @@ def geometry(name: str, value: object, sizes: Sizes) -> dict[str, object]:
 
 
 def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa: ARG001
-    """The rule for another cloud: its id."""
+    """Applies the rule for another cloud, which is sent by its id."""
     found = value.get("id") if isinstance(value, Mapping) else value
-    for attribute in ["id", "cloud_id"]:  # of a Cloud; of what answers say
+    for attribute in ["id", "cloud_id"]:  # of a Cloud; of diagnostics
         found = getattr(found, attribute, found)
     if not isinstance(found, str):
         kind = type(value).__name__
@@ -213,7 +213,7 @@ def cloud(name: str, value: object, sizes: Sizes) -> dict[str, object]:  # noqa:
 
 
 def duration(name: str, value: object, sizes: Sizes) -> float:
-    """The rule for seconds; they may be infinite."""
+    """Applies the rule for seconds, which may be infinite."""
     seconds = math.inf if isinstance(value, float) and value == math.inf else number(name, value, sizes)
     if seconds < 0:
         raise ValueError(f"{name} is {seconds}, and times are not negative")
@@ -237,7 +237,7 @@ FIT: Mapping[str, Rule] = {
     "kernel": kernel,
     "alpha": number,
     "noise_variances": array("n"),
-    # What an answer says of its solver can be sent, and is refused by the service if that has no such choice.
+    # The solver that an answer reports can be sent too. The service refuses it if it is no valid choice.
     "solver": word(*SolverChoice, *SolverUsed),
 }
 
@@ -277,13 +277,13 @@ REQUEST: Mapping[str, Rule] = {
 }
 
 GEOMETRIC: Mapping[str, Rule] = {**REQUEST, "include": words(*GeometryInclude)}
-"""Those of normals and curvatures, and of values and operators that may have deviations."""
+"""Rules for normals and curvatures, and for values and operators that may have deviations."""
 
 BATCH: Mapping[str, Rule] = {**REQUEST, "values": array("k", "n")}
-"""Those of many lists of values."""
+"""Rules for many lists of values."""
 
 GEOMETRIC_BATCH: Mapping[str, Rule] = {**GEOMETRIC, "values": array("k", "n")}
-"""Those of many lists of values that may have deviations."""
+"""Rules for many lists of values that may have deviations."""
 
 CLIENT: Mapping[str, Rule] = {
     "timeout": duration,

@@ -1,4 +1,4 @@
-"""Clouds that the service knows, and may forget."""
+"""Registration of clouds, which the service may forget."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class RegisteredCloud:
-    """The part of `Cloud` that concerns its life: what it is, and how it is posted, posted again and deleted."""
+    """The part of `Cloud` that describes, posts, posts again and deletes it."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class RegisteredCloud:
         normals: Array | None = None,
         file: bytes | None = None,
     ) -> None:
-        """Takes what the service said of the cloud; `Client.cloud` and `Client.clouds` make clouds."""
+        """Takes the service's description of the cloud. `Client.cloud` and `Client.clouds` make clouds."""
         self._connection = connection
         self.description = description
         self._points = points
@@ -41,7 +41,7 @@ class RegisteredCloud:
 
     @property
     def id(self) -> str:
-        """64 hexadecimal digits."""
+        """The id of the cloud, 64 hexadecimal digits."""
         return self.description.cloud_id
 
     @property
@@ -56,16 +56,19 @@ class RegisteredCloud:
 
     @property
     def points(self) -> Array | None:
-        """`[n, d]`, read-only; None if the cloud was not made from points, but from a file or a list of clouds."""
+        """Points `[n, d]`, read-only. None if the cloud comes from a file or a list of clouds."""
         return self._points
 
     @property
     def normals_given(self) -> Array | None:
-        """`[n, d]`, read-only: the normals that the cloud was made with, whose side is outward."""
+        """Normals `[n, d]` with which the cloud was made, read-only. Their side is outward."""
         return self._normals
 
     def delete(self) -> None:
-        """Makes the service forget the points and all that was computed from them; no matter if it has already."""
+        """Makes the service forget the points and everything computed from them.
+
+        Does nothing if the service has already forgotten them.
+        """
         try:
             self._connection.send("DELETE", f"/v1/clouds/{self.id}", headers=about(self.id))
         except UnknownCloud:
@@ -74,10 +77,10 @@ class RegisteredCloud:
     def _compute(
         self, read: Callable[[Members], T], path: str, rules: Mapping[str, Rule] = REQUEST, **fields: object
     ) -> T:
-        """Asks for something about this cloud, and perhaps the surface of another one.
+        """Computes something about this cloud, and possibly the surface of another one.
 
-        Where the service has forgotten a cloud, both are posted again if their points or files are at hand, and the
-        request is repeated once: the ids in it are still right.
+        If the service has forgotten a cloud, both are posted again if their points or files are available.
+        The request is then repeated once: the ids in it are still right.
         """
         sizes = {"n": self.n_points, "d": self.dimension}
         request = {"cloud": {"id": self.id}, **normalise(fields, rules, sizes)}
@@ -89,12 +92,15 @@ class RegisteredCloud:
         return self._connection.compute(path, request, read, self.id)
 
     def _post_again(self, *clouds: RegisteredCloud | None) -> bool:
-        """Posts those clouds whose points or file are at hand, and says whether there was one."""
+        """Posts the clouds whose points or file are available. Returns true if there was one."""
         posted = [cloud._post(self.id) for cloud in clouds if cloud is not None]
         return any(posted)
 
     def _post(self, asked: str) -> bool:
-        """Posts the points or the file where requests about the cloud `asked` go, and says whether there was either."""
+        """Posts the points or the file, and returns true if there was either.
+
+        Posts to the replica that gets requests about the cloud `asked`.
+        """
         if self._points is not None:
             register(self._connection, self._points, self._normals, asked)
         elif self._file is not None:
@@ -103,19 +109,25 @@ class RegisteredCloud:
 
 
 def _cloud_of(geometry: object) -> RegisteredCloud | None:
-    """Returns the cloud of a geometry, however it was given; None if it has none, or but its id."""
+    """Returns the cloud of a geometry in any form, or None if it has no cloud or only an id."""
     inner = geometry.get("cloud") if isinstance(geometry, Mapping) else getattr(geometry, "cloud", None)
     return next((cloud for cloud in (geometry, inner) if isinstance(cloud, RegisteredCloud)), None)
 
 
 def register(connection: Connection, points: Array, normals: Array | None, cloud_id: str | None = None) -> models.Cloud:
-    """Posts points, to the replica that has the cloud `cloud_id` if given, and says what the service knows of them."""
+    """Posts points, and returns the service's description of the cloud.
+
+    Posts to the replica that has the cloud `cloud_id`, if given.
+    """
     fields = {"points": points} if normals is None else {"points": points, "normals": normals}
     return connection.read(models.Cloud.from_dict, connection.post("/v1/clouds", fields, JSON, cloud_id))
 
 
 def register_file(connection: Connection, file: bytes, cloud_id: str | None = None) -> models.Cloud:
-    """Posts a PLY file, likewise."""
+    """Posts a PLY file, and returns the service's description of the cloud.
+
+    Posts to the replica that has the cloud `cloud_id`, if given.
+    """
     headers = {"Content-Type": PLY, "Accept": JSON, **about(cloud_id)}
     response = connection.send("POST", "/v1/clouds", content=file, headers=headers)
     return connection.read(models.Cloud.from_dict, response)

@@ -1,4 +1,4 @@
-"""Single numbers and words as they are sent."""
+"""Conversion of single numbers and words to what is sent."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ import numpy as np
 def as_number(name: str, value: object) -> float:
     """Returns a number in float64.
 
-    Floating-point numbers are rounded to it, if need be. Those that are exact (integers, fractions, decimals) must be
-    exact in float64 too.
+    Floating-point numbers are rounded to float64 if necessary. Exact numbers (integers, fractions, decimals)
+    must be exact in float64 too.
 
     Raises
     ------
     TypeError
-        If it is something else than one real number.
+        If it is not one real number.
     ValueError
         If it is masked, not finite, or not exact.
     """
     value = unwrapped(name, value)
     if isinstance(value, np.integer):
-        value = int(value)  # compared with a float it would be rounded itself
+        value = int(value)  # a NumPy integer would be rounded when compared with a float
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real | Decimal):
         raise TypeError(f"{name} is to be a number, not {_kind(value)}")
     try:
@@ -42,12 +42,12 @@ def as_number(name: str, value: object) -> float:
 
 
 def as_whole(name: str, value: object) -> int:
-    """Returns a whole number; a floating-point number may be one as well.
+    """Returns a whole number. Floating-point numbers without a fraction are accepted.
 
     Raises
     ------
     TypeError
-        If it is something else than one real number.
+        If it is not one real number.
     ValueError
         If it has a fraction, or `as_number` refuses it.
     """
@@ -58,12 +58,12 @@ def as_whole(name: str, value: object) -> int:
 
 
 def as_truth(name: str, value: object) -> bool:
-    """Returns a truth value; numbers are none.
+    """Returns a truth value. Numbers are refused.
 
     Raises
     ------
     TypeError
-        If it is something else.
+        If it is not a truth value.
     """
     value = unwrapped(name, value)
     if not isinstance(value, bool | np.bool_):
@@ -72,14 +72,14 @@ def as_truth(name: str, value: object) -> bool:
 
 
 def as_word(name: str, value: object, words: Iterable[str]) -> str:
-    """Returns one of these words, given as such or as member of an enumeration.
+    """Returns one of these words, given as a string or as a member of an enumeration.
 
     Raises
     ------
     TypeError
         If it is no word.
     ValueError
-        If it is another one.
+        If it is not one of these words.
     """
     value = unwrapped(name, value)
     word = value.value if isinstance(value, Enum) else value
@@ -93,14 +93,14 @@ def as_word(name: str, value: object, words: Iterable[str]) -> str:
 
 
 def as_words(name: str, value: object, words: Iterable[str]) -> list[str]:
-    """Returns a list of such words; one word alone is a list of one.
+    """Returns a list of these words. A single word becomes a list of one.
 
     Raises
     ------
     TypeError
         If it is no word and no list of words.
     ValueError
-        If one is another word.
+        If an entry is not one of these words.
     """
     value = unwrapped(name, value)
     words = list(words)
@@ -110,7 +110,10 @@ def as_words(name: str, value: object, words: Iterable[str]) -> list[str]:
 
 
 def unwrapped(name: str, value: object) -> object:
-    """Returns the number or word in an array without axes; another library's too, if NumPy can read it."""
+    """Returns the number or word in an array without axes. Returns other values unchanged.
+
+    The array may be of another library, if NumPy can read it.
+    """
     if value is np.ma.masked or (isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and value.mask):
         raise ValueError(f"{name} is masked, and nothing can be sent for it")
     if isinstance(value, np.ndarray) or (hasattr(value, "__array__") and not isinstance(value, np.generic)):
@@ -120,13 +123,13 @@ def unwrapped(name: str, value: object) -> object:
 
 
 def nearest(word: object, words: Iterable[str]) -> str:
-    """Returns a question for the word that was probably meant, or nothing."""
+    """Returns a question that suggests the nearest word, or an empty string."""
     near = difflib.get_close_matches(str(word).lower(), list(words), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def _kind(value: object) -> str:
-    """Says what was given instead."""
+    """Describes a value that was given instead of the expected one."""
     if isinstance(value, np.ndarray):
         return f"an array of the shape {list(value.shape)}"
     if isinstance(value, str | bytes | bool | complex | np.generic):

@@ -1,1 +1,1 @@
-"""What a registered cloud is asked: values, surfaces, operators, selection."""
+"""Operations on a registered cloud: values, surfaces, operators, selection."""

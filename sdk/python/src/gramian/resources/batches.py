@@ -1,4 +1,4 @@
-"""What can be asked about many lists of values at the points of a cloud."""
+"""Operations on many lists of values at the points of a cloud."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..arguments.registration import RegisteredCloud
 
 @suggest_names
 class BatchesOnCloud(RegisteredCloud):
-    """The part of `Cloud` that concerns many lists of values at its points; V is their unit."""
+    """The part of `Cloud` that concerns many lists of values at its points. V is their unit."""
 
     def interpolate_batch(
         self,
@@ -34,41 +34,42 @@ class BatchesOnCloud(RegisteredCloud):
     ) -> InterpolationBatch:
         """Fits a function to each of k lists of values, with one factorization for all, and evaluates them.
 
-        Each is what `interpolate` makes of its list with the same kernel and noise.
+        Each function is the one that `interpolate` fits to its list with the same kernel and noise.
 
         Parameters
         ----------
         values : array_like, `[k, n]`
             A row for each list, with a value at each point, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where the functions are wanted, a row of coordinates each; the points if absent.
+            Positions at which to evaluate the functions, a row of coordinates each. The points if absent.
         derivatives : 0, 1 or 2, optional
-            1 for gradients, 2 for Hessians as well; 0 if absent.
+            1 for gradients, 2 for Hessians as well. 0 if absent.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`.
+            True for standard deviations, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from all lists together by their likelihood, with its
-            variance and the noise, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from all lists together
+            by their likelihood, with its variance and the noise, and reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values.
         mean : str, optional
-            What each function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A
-            constant if absent with `kernel`, else zero.
+            Mean of each function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the
+            coordinates. If absent, a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"`, which is the same here, as if absent.
+            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         InterpolationBatch
-            `values` at the queries, a row for each list, and `gradients`, `hessians` and deviations where asked for.
+            `values` at the queries, a row for each list, and `gradients`, `hessians` and deviations if
+            requested.
 
         Examples
         --------
@@ -112,47 +113,48 @@ class BatchesOnCloud(RegisteredCloud):
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
     ) -> PosteriorBatch:
-        """Computes the posteriors of k Gaussian processes with kernel and noise in common, with one factorization.
+        """Computes the posteriors of k Gaussian processes with one kernel, noise and factorization.
 
-        Each is what `posterior` makes of its list of values; variances and covariances do not depend on values, so that
-        there is one of them for all.
+        Each posterior is the one that `posterior` computes from its list of values. Variances and covariances
+        do not depend on values, so all lists share them.
 
         Parameters
         ----------
         values : array_like, `[k, n]`
             A row for each list, with a value at each point, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where the posteriors are wanted, a row of coordinates each; the points if absent.
+            Positions at which to evaluate the posteriors, a row of coordinates each. The points if absent.
         include : str or several, optional
-            What is wanted beside the means: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
-            `"gradient_variances"`, `"log_marginal_likelihood"`; nothing if absent.
+            Additional results beside the means: `"variance"`, `"observation_variance"`, `"covariance"`,
+            `"gradients"`, `"gradient_variances"`, `"log_marginal_likelihood"`. Nothing if absent.
         samples : int or dict, optional
-            How many functions to draw from each posterior, at all queries together; or `{"count": 10, "seed": 1}`.
+            Number of functions to draw from each posterior, jointly at all queries, or
+            `{"count": 10, "seed": 1}`.
         quantiles : array_like, `[q]`, optional
-            Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted.
+            Probabilities between 0 and 1 for which to return quantiles of the latent functions.
         threshold : float, optional
-            What a new observation is to exceed, V, for `exceedance_probabilities`.
+            Threshold of `exceedance_probabilities`, V: the probabilities that a new observation exceeds it.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from all lists together by their likelihood, with its
-            variance and the noise, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from all lists together
+            by their likelihood, with its variance and the noise, and reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values.
         mean : str, optional
-            What each function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A
-            constant if absent with `kernel`, else zero.
+            Mean of each function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the
+            coordinates. If absent, a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"`, which is the same here, as if absent.
+            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         PosteriorBatch
-            `means` at the queries, a row for each list, and what `include` asks for.
+            `means` at the queries, a row for each list, and the results named by `include`.
 
         Examples
         --------

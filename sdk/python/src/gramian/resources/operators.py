@@ -23,7 +23,7 @@ from ..arguments.registration import RegisteredCloud
 
 @suggest_names
 class OperatorsOnCloud(RegisteredCloud):
-    """The part of `Cloud` that concerns operators on the surface of its points; V is the unit of values."""
+    """The part of `Cloud` that concerns operators on the surface of its points. V is the unit of values."""
 
     def surface_gradient(
         self,
@@ -45,38 +45,39 @@ class OperatorsOnCloud(RegisteredCloud):
         Parameters
         ----------
         values : array_like, `[n]`
-            At the points, in their order, unit V.
+            Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where it comes from another cloud or fit than the values.
+            The surface, if it has another cloud or fit than the values.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`.
+            True for standard deviations, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
-            and the noise, chosen from the cloud for the surface, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
+            likelihood, with its variance and the noise, and chosen from the cloud for the surface.
+            `diagnostics` reports it.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values. The same for the surface if given here;
-            if absent, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values. If given, it applies to
+            the surface too. If absent, the surface has the default of `Cloud.normals`.
         mean : str, optional
-            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
-            absent with `kernel`, else zero.
+            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
+            a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for weights of the points near each query, which take no `kernel` or `alpha` and
-            any number of points, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`; `"local"` for weights of the points near each query, without `kernel` or `alpha` and
+            for any number of points; or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         SurfaceGradient
-            `gradients` at the queries, NaN where there is none; `degenerate` says why.
+            `gradients` at the queries, NaN where there is none. `degenerate` says why.
 
         Examples
         --------
@@ -119,29 +120,31 @@ class OperatorsOnCloud(RegisteredCloud):
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where it comes from another cloud or fit than the values.
+            The surface, if it has another cloud or fit than the values.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
-            the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            1e-10 for the values if absent. If given, it applies to the surface too. If absent, the surface
+            has the default of `Cloud.normals`.
         mean : str, optional
-            That of the functions through the values: `"zero"` if absent, `"constant"`, or `"linear"` in the
-            coordinates. With a constant the matrix makes constants exactly 0.
+            Mean of the functions through the values: `"zero"` (if absent), `"constant"`, or `"linear"` in the
+            coordinates. With a constant the matrix maps constants exactly to 0.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         SurfaceGradientMatrix
-            `matrices`, `[d, m, n]`, whose rows are NaN where there is no gradient; `degenerate` says why.
+            `matrices`, `[d, m, n]`. Rows are NaN where there is no gradient, and `degenerate` says why.
 
         Examples
         --------
@@ -177,38 +180,39 @@ class OperatorsOnCloud(RegisteredCloud):
         duplicates: Duplicates | None = None,
         sites: npt.ArrayLike | None = None,
     ) -> SurfaceGradientSparseMatrix:
-        """Assembles sparse matrices, one per coordinate, that turn values at the points into surface gradients.
+        """Assembles sparse matrices, one per coordinate, that map values to surface gradients.
 
-        From the points near each query, with no kernel for the values: `kernel` and `alpha` are those of the surface.
-        Takes any number of points, and SciPy.
+        The weights come from the points near each query, without a kernel for the values. `kernel` and
+        `alpha` are those of the surface. Works for any number of points. Needs SciPy.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where its points are those of another cloud.
+            The surface, if it is sampled by the points of another cloud.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, instead of `alpha`.
+            The noise variance at each point, instead of `alpha`.
         solver : str, optional
-            How the surface is fitted: `"dense"`, `"local"` for regressions of the points near each query, or `"auto"`
-            to let the service choose, as it does if absent.
+            Solver for the fit of the surface: `"dense"`, `"local"` for regressions of the points near each
+            query, or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
-            it chooses if absent.
+            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
+            the cloud. The solver chooses some if absent.
 
         Returns
         -------
         SurfaceGradientSparseMatrix
-            `matrices`, d of `scipy.sparse.csr_matrix` with the shape `[m, n]`, whose rows have no entries where there
-            is no gradient; `degenerate` says why.
+            `matrices`, d matrices of type `scipy.sparse.csr_matrix` and shape `[m, n]`. Rows have no entries
+            where there is no gradient, and `degenerate` says why.
 
         Raises
         ------
@@ -254,43 +258,46 @@ class OperatorsOnCloud(RegisteredCloud):
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
     ) -> LaplaceBeltrami:
-        """Applies the Laplace–Beltrami operator to the function through values: on the unit circle Δ cos θ = −cos θ.
+        """Applies the Laplace–Beltrami operator to the function through values.
+
+        On the unit circle Δ cos θ = −cos θ.
 
         Parameters
         ----------
         values : array_like, `[n]`
-            At the points, in their order, unit V.
+            Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where it comes from another cloud or fit than the values.
+            The surface, if it has another cloud or fit than the values.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`.
+            True for standard deviations, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
-            and the noise, chosen from the cloud for the surface, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
+            likelihood, with its variance and the noise, and chosen from the cloud for the surface.
+            `diagnostics` reports it.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values. The same for the surface if given here;
-            if absent, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values. If given, it applies to
+            the surface too. If absent, the surface has the default of `Cloud.normals`.
         mean : str, optional
-            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
-            absent with `kernel`, else zero.
+            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
+            a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for weights of the points near each query, which take no `kernel` or `alpha` and
-            any number of points, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`; `"local"` for weights of the points near each query, without `kernel` or `alpha` and
+            for any number of points; or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         LaplaceBeltrami
-            `values` of Δu at the queries, NaN where there is none; `degenerate` says why.
+            `values` of Δu at the queries, NaN where there is none. `degenerate` says why.
 
         Examples
         --------
@@ -333,29 +340,31 @@ class OperatorsOnCloud(RegisteredCloud):
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where it comes from another cloud or fit than the values.
+            The surface, if it has another cloud or fit than the values.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses; 1e-10 for
-            the values if absent. For the surface it is the same if given here; if absent, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            1e-10 for the values if absent. If given, it applies to the surface too. If absent, the surface
+            has the default of `Cloud.normals`.
         mean : str, optional
-            That of the functions through the values: `"zero"` if absent, `"constant"`, or `"linear"` in the
-            coordinates. With a constant the matrix makes constants exactly 0.
+            Mean of the functions through the values: `"zero"` (if absent), `"constant"`, or `"linear"` in the
+            coordinates. With a constant the matrix maps constants exactly to 0.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`, or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         LaplaceBeltramiMatrix
-            `matrix`, `[m, n]`, whose rows are NaN where there is no value; `degenerate` says why.
+            `matrix`, `[m, n]`. Rows are NaN where there is no value, and `degenerate` says why.
 
         Examples
         --------
@@ -393,36 +402,37 @@ class OperatorsOnCloud(RegisteredCloud):
     ) -> LaplaceBeltramiSparseMatrix:
         """Assembles the sparse matrix that turns values at the points into Δu at the queries.
 
-        From the points near each query, with no kernel for the values: `kernel` and `alpha` are those of the surface.
-        Takes any number of points, and SciPy.
+        The weights come from the points near each query, without a kernel for the values. `kernel` and
+        `alpha` are those of the surface. Works for any number of points. Needs SciPy.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            On the surface, a row of coordinates each; the points of the surface's cloud if absent.
+            Positions on the surface, a row of coordinates each. The points of the surface's cloud if absent.
         geometry : Geometry, dict, Cloud or Diagnostics, optional
-            The surface, where its points are those of another cloud.
+            The surface, if it is sampled by the points of another cloud.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
+            Number added to the diagonal of the Gram matrix of the surface, as for `Cloud.normals`.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, instead of `alpha`.
+            The noise variance at each point, instead of `alpha`.
         solver : str, optional
-            How the surface is fitted: `"dense"`, `"local"` for regressions of the points near each query, or `"auto"`
-            to let the service choose, as it does if absent.
+            Solver for the fit of the surface: `"dense"`, `"local"` for regressions of the points near each
+            query, or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
-            it chooses if absent.
+            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
+            the cloud. The solver chooses some if absent.
 
         Returns
         -------
         LaplaceBeltramiSparseMatrix
-            `matrix`, a `scipy.sparse.csr_matrix` with the shape `[m, n]`, whose rows have no entries where there is no
-            value; `degenerate` says why.
+            `matrix`, a `scipy.sparse.csr_matrix` of shape `[m, n]`. Rows have no entries where there is no
+            value, and `degenerate` says why.
 
         Raises
         ------

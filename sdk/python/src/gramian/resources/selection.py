@@ -1,4 +1,4 @@
-"""Which kernel and noise explain values at the points of a cloud."""
+"""Selection of the kernel and the noise that explain values at the points of a cloud."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ Parameter: TypeAlias = (
 
 
 class Bounds(TypedDict, total=False):
-    """What is free, each with the least and the greatest that it may be: `{"length_scale": (0.1, 10)}`.
+    """Free parameters, each with its least and greatest value: `{"length_scale": (0.1, 10)}`.
 
     Keys
     ----
     length_scale
-        Of the kernel, unit of the coordinates.
+        Length scale of the kernel, unit of the coordinates.
     length_scales
-        Of the kernel, of every axis its own, each within these bounds.
+        Length scales of the kernel, a separate one for every axis, each within these bounds.
     variance
-        Of the kernel, V².
+        Variance of the kernel, V².
     alpha
-        The variance of the noise, V².
+        Variance of the noise, V².
     epsilon
-        Of `laplace`.
+        Parameter of `laplace`.
     nu
-        Of `matern`: each half-integer within the bounds is tried.
+        Parameter of `matern`. Each half-integer within the bounds is tried.
     """
 
     length_scale: npt.ArrayLike | None
@@ -49,16 +49,16 @@ class Bounds(TypedDict, total=False):
 
 
 class FreeParameterFields(TypedDict, total=False):
-    """A parameter that is free, as a dictionary: `{"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10}`.
+    """A free parameter as a dictionary: `{"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10}`.
 
     Keys
     ----
     parameter
-        Which: a key of `Bounds`.
+        Name of the parameter, a key of `Bounds`.
     axis
-        Of `length_scales`: which, from 0; every axis if absent, each within these bounds.
+        Axis of `length_scales`, counted from 0. If absent, every axis, each within these bounds.
     min, max
-        The least and the greatest that it may be.
+        Least and greatest value.
     """
 
     parameter: Required[Parameter]
@@ -68,12 +68,12 @@ class FreeParameterFields(TypedDict, total=False):
 
 
 Vary: TypeAlias = Bounds | Mapping[SelectionParameter, npt.ArrayLike] | Iterable[FreeParameterFields | FreeParameter]
-"""What is free: bounds by name, or a list of parameters with an axis where need be."""
+"""Free parameters: bounds by name, or a list of parameters, each with an axis where needed."""
 
 
 @suggest_names
 class SelectionOnCloud(RegisteredCloud):
-    """The part of `Cloud` that selects models; V is the unit of the values."""
+    """The part of `Cloud` that selects models. V is the unit of the values."""
 
     def select_model(
         self,
@@ -91,52 +91,56 @@ class SelectionOnCloud(RegisteredCloud):
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
     ) -> ModelSelection:
-        """Searches the kernel and the noise that explain values best.
+        """Searches for the kernel and the noise that explain values best.
 
-        The search begins with `kernel` and `alpha`, and again from further places within the bounds, and follows the
-        slopes of the criterion.
+        The search begins with `kernel` and `alpha`, and again from other starts within the bounds. It follows
+        the slopes of the criterion.
 
         Parameters
         ----------
         values : array_like, `[n]`
-            At the points, in their order, unit V.
+            Values at the points, in their order, unit V.
         criterion : str, optional
-            What is made as great as possible: `"marginal_likelihood"`, as if absent, `"leave_one_out"` for the log
-            densities of each value given all others, or `"generalized_cross_validation"`, for which variance and alpha
-            only count by their ratio.
+            Criterion to maximize: `"marginal_likelihood"` (if absent); `"leave_one_out"` for the log
+            densities of each value given all others; or `"generalized_cross_validation"`, which depends only
+            on the ratio of variance and alpha.
         vary : dict or list, optional
-            What is free, and its bounds: `{"length_scales": (0.1, 10), "alpha": (1e-6, 1)}`, as `gramian.Bounds`
-            documents, or a list of `{"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10}`. If absent,
-            length scale (or that of each axis, where `kernel` has them), variance and, without `noise_variances`,
-            alpha, from a hundredth (alpha: a millionth) to a hundred times of where the search begins.
+            Free parameters and their bounds: `{"length_scales": (0.1, 10), "alpha": (1e-6, 1)}`, as
+            `gramian.Bounds` documents, or a list of
+            `{"parameter": "length_scales", "axis": 0, "min": 0.1, "max": 10}`. If absent, the length scale
+            (or that of each axis, where `kernel` has them), the variance and, without `noise_variances`,
+            alpha. Their bounds are then a hundredth (alpha: a millionth) and a hundred times the values at
+            the start.
         families : str or several, optional
-            What is tried, with the parameters of `kernel` where it is of that family; its family alone if absent.
+            Families to try. The family of `kernel` starts from its parameters. If absent, only that family is
+            tried.
         restarts : int, optional
-            How many further places the search begins from for each family, at most 100; 2 if absent.
+            Number of further starts for each family, at most 100. 2 if absent.
         seed : int, optional
-            Where these are; 0 if absent.
+            Seed of the further starts. 0 if absent.
         kernel : str, dict or Kernel, optional
-            Where the search begins: a family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or
-            as a dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
-            likelihood, with its variance and the noise.
+            Start of the search: a family (`"gauss"`), one with parameters
+            (`gramian.Kernel("gauss", length_scale=2)` or a dictionary), or the `diagnostics.kernel` of an
+            answer. If absent, learned from the values by their likelihood, with its variance and the noise.
         alpha : float, optional
-            Where the search begins: the variance of the noise, V². If absent, 1e-10 with a kernel given, else learned
-            from the values.
+            Noise variance at the start of the search, V². If absent, 1e-10 where `kernel` is given, else
+            learned from the values.
         mean : str, optional
-            What the function is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A
-            constant if absent with `kernel`, else zero.
+            Mean of the function, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates.
+            If absent, a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`, which then is not searched.
+            The noise variance at each point, V², instead of `alpha`, which is then not searched.
         solver : str, optional
-            `"dense"`, or `"auto"`, which is the same here, as if absent.
+            `"dense"` or `"auto"`, which mean the same here. `"auto"` if absent.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent. They are not merged
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent). They are not merged
             here.
 
         Returns
         -------
         ModelSelection
-            The `kernel` and `alpha` selected, the criterion over alpha, and each value predicted from all others.
+            The selected `kernel` and `alpha`, the criterion over alpha, and each value predicted from all
+            others.
 
         Examples
         --------

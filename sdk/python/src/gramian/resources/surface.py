@@ -1,4 +1,4 @@
-"""What can be asked about the surface that the points of a cloud sample."""
+"""Operations on the surface that the points of a cloud sample."""
 
 from __future__ import annotations
 
@@ -32,42 +32,44 @@ class SurfaceOfCloud(RegisteredCloud):
         duplicates: Duplicates | None = None,
         sites: npt.ArrayLike | None = None,
     ) -> Normals:
-        """Computes unit normals ν = −∇u/|∇u| of the surface that the points sample; no mesh is needed.
+        """Computes unit normals ν = −∇u/|∇u| of the surface that the points sample. No mesh is needed.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            Where normals are wanted, a row of coordinates each; the points if absent.
+            Positions at which to compute normals, a row of coordinates each. The points if absent.
         surface : str, optional
-            `"signature"`, `"offset"` or `"local"` to forbid the other functions; `"auto"` if absent.
+            `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
         orientation : str, optional
-            `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+            `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`; by local regressions, unless `kernel`,
-            `alpha`, `surface` or `solver` say otherwise.
+            True for standard deviations, as by `include="deviations"`. They come from local regressions,
+            unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, without unit; if absent, 1e-10 with a kernel given, else chosen by
-            the noise of the points, 1e-3 at least.
+            Number added to the diagonal of the Gram matrix, without unit. If absent, 1e-10 where `kernel` is
+            given, else chosen by the noise of the points, at least 1e-3.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, instead of `alpha`.
+            The noise variance at each point, instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for regressions of the points near each query, which take no `kernel` or `alpha` and
-            any number of points, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`; `"local"` for regressions of the points near each query, without `kernel` or `alpha`
+            and for any number of points; or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
-            it chooses if absent.
+            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
+            the cloud. The solver chooses some if absent.
 
         Returns
         -------
         Normals
-            `normals` at the queries, NaN where there is none; `degenerate` says why. `normal_deviations` if asked for.
+            `normals` at the queries, NaN where there is none, and `degenerate` says why. `normal_deviations`
+            if requested.
 
         Examples
         --------
@@ -111,45 +113,46 @@ class SurfaceOfCloud(RegisteredCloud):
         duplicates: Duplicates | None = None,
         sites: npt.ArrayLike | None = None,
     ) -> Curvatures:
-        """Computes principal, mean and Gaussian curvatures of the surface that the points sample; no mesh is needed.
+        """Computes principal, mean and Gaussian curvatures of the surface that the points sample.
 
-        With outward normals a sphere of radius r has the curvatures +1/r.
+        No mesh is needed. With outward normals a sphere of radius r has the curvatures +1/r.
 
         Parameters
         ----------
         queries : array_like, `[m, d]`, optional
-            Where curvatures are wanted, a row of coordinates each; the points if absent.
+            Positions at which to compute curvatures, a row of coordinates each. The points if absent.
         surface : str, optional
-            `"signature"`, `"offset"` or `"local"` to forbid the other functions; `"auto"` if absent.
+            `"signature"`, `"offset"` or `"local"` to allow only that function. `"auto"` if absent.
         orientation : str, optional
-            `"outward"` if absent; `"gradient"` for the side that the gradient of u says.
+            `"outward"` (if absent), or `"gradient"` for the side given by the gradient of u.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`; by local regressions, unless `kernel`,
-            `alpha`, `surface` or `solver` say otherwise.
+            True for standard deviations, as by `include="deviations"`. They come from local regressions,
+            unless `kernel`, `alpha`, `surface` or `solver` say otherwise.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. Chosen from the cloud if absent, and
+            reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, without unit; if absent, 1e-10 with a kernel given, else chosen by
-            the noise of the points, 1e-3 at least.
+            Number added to the diagonal of the Gram matrix, without unit. If absent, 1e-10 where `kernel` is
+            given, else chosen by the noise of the points, at least 1e-3.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, instead of `alpha`.
+            The noise variance at each point, instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for regressions of the points near each query, which take no `kernel` or `alpha` and
-            any number of points, or `"auto"` to let the service choose, as it does if absent.
+            `"dense"`; `"local"` for regressions of the points near each query, without `kernel` or `alpha`
+            and for any number of points; or `"auto"` (if absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
         sites : array_like, `[s, d]`, optional
-            Where the local solver learns noise and shape of the surface, at most 192 points of the cloud; some that
-            it chooses if absent.
+            Positions at which the local solver learns noise and shape of the surface, at most 192 points of
+            the cloud. The solver chooses some if absent.
 
         Returns
         -------
         Curvatures
-            `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN where there
-            are none; `degenerate` says why. Standard deviations of each if asked for.
+            `principal_curvatures`, `mean_curvatures`, `gaussian_curvatures` and more at the queries, NaN
+            where there are none, and `degenerate` says why. Standard deviations of each if requested.
 
         Examples
         --------
@@ -159,7 +162,7 @@ class SurfaceOfCloud(RegisteredCloud):
         array([[0.2],
                [0.2]])
 
-        With standard deviations, of noise of 0.01 in the points:
+        With standard deviations, for noise of 0.01 in the points:
 
         >>> noise = 0.01 * np.random.default_rng(0).normal(size=(64, 1))
         >>> noisy = gramian.Client().cloud((5 + noise) * np.column_stack([np.cos(angles), np.sin(angles)]))

@@ -1,4 +1,4 @@
-"""What can be asked about values at the points of a cloud."""
+"""Operations on values at the points of a cloud."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..arguments.registration import RegisteredCloud
 
 @suggest_names
 class ValuesOfCloud(RegisteredCloud):
-    """The part of `Cloud` that concerns values at its points; V is their unit."""
+    """The part of `Cloud` that concerns values at its points. V is their unit."""
 
     def interpolate(
         self,
@@ -34,42 +34,42 @@ class ValuesOfCloud(RegisteredCloud):
     ) -> Interpolation:
         """Fits `u = Σ λ_j k(·, x_j)` to values, (K + αI)Λ = Y, and evaluates it.
 
-        At `alpha=0` it takes the values at the points exactly.
+        With `alpha=0` u equals the values at the points exactly.
 
         Parameters
         ----------
         values : array_like, `[n]`
-            At the points, in their order, unit V.
+            Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where u is wanted, a row of coordinates each; the points if absent.
+            Positions at which to evaluate u, a row of coordinates each. The points if absent.
         derivatives : 0, 1 or 2, optional
-            1 for gradients, 2 for Hessians as well; 0 if absent.
+            1 for gradients, 2 for Hessians as well. 0 if absent.
         include : str or several, optional
-            What is wanted beside: `"deviations"`; nothing if absent.
+            Additional results: `"deviations"`. Nothing if absent.
         deviations : bool, optional
-            Whether standard deviations are wanted, as by `include="deviations"`.
+            True for standard deviations, as by `include="deviations"`.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
-            and the noise, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
+            likelihood, with its variance and the noise, and reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values.
         mean : str, optional
-            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
-            absent with `kernel`, else zero.
+            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
+            a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
-            it does if absent.
+            `"dense"`; `"local"` to solve for each query with the points nearest to it; or `"auto"` (if
+            absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         Interpolation
-            `values` of u at the queries, and `gradients`, `hessians` and deviations where asked for.
+            `values` of u at the queries, and `gradients`, `hessians` and deviations if requested.
 
         Examples
         --------
@@ -114,45 +114,46 @@ class ValuesOfCloud(RegisteredCloud):
         solver: Solver | None = None,
         duplicates: Duplicates | None = None,
     ) -> Posterior:
-        """Computes the posterior of a Gaussian process with the kernel as covariance and noise of variance `alpha`.
+        """Computes the posterior of a Gaussian process: covariance by the kernel, noise of variance `alpha`.
 
         Parameters
         ----------
         values : array_like, `[n]`
-            At the points, in their order, unit V.
+            Values at the points, in their order, unit V.
         queries : array_like, `[m, d]`, optional
-            Where the posterior is wanted, a row of coordinates each; the points if absent.
+            Positions at which to evaluate the posterior, a row of coordinates each. The points if absent.
         include : str or several, optional
-            What is wanted beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`, `"gradients"`,
-            `"gradient_variances"`, `"log_marginal_likelihood"`; nothing if absent.
+            Additional results beside the mean: `"variance"`, `"observation_variance"`, `"covariance"`,
+            `"gradients"`, `"gradient_variances"`, `"log_marginal_likelihood"`. Nothing if absent.
         samples : int or dict, optional
-            How many functions to draw from the posterior, at all queries together; or `{"count": 10, "seed": 1}`.
+            Number of functions to draw from the posterior, jointly at all queries, or
+            `{"count": 10, "seed": 1}`.
         quantiles : array_like, `[q]`, optional
-            Probabilities between 0 and 1 of which the quantiles of the latent function are wanted.
+            Probabilities between 0 and 1 for which to return quantiles of the latent function.
         threshold : float, optional
-            What a new observation is to exceed, V, for `exceedance_probabilities`.
+            Threshold of `exceedance_probabilities`, V: the probabilities that a new observation exceeds it.
         kernel : str, dict or Kernel, optional
-            A family (`"gauss"`), its parameters (`gramian.Kernel("gauss", length_scale=2)` or as a dictionary), or the
-            `diagnostics.kernel` of an answer. If absent, learned from the values by their likelihood, with its variance
-            and the noise, and repeated in `diagnostics`.
+            A family (`"gauss"`), one with parameters (`gramian.Kernel("gauss", length_scale=2)` or a
+            dictionary), or the `diagnostics.kernel` of an answer. If absent, learned from the values by their
+            likelihood, with its variance and the noise, and reported in `diagnostics`.
         alpha : float, optional
-            Added to the diagonal of the Gram matrix, V²: 0 interpolates, the variance of the noise regresses. If
-            absent, 1e-10 with a kernel given, else learned from the values.
+            Number added to the diagonal of the Gram matrix, V². 0 interpolates, the noise variance regresses.
+            If absent, 1e-10 where `kernel` is given, else learned from the values.
         mean : str, optional
-            What u is made of beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. A constant if
-            absent with `kernel`, else zero.
+            Mean of u, beside the kernel: `"zero"`, `"constant"`, or `"linear"` in the coordinates. If absent,
+            a constant where `kernel` is absent too, else zero.
         noise_variances : array_like, `[n]`, optional
-            The variance of the noise at each point, V², instead of `alpha`.
+            The noise variance at each point, V², instead of `alpha`.
         solver : str, optional
-            `"dense"`, `"local"` for each query from the points nearest to it, or `"auto"` to let the service choose, as
-            it does if absent.
+            `"dense"`; `"local"` to solve for each query with the points nearest to it; or `"auto"` (if
+            absent) to let the service choose.
         duplicates : str, optional
-            What to do with points that coincide when `alpha` is 0: `"refuse"` them, as if absent, or `"merge"` them.
+            Policy for points that coincide when `alpha` is 0: `"refuse"` (if absent) or `"merge"`.
 
         Returns
         -------
         Posterior
-            `means` at the queries, and what `include` asks for.
+            `means` at the queries, and the results named by `include`.
 
         Examples
         --------

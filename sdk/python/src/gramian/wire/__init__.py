@@ -1,1 +1,1 @@
-"""How requests and answers travel: HTTP, arrays as tensors, jobs, and problems."""
+"""Transport of requests and answers: HTTP, arrays as tensors, jobs, and problems."""

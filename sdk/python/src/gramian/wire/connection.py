@@ -1,4 +1,4 @@
-"""Requests about clouds and their answers: arrays as JSON or tensors, long ones as jobs."""
+"""Requests about clouds, and their answers: arrays as JSON or tensors, computations as jobs if wanted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 class Connection(Transport):
-    """A service at an address, and how arrays travel there. May be shared by threads."""
+    """A service at an address, with the format of arrays. Threads may share it."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class Connection(Transport):
         format: Format,  # noqa: A002
         show: Callable[[str], Progress] | None = None,
     ) -> None:
-        """Takes the HTTP client, whose base URL is the service, the format of arrays, and who is shown jobs."""
+        """Takes the HTTP client (its base URL is the service), the array format, and a display for jobs."""
         super().__init__(http)
         self.format = format
         self.show = show
@@ -33,7 +33,10 @@ class Connection(Transport):
     def post(
         self, path: str, request: Mapping[str, object], accept: str | None = None, cloud_id: str | None = None
     ) -> httpx.Response:
-        """Posts a JSON document with arrays in it, to the replica that has the cloud if its id is known."""
+        """Posts a JSON document that contains arrays.
+
+        If `cloud_id` is given, the request goes to the replica that has that cloud.
+        """
         body, media_type = encode(request, self.format)
         accepted = accept or (JSON if self.format == "json" else SAFETENSORS)
         headers = {"Content-Type": media_type, "Accept": accepted, **about(cloud_id)}
@@ -47,7 +50,7 @@ class Connection(Transport):
         Raises
         ------
         Problem
-            If it is none of this service.
+            If the answer is not one of this service.
         """
         return understood(response, lambda: parse(response.json()))
 
@@ -57,14 +60,14 @@ class Connection(Transport):
         Raises
         ------
         Problem
-            If the request is refused, or the answer none of this service.
+            If the request is refused, or the answer is not one of this service.
         """
         response = self.post(path, request, cloud_id=cloud_id)
         return understood(response, lambda: read(decode(response, request)))
 
 
 def understood(response: httpx.Response, read: Callable[[], T]) -> T:
-    """Returns what `read` makes of an answer; what it cannot read is a problem, such as the page of another service."""
+    """Reads an answer by `read`. Raises a `Problem` if that fails, as for the page of another service."""
     try:
         return read()
     except UNREADABLE as error:

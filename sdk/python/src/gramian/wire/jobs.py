@@ -1,4 +1,4 @@
-"""Computations as jobs of the service: a deadline of their own, a progress bar, and an end on Ctrl-C."""
+"""Computations as jobs of the service: a separate deadline, a progress bar, and cancellation on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -16,19 +16,25 @@ from .progress import Progress
 from .transport import Transport
 
 PREFERENCE = {"Prefer": "respond-async"}
-"""Asks for a job instead of an answer (RFC 7240). A service that knows no jobs answers as always."""
+"""Header that asks for a job instead of an answer (RFC 7240). A service without jobs answers as always."""
 
 REOPENING_SECONDS = 0.5
-"""Between two connections to the events of one job; while the service is away, the first pause, doubled each time."""
+"""Pause between two connections to the events of a job.
+
+Also the first pause while the service is away, doubled each time.
+"""
 
 LONGEST_PAUSE_SECONDS = 15.0
-"""Between two looks for a service that is away."""
+"""Longest pause between two requests to a service that is away."""
 
 AWAY_SECONDS = 600.0
-"""How long the service may be away: a job of hours outlasts a restart, and another replica takes it up in seconds."""
+"""Longest absence of the service, in seconds.
+
+A job of hours outlasts a restart, and another replica takes it up in seconds.
+"""
 
 PARTING_SECONDS = 5.0
-"""How long whoever leaves a job waits to hear that it is deleted."""
+"""Longest wait for the deletion of an abandoned job."""
 
 _AWAY = (*TRY_LATER, httpx.codes.GATEWAY_TIMEOUT)
 
@@ -42,22 +48,24 @@ def answer(
 ) -> httpx.Response:
     """Posts a request as a job, follows it, and returns the answer of the request.
 
-    Whatever ends the wait before the job has ended, such as Ctrl-C, cancels the job; but not a service that is away for
-    longer than `AWAY_SECONDS`. An exception that leaves a job behind has a note that names it.
+    An exception that ends the wait early, such as Ctrl-C, cancels the job. Only if the service is away for
+    longer than `AWAY_SECONDS` is the job not cancelled. An exception that leaves a job behind has a note that
+    names the job.
 
     Raises
     ------
     Problem
-        What the request itself would have been refused with.
+        If the request is refused, with the same problem as without a job.
     httpx.TransportError
         If the service is away for too long.
     """
-    # A repetition, after a lost connection or by a proxy, is the same job.
+    # With this key, a repetition after a lost connection or by a proxy refers to the same job.
     key = {"Idempotency-Key": str(uuid.uuid4())}
     response = transport.send("POST", path, content=content, headers=headers | PREFERENCE | key)
     if response.status_code != httpx.codes.ACCEPTED:
         return response
-    # Proxies send all that is about a job to the replica that has it, which is that of its cloud.
+    # With this header, proxies send requests about a job to the replica that has it, which is that of its
+    # cloud.
     routed = {name: value for name, value in headers.items() if name == "Gramian-Cloud"}
     job = _Followed(transport, response.headers["Location"], routed)
     try:
@@ -69,29 +77,30 @@ def answer(
     except BaseException as error:
         job.leave(error)
         raise
-    job.delete()  # what was fetched need not be kept
+    job.delete()  # the service need not keep a fetched result
     return answered
 
 
 class _Followed:
-    """A job of the service that somebody waits for."""
+    """A job of the service for which a caller waits."""
 
     def __init__(self, transport: Transport, place: str, headers: dict[str, str]) -> None:
-        """Takes the path of the job, and what requests about it are to have in their heads."""
+        """Takes the path of the job, and the headers of requests about it."""
         self._transport = transport
         self._place = place
         self._headers = headers
         self._is_out_of_reach = False
 
     def states(self) -> Iterator[Job]:
-        """Yields the job whenever it is further, until it has ended."""
+        """Yields the job whenever it has progressed, until it has ended."""
         while True:
             with contextlib.suppress(httpx.TransportError), self._events() as response:
                 for name, job in _jobs(response):
                     yield job
                     if name == "done":
                         return
-            # The service closed the connection, or another one has the job now: a look says whether it is known at all.
+            # The service closed the connection, or another replica has the job now. A request for the job
+            # tells whether it still exists.
             job = Job.from_dict(self.ask().json())
             yield job
             if job.status not in (JobStatus.QUEUED, JobStatus.RUNNING):
@@ -99,7 +108,7 @@ class _Followed:
             time.sleep(REOPENING_SECONDS)
 
     def ask(self, member: str = "") -> httpx.Response:
-        """Asks for the job or a member of it, and again while the service is away: it may come back with the job."""
+        """Requests the job or a member of it. Repeats while the service is away: it may come back with it."""
         pause, last = REOPENING_SECONDS, time.monotonic() + AWAY_SECONDS
         while True:
             try:
@@ -115,17 +124,17 @@ class _Followed:
             pause = min(2 * pause, LONGEST_PAUSE_SECONDS)
 
     def leave(self, error: BaseException) -> None:
-        """Cancels the job, since nobody waits for it any more; where that fails, the error says what is left."""
+        """Cancels the job, since no caller waits for it. If that fails, adds a note about it to the error."""
         is_gone = False
         try:
-            # One that is out of reach is wanted still: the service may be back with it any moment.
+            # A job out of reach is still wanted: the service may return with it at any moment.
             is_gone = not self._is_out_of_reach and self.delete()
         finally:
             if not is_gone:
                 error.add_note(self._note())
 
     def delete(self) -> bool:
-        """Cancels the job, or forgets its result; says whether it is gone."""
+        """Cancels the job, or deletes its result. Returns true if it is gone."""
         return self._transport.delete(self._place, self._headers, PARTING_SECONDS)
 
     def _note(self) -> str:
@@ -144,14 +153,14 @@ class _Followed:
 
 
 def _is_away(error: httpx.TransportError | Problem) -> bool:
-    """Says whether it is the service that is missing; a job that took too long has a 504 of its own."""
+    """Returns true if the error means that the service is away. A 504 for an overlong job does not."""
     if isinstance(error, Problem):
         return error.status in _AWAY and error.slug != "deadline-exceeded"
     return True
 
 
 def _jobs(response: httpx.Response) -> Iterator[tuple[str, Job]]:
-    """Reads server-sent events; what is no event is a comment that keeps the connection open."""
+    """Reads server-sent events. Skips comments, which only keep the connection open."""
     name = ""
     for line in response.iter_lines():
         field, _, value = line.partition(": ")

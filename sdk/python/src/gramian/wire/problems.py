@@ -14,10 +14,10 @@ T = TypeVar("T")
 
 
 class Problem(Exception):
-    """A request was refused, or could not be answered.
+    """Raised when a request is refused or cannot be answered.
 
-    Carries the problem document (RFC 9457) that the service answered with; where a proxy or another service answered,
-    one with the type `about:blank`. `str()` of it has what happened, where, and the remedy where there is one.
+    Carries the problem document (RFC 9457) of the service. If a proxy or another service answered, the
+    document has the type `about:blank`. `str()` says what happened, where, and the remedy if there is one.
 
     Examples
     --------
@@ -37,18 +37,18 @@ class Problem(Exception):
 
     def __str__(self) -> str:
         lines = [f"{self.status} {self.slug}: {self.detail}"]
-        # A single field usually repeats the detail of the problem: then only its place is news.
+        # A single field usually repeats the detail of the problem. Then only its place is shown.
         lines += [
             f"  at {error.pointer}" + ("" if error.detail == self.detail else f": {error.detail}")
             for error in self.errors
         ]
         if self.request_id:
             lines.append(f"  request {self.request_id}")
-        return "\n".join(dict.fromkeys(lines))  # points of a cloud that was given by id share a pointer
+        return "\n".join(dict.fromkeys(lines))  # points of a cloud given by id share a pointer
 
     @property
     def slug(self) -> str:
-        """The kind of problem, such as `invalid-request`; the service explains it at `/problems/<slug>`."""
+        """The kind of problem, such as `invalid-request`. The service explains it at `/problems/<slug>`."""
         return self.document.type_.rpartition("/")[2]
 
     @property
@@ -63,17 +63,17 @@ class Problem(Exception):
 
     @property
     def detail(self) -> str:
-        """What happened, where, and the remedy where there is one."""
+        """The explanation: what happened, where, and the remedy if there is one."""
         return self.document.detail
 
     @property
     def errors(self) -> tuple[FieldError, ...]:
-        """The fields that were refused, each with `pointer` and `detail`."""
+        """The refused fields, each with `pointer` and `detail`."""
         return tuple(self.document.errors or ())
 
     @property
     def pointer(self) -> str | None:
-        """The first of these fields, as JSON pointer into the request: `/cloud/points/17/2`."""
+        """The first refused field, as JSON pointer into the request: `/cloud/points/17/2`."""
         return self.errors[0].pointer if self.errors else None
 
     @property
@@ -83,7 +83,7 @@ class Problem(Exception):
 
     @property
     def point_indices(self) -> tuple[int, ...]:
-        """The points in question, by position in the cloud; at most the first 1,000."""
+        """The points in question, by position in the cloud. At most the first 1,000."""
         return tuple(self.document.point_indices or ())
 
     @property
@@ -93,7 +93,7 @@ class Problem(Exception):
 
     @property
     def required(self) -> int | None:
-        """What the request would have needed, in the same unit."""
+        """The size that the request would have needed, in the unit of `limit`."""
         return _given(self.document.required)
 
     @property
@@ -103,15 +103,21 @@ class Problem(Exception):
 
 
 class UnknownCloud(Problem):
-    """The service has no such cloud (any more), and the points are not at hand, or were forgotten at once again."""
+    """Raised when the service does not know the cloud, or no longer.
+
+    The points are not available here, or the service forgot them again at once.
+    """
 
 
 class NotPositiveDefinite(Problem):
-    """The matrix K + αI is too close to singular for what was asked; `minimum_alpha` may say which `alpha` helps."""
+    """Raised when K + αI is too close to singular for the request.
+
+    `minimum_alpha` may say which `alpha` helps.
+    """
 
 
 class Overloaded(Problem):
-    """The service had no place (503), or not so soon again (429), for longer than the client was ready to wait."""
+    """Raised when the service is full (503) or limits the rate (429) for longer than `max_wait`."""
 
 
 _KINDS: dict[str, type[Problem]] = {
@@ -119,17 +125,17 @@ _KINDS: dict[str, type[Problem]] = {
     "not-positive-definite": NotPositiveDefinite,
 }
 MAX_QUOTED = 200
-"""How many bytes of a page are repeated."""
+"""Number of bytes of a foreign page that are quoted."""
 
 _OVERLOADED = (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE)
 TRY_LATER = (*_OVERLOADED, httpx.codes.BAD_GATEWAY)
-"""The statuses after which the same request may succeed; 502 is that of a proxy, which lost its connection."""
+"""Statuses after which the same request may succeed. 502 comes from a proxy that lost its connection."""
 
 
 def problem_of(response: httpx.Response, retry_after: float | None = None) -> Problem:
     """Returns the exception for an answer that is no success."""
     document = _document(response)
-    # By the status, since a proxy on the way says so without a document.
+    # The status decides, since a proxy may answer without a document.
     if response.status_code in _OVERLOADED:
         return Overloaded(document, retry_after)
     kind = _KINDS.get(document.type_.rpartition("/")[2], Problem)
@@ -137,7 +143,7 @@ def problem_of(response: httpx.Response, retry_after: float | None = None) -> Pr
 
 
 def unreadable(response: httpx.Response, error: Exception) -> Problem:
-    """Returns the exception for a success that cannot be read: another service answered, or a part is lost."""
+    """Returns the exception for an unreadable success: another service answered, or a part is lost."""
     media_type = response.headers.get("Content-Type", "no Content-Type")
     detail = (
         f"{response.url.copy_with(query=None)} answered {response.status_code}, but not as gramian does ({media_type}, "
@@ -147,11 +153,11 @@ def unreadable(response: httpx.Response, error: Exception) -> Problem:
 
 
 UNREADABLE = (AttributeError, LookupError, RecursionError, TypeError, ValueError)
-"""What reading a document raises that is another one than it should be."""
+"""Exceptions raised by reading a document of an unexpected form."""
 
 
 def _document(response: httpx.Response) -> models.Problem:
-    """Reads the document, or writes one for what others answer, such as a proxy with a page in HTML."""
+    """Reads the problem document, or makes one for a foreign answer, such as a proxy's page in HTML."""
     try:
         document = models.Problem.from_dict(response.json())
         for text in (document.type_, document.title, document.detail, document.instance):
@@ -166,7 +172,7 @@ def _document(response: httpx.Response) -> models.Problem:
 
 
 def _written(response: httpx.Response, title: str, detail: str) -> models.Problem:
-    """Writes a document where the service has not."""
+    """Makes a problem document where the service has sent none."""
     return models.Problem(
         type_="about:blank",
         title=title,

@@ -1,4 +1,4 @@
-"""Who is shown how far a job is."""
+"""Displays of the progress of a job."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from ..rest.models import Job
 
 
 class Progress(Protocol):
-    """Is told how far a job is, until it is closed."""
+    """A display of the progress of a job."""
 
     def __call__(self, job: Job) -> object:
-        """Takes the job as it is now."""
+        """Shows the current state of the job."""
 
     def close(self) -> object:
-        """Says that there is no more to tell."""
+        """Ends the display."""
 
 
 class Bar:
@@ -27,7 +27,7 @@ class Bar:
         Raises
         ------
         ImportError
-            Without tqdm: the extra `progress` of this package has it.
+            If tqdm is not installed. The extra `progress` of this package installs it.
         """
         from tqdm.auto import tqdm
 
@@ -35,7 +35,7 @@ class Bar:
         self._bar = tqdm(desc=name, total=1.0, bar_format=layout)
 
     def __call__(self, job: Job) -> None:
-        """Moves on, and says what is being done."""
+        """Advances the bar, and shows the current stage."""
         progress = job.progress
         self._bar.n = max(self._bar.n, progress.fraction)
         parts = [progress.stage]
@@ -46,20 +46,20 @@ class Bar:
         self._bar.set_postfix_str(", ".join(parts))
 
     def close(self) -> None:
-        """Leaves the bar as it is."""
+        """Ends the bar, and leaves it visible."""
         self._bar.close()
 
 
 class Told:
-    """A function that is told."""
+    """A display that passes each state of the job to a function."""
 
     def __init__(self, function: Callable[[Job], object]) -> None:
         """Takes the function."""
         self._function = function
 
     def __call__(self, job: Job) -> None:
-        """Tells it."""
+        """Calls the function with the current state of the job."""
         self._function(job)
 
     def close(self) -> None:
-        """Has nothing to close."""
+        """Does nothing."""

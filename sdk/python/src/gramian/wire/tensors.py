@@ -1,8 +1,11 @@
-"""Requests and answers as bytes: safetensors, or JSON where that package is absent or a request has no arrays.
+"""Encoding of requests and decoding of answers, in safetensors or JSON.
 
-In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`), and all
-other fields are JSON text in the metadata entry `request`; an answer has the entry `response`, and NaN where JSON has
-null. Both ways numbers are float64 and keep every bit; the integers of sparse matrices are int64.
+JSON is used where the package safetensors is absent or a request has no arrays.
+
+In safetensors the arrays of a request are tensors, named by their path in the JSON document (`cloud.points`).
+All other fields are JSON text in the metadata entry `request`. An answer has the entry `response`, and NaN
+where JSON has null. In both formats numbers are float64 and keep every bit. The integers of sparse matrices
+are int64.
 """
 
 from __future__ import annotations
@@ -28,15 +31,15 @@ Array: TypeAlias = npt.NDArray[np.float64]
 """Numbers in float64, little-endian, row major."""
 
 Integers: TypeAlias = npt.NDArray[np.int64]
-"""Whole numbers, those of sparse matrices."""
+"""Whole numbers of sparse matrices."""
 
 Format: TypeAlias = Literal["safetensors", "json"]
-"""How arrays travel."""
+"""Format of arrays in transit."""
 
 T = TypeVar("T", bound=np.generic)
 
 DTYPES = {"F64": "<f8", "I64": "<i8"}
-"""What answers have in tensors: numbers, and where those of sparse matrices stand."""
+"""Types of tensors in answers: F64 for numbers, I64 for the positions of entries of sparse matrices."""
 
 JSON = "application/json"
 SAFETENSORS = "application/x-safetensors"
@@ -49,19 +52,20 @@ def available_format() -> Format:
 
 
 def encode(request: Mapping[str, object], format: Format) -> tuple[bytes, str]:  # noqa: A002
-    """Returns the body of a request, a JSON document with arrays in it, and its media type.
+    """Returns the body of a request, a JSON document that contains arrays, and its media type.
 
     Raises
     ------
     ModuleNotFoundError
-        If safetensors is asked for and not installed.
+        If safetensors is requested and not installed.
     """
     if format == "safetensors" and save_safetensors is None:
         raise ModuleNotFoundError(
             "safetensors is not installed: pip install 'gramian[safetensors]'", name="safetensors"
         )
     tensors, fields = _split(request)
-    if format == "json" or save_safetensors is None or not tensors:  # safetensors 0.4.3 cannot write a file without
+    # safetensors 0.4.3 cannot write a file without tensors.
+    if format == "json" or save_safetensors is None or not tensors:
         return json.dumps(request, default=_plain, allow_nan=False).encode(), JSON
     return save_safetensors(tensors, metadata={"request": json.dumps(fields, allow_nan=False)}), SAFETENSORS
 
@@ -73,7 +77,7 @@ def _plain(value: object) -> object:
 
 
 def _split(request: Mapping[str, object], path: str = "") -> tuple[dict[str, Array], dict[str, object]]:
-    """Takes the arrays out, under their paths; the rest stays as it is."""
+    """Splits a request into its arrays, by path, and all other fields."""
     tensors: dict[str, Array] = {}
     fields: dict[str, object] = {}
     for name, value in request.items():
@@ -89,16 +93,16 @@ def _split(request: Mapping[str, object], path: str = "") -> tuple[dict[str, Arr
 
 @dataclass(frozen=True)
 class Members:
-    """The members of an answer, however it was written."""
+    """The members of an answer, in either format."""
 
     tensors: Mapping[str, npt.NDArray[Any]]
     fields: Mapping[str, Any]
     request: Mapping[str, Any]
-    """What was asked."""
+    """The request that was answered."""
 
     @property
     def diagnostics(self) -> Diagnostics:
-        """How the answer came about."""
+        """The diagnostics of the answer."""
         return Diagnostics.from_dict(self.fields["diagnostics"])
 
     @property
@@ -113,7 +117,7 @@ class Members:
         return _frozen(_filled(self.fields[name], entry))
 
     def arrays(self, name: str, *entry: int) -> Array:
-        """Returns a stack of such arrays."""
+        """Returns a list of arrays as one array, with entries of the shape `entry`, NaN for null."""
         if name in self.tensors:
             return self.tensors[name]
         return _frozen(np.stack([_filled(rows, entry) for rows in self.fields[name]]))
@@ -142,7 +146,7 @@ class Members:
 
 
 def decode(response: httpx.Response, request: Mapping[str, object]) -> Members:
-    """Reads the answer to a request in the format that it announces; tensors are views of its bytes."""
+    """Reads the answer to a request, in the format that it announces. Tensors are views of its bytes."""
     if not response.headers.get("Content-Type", "").startswith(SAFETENSORS):
         return Members({}, response.json(), request)
     body = response.content
@@ -162,7 +166,7 @@ def _view(body: bytes, start: int, tensor: Mapping[str, Any]) -> npt.NDArray[Any
 
 
 def _filled(rows: Sequence[Any], entry: tuple[int, ...]) -> Array:
-    """Returns the rows as an array; it needs their shape, since all of them may be null."""
+    """Returns the rows as an array. `entry` is the shape of a row, since all rows may be null."""
     array = np.full((len(rows), *entry), np.nan)
     present = [row for row, numbers in enumerate(rows) if numbers is not None]
     if present:

@@ -1,4 +1,4 @@
-"""The one place that sends requests: retries, and problems as exceptions."""
+"""Sending of requests, with retries, and with problems as exceptions."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ from .problems import TRY_LATER, problem_of
 T = TypeVar("T")
 
 BACKOFF_SECONDS = 0.1
-"""The first wait where the service does not say how long; doubled from one attempt to the next."""
+"""First wait if the service does not say how long to wait. Doubled from one attempt to the next."""
 
 CLOUD_HEADER = "Gramian-Cloud"
-"""Names the cloud that a request is about to proxies: the replica that it is always sent to has what was computed."""
+"""Header that names the cloud of a request for proxies.
 
-# Every operation of the service may be repeated: clouds are named by their content, all else computes or deletes, and
-# requests for jobs have a key by which the service knows them again.
-# Reading past the timeout is not among these, since the service is then busy with the first request still.
+They always send it to the same replica, which has the results already computed.
+"""
+
+# Errors after which a request is repeated. Every operation of the service may be repeated: clouds are named
+# by their content, all else computes or deletes, and requests for jobs have an idempotency key. A read
+# timeout is not among these errors, since the service is then still busy with the first request.
 _LOST_CONNECTION = (
     httpx.ConnectError,
     httpx.ConnectTimeout,
@@ -35,15 +38,15 @@ _LOST_CONNECTION = (
 
 
 _RETRIES = "gramian.retries"
-"""The extension of a request that has a number of repetitions of its own."""
+"""Name of the request extension that holds a number of repetitions for that request alone."""
 
 
 class RetryingClient(httpx.Client):
-    """An HTTP client that tries again after 429, 502, 503 and lost connections.
+    """An HTTP client that repeats requests after 429, 502, 503 and lost connections.
 
-    Waits as long as `Retry-After` says, and not at all if that would exceed `max_wait` seconds for all waits of a
-    request together: the caller should know at once. Then, and after `retries` repetitions, the answer is returned as
-    it is.
+    It waits as long as `Retry-After` says. If all waits of a request together would exceed `max_wait`
+    seconds, it does not wait at all, so that the caller learns at once. Then, and after `retries`
+    repetitions, it returns the answer unchanged.
     """
 
     def __init__(
@@ -57,20 +60,20 @@ class RetryingClient(httpx.Client):
         """Takes the bounds, the function that waits, and the options of `httpx.Client`."""
         super().__init__(**options)
         self._retries = retries
-        self._max_wait = min(max_wait, TIMEOUT_MAX)  # nobody can sleep longer
+        self._max_wait = min(max_wait, TIMEOUT_MAX)  # a thread cannot sleep longer
         self._sleep = sleep
         self._process = os.getpid()
 
     def __del__(self) -> None:
-        # Five lines of a notebook close nothing. Without this, sockets would warn when they are collected.
+        # Short scripts and notebooks close nothing. Without this, sockets would warn when they are collected.
         if not getattr(self, "is_closed", True):
             self.close()
 
     def send(self, request: httpx.Request, **options: Any) -> httpx.Response:  # noqa: ANN401 (those of httpx.Client.send)
-        """Sends a request, again if need be."""
+        """Sends a request, and repeats it if necessary."""
         if os.getpid() != self._process:  # both would read from one socket, and get each other's answers
             raise RuntimeError("a Client cannot be used after a fork: every process makes its own")
-        request.read()  # a body that is read from a file can be sent once only
+        request.read()  # a body that is read from a file could be sent only once
         waited = 0.0
         for attempt in range(request.extensions.get(_RETRIES, self._retries)):
             backoff = BACKOFF_SECONDS * 2**attempt
@@ -93,7 +96,7 @@ class RetryingClient(httpx.Client):
 
 
 def retry_after(response: httpx.Response) -> float | None:
-    """Returns the seconds that `Retry-After` asks to wait, given as seconds or as date; None without the header."""
+    """Returns the seconds to wait by `Retry-After`, a number or a date. None without the header."""
     text = response.headers.get("Retry-After", "").strip()
     if text.isdecimal():
         return float(text)
@@ -101,7 +104,7 @@ def retry_after(response: httpx.Response) -> float | None:
         date = parsedate_to_datetime(text)
     except ValueError:
         return None
-    if date.tzinfo is None:  # "-0000" says: in UTC, of an unknown place
+    if date.tzinfo is None:  # "-0000" means UTC from an unknown place
         date = date.replace(tzinfo=UTC)
     return max(0.0, (date - datetime.now(UTC)).total_seconds())
 
@@ -111,7 +114,7 @@ def _or(value: float | None, default: float) -> float:
 
 
 class Transport:
-    """A service at an address. May be shared by threads."""
+    """A service at an address. Threads may share it."""
 
     def __init__(self, http: httpx.Client) -> None:
         """Takes the HTTP client, whose base URL is the service."""
@@ -125,7 +128,7 @@ class Transport:
         Problem
             If the answer is a refusal, or the redirection of a proxy.
         httpx.TransportError
-            If there is none.
+            If there is no answer.
         """
         try:
             response = self.http.request(method, path, **options)
@@ -137,21 +140,21 @@ class Transport:
         return response
 
     def delete(self, path: str, headers: dict[str, str], seconds: float) -> bool:
-        """Deletes in one attempt, since nobody is to wait for what is not wanted; says whether it is gone."""
+        """Deletes a resource in one attempt, as no caller should wait. Returns true if it is gone."""
         try:
             response = self.http.delete(path, headers=headers, timeout=seconds, extensions={_RETRIES: 0})
-        except Exception:  # whatever it was, such as a closed client, what led here matters more
+        except Exception:  # any error, such as a closed client, matters less than the one that led here
             return False
         return response.is_success or response.status_code == httpx.codes.NOT_FOUND
 
 
 def about(cloud_id: str | None) -> dict[str, str]:
-    """Returns the headers of a request about a cloud, if its id is known."""
+    """Returns the headers of a request about a cloud. Empty if its id is not known."""
     return {} if cloud_id is None else {CLOUD_HEADER: cloud_id}
 
 
 def _advice(error: httpx.TransportError, url: httpx.URL) -> str:
-    """Says what to look at where there is no answer."""
+    """Returns advice on what to check if there is no answer."""
     if isinstance(error, httpx.ReadTimeout):
         return f"{url} has not answered in time, see Client(timeout=…)."
     return f"There is no answer from {url}, see Client(base_url=…) or GRAMIAN_URL."
