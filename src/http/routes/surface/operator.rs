@@ -19,14 +19,15 @@ use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::clouds::RegisteredCloud;
 use gramian_numerics::function::moving::Moving;
+use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::Report;
-use gramian_numerics::model::price::{OperatorAsked, Sizes, operator_price};
+use gramian_numerics::model::price::{OperatorAsked, operator_price};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::neighbours::Neighbours;
-use gramian_numerics::points::sampling::Sampling;
+use gramian_numerics::points::sampling::{Sampling, sampling_price};
 use gramian_numerics::selection::learning_price;
-use gramian_numerics::solver::choose::{Asked, n_entries_per_row, sampling_bytes, work_price};
 use gramian_numerics::surface::geometry::GeometryRequest;
+use gramian_numerics::surface::operators::price::{matrix_price, n_entries_per_row, stencils_price};
 use gramian_numerics::surface::operators::{Judged, Kriged, OfKriged, Operator, SparseMatrix};
 
 /// A checked request to apply an operator to values.
