@@ -1,6 +1,7 @@
-//! The bytes that the stores count against those that the process takes, with the allocator of the server.
+//! Test that the bytes counted by the stores are those that the process takes, with the allocator of the
+//! server.
 //!
-//! One test alone in its process: the resident set is everybody's.
+//! It is the only test of its process, because all tests of a process share the resident set.
 
 #[path = "../numerics/tests/common/mod.rs"]
 mod common;
@@ -30,10 +31,10 @@ use crate::common::fits;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// How far the count may be from the resident set.
+/// Largest relative difference between the count and the resident set.
 const TOLERANCE: f64 = 0.05;
 
-/// Enough for every store here: nothing is evicted.
+/// Budget that is large enough for every store here, so that nothing is evicted.
 const BUDGET: usize = 1 << 34;
 
 const OWNER: Owner = Owner(0);
@@ -67,14 +68,17 @@ async fn what_the_stores_count_is_what_they_take() {
     for (name, counted, resident) in measurements {
         let ratio = counted / resident;
         println!("{name}: counted {counted:.1} MB, resident {resident:.1} MB, {ratio:.3}");
-        // Where huge pages are switched off, what was never written is not resident: the count is an upper bound.
+        // Where huge pages are off, pages that were never written are not resident. Then the count is an
+        // upper bound.
         let highest = if huge_pages_are_off() { f64::INFINITY } else { 1.0 + TOLERANCE };
         assert!((1.0 - TOLERANCE..=highest).contains(&ratio), "{name}: {counted:.1} MB of {resident:.1} MB");
     }
 }
 
-/// By how many megabytes a store and the resident set grow over the last two thirds of `n` entries. The first third pays what
-/// is paid once: threads, their scratch space, and the pages that the allocator has begun for every size of block.
+/// Measures by how many megabytes a store and the resident set grow over the last two thirds of `n` entries.
+///
+/// The first third bears the costs that arise once: threads, their scratch space, and the pages that the
+/// allocator begins for every block size.
 async fn growth<S>(
     name: &'static str,
     store: S,
@@ -90,7 +94,7 @@ async fn growth<S>(
         keep(&store, k).await;
     }
     let growth = (name, (n_bytes(&store) as f64 - counted) / 1e6, (resident_bytes() - resident) / 1e6);
-    // The next store must not find its memory.
+    // The store is leaked, so that the next one cannot reuse its memory.
     std::mem::forget(store);
     growth
 }
@@ -113,7 +117,7 @@ async fn keep_weights(store: &Factors, k: usize) {
 }
 
 async fn keep_cloud(store: &Clouds, n: usize, k: usize) {
-    // As a parser leaves them: grown by doubling.
+    // A parser leaves coordinates like this, grown by doubling.
     let mut coordinates = Vec::new();
     (0..3 * n).for_each(|i| coordinates.push((k * 7 + i) as f64));
     let (stored, is_new) = store.register(OWNER, Cloud::new(coordinates, 3).unwrap(), None);
@@ -146,7 +150,7 @@ async fn keep_factor(store: &Factors, n: usize, k: usize, with_surface: bool) {
     }
 }
 
-/// A kernel of its own for every k, so that no fit is like another.
+/// Returns a different kernel for every k, so that no two fits are equal.
 fn kernel(k: usize) -> Kernel {
     Kernel::new(Family::Matern { order: 2 }, 0.3 + 1e-6 * k as f64, 1.0).unwrap()
 }

@@ -1,9 +1,54 @@
-//! The numerical heart: f64 in, f64 out.
+//! Geometric kernel interpolation and regression on point clouds, after Guidotti: f64 in, f64 out.
 //!
-//! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the calling
-//! thread; stages and cancellation pass through an [`observer::Observer`].
+//! A cloud of n points, a [`kernel::Kernel`] and a [`sums::regularization::Regularization`] α make a
+//! [`solver::System`], K + αI. A [`solver::Solver`] factorizes it once. Functions through values, their variances,
+//! and the surface that the points sample are then solves and sums:
 //!
-//! The rooms, each of which knows those before it: `machine`, `points`, `kernel`, `patches`, `sums`, `solver`, `selection`, `function`, `surface`, `model`.
+//! ```
+//! use std::sync::Arc;
+//!
+//! use gramian_numerics::function::interpolant::Interpolant;
+//! use gramian_numerics::kernel::{Family, Kernel};
+//! use gramian_numerics::observer::Unobserved;
+//! use gramian_numerics::points::cloud::Cloud;
+//! use gramian_numerics::solver::{Solver, System};
+//! use gramian_numerics::sums::jets::JetOrder;
+//! use gramian_numerics::sums::regularization::Regularization;
+//! use gramian_numerics::surface::Surface;
+//! use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
+//!
+//! // 200 points of a circle of radius 2, and the values x at them.
+//! let angles = (0..200).map(|i| std::f64::consts::TAU * f64::from(i) / 200.0);
+//! let points: Vec<f64> = angles.flat_map(|t| [2.0 * t.cos(), 2.0 * t.sin()]).collect();
+//! let values: Vec<f64> = points.chunks(2).map(|point| point[0]).collect();
+//! let cloud = Arc::new(Cloud::new(points, 2)?);
+//!
+//! // One factorization serves all that follows.
+//! let kernel = Kernel::new(Family::Matern { order: 4 }, 2.0, 1.0)?;
+//! let system = System::new(cloud.clone(), kernel, Regularization::uniform(1e-10)?)?;
+//! let solver = Arc::new(Solver::dense(system, &Unobserved)?);
+//!
+//! // A function through the values, at a query.
+//! let function = Interpolant::fit(solver.clone(), &values, &Unobserved)?;
+//! let at = Cloud::new(vec![0.0, 2.0], 2)?;
+//! let jets = function.at(&at, JetOrder::Gradient, &Unobserved)?;
+//! assert!(jets.values()[0].abs() < 1e-6);
+//!
+//! // The surface is the level set of the function through the constant 1. A circle of radius 2 has curvature 1/2.
+//! let signature = Interpolant::signature(solver, &Unobserved)?;
+//! let surface = Surface::of(signature, None, &Unobserved)?;
+//! let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved)?;
+//! let curvatures = geometry.curvatures(&Unobserved)?;
+//! assert!(curvatures.mean.iter().all(|mean| (mean - 0.5).abs() < 1e-3));
+//! # Ok::<(), gramian_numerics::error::NumericsError>(())
+//! ```
+//!
+//! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the
+//! calling thread. An [`observer::Observer`] is told of stages, and may cancel. Errors name their cause and the
+//! offending point ([`error::NumericsError`]).
+//!
+//! The rooms, each of which knows those before it: [`machine`], [`points`], [`kernel`], [`patches`], [`sums`],
+//! [`solver`], [`selection`], [`function`], [`surface`], [`model`].
 
 // A request must never bring a thread down; tests may.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]

@@ -1,4 +1,4 @@
-//! Names of clouds, factorizations and values, from canonical bytes.
+//! Keys of clouds, factorizations and values: hashes of canonical bytes.
 
 use std::fmt;
 
@@ -10,13 +10,15 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 
-/// BLAKE3 of d and n as u64 little-endian, the points row major as f64 little-endian (−0.0 as 0.0), then the normals
-/// likewise if given; written as 64 hexadecimal digits.
+/// Id of a cloud: a BLAKE3 hash, written as 64 hexadecimal digits.
+///
+/// The hash covers d and n as u64 little-endian, then the points row major as f64 little-endian (−0.0 as
+/// 0.0). Normals follow in the same form, if given.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CloudId([u8; 32]);
 
 impl CloudId {
-    /// Names a cloud; normals, if any, are `[n, d]`.
+    /// Computes the id of a cloud. Normals, if any, are `[n, d]`.
     pub fn of(cloud: &Cloud, normals: Option<&Cloud>) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&(cloud.dimension() as u64).to_le_bytes());
@@ -28,7 +30,7 @@ impl CloudId {
         Self(hasher.finalize().into())
     }
 
-    /// Reads 64 lower-case hexadecimal digits.
+    /// Parses 64 lower-case hexadecimal digits.
     pub fn parse(text: &str) -> Option<Self> {
         let is_digit = |c: u8| matches!(c, b'0'..=b'9' | b'a'..=b'f');
         if text.len() != 64 || !text.bytes().all(is_digit) {
@@ -50,22 +52,22 @@ impl fmt::Debug for CloudId {
     }
 }
 
-/// Everything a factorization depends on.
+/// Key of a factorization. It covers everything that the factorization depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct FitKey {
     pub owner: Owner,
     pub cloud_id: CloudId,
-    /// BLAKE3 of kernel, regularization, solver and whether duplicates were merged.
+    /// BLAKE3 hash of kernel, regularization, solver and whether duplicates were merged.
     fit: [u8; 32],
 }
 
 impl FitKey {
-    /// What the factorization depends on beside its cloud, 64 hexadecimal digits.
+    /// Returns the key without owner and cloud, as 64 hexadecimal digits.
     pub fn fit_name(&self) -> String {
         blake3::Hash::from(self.fit).to_string()
     }
 
-    /// Names what a recipe makes of a cloud (with duplicates merged or not).
+    /// Computes the key of the model that a recipe makes of a cloud, with duplicates merged or not.
     pub fn of(owner: Owner, cloud_id: CloudId, recipe: &Recipe, is_merged: bool) -> Self {
         let mut hasher = blake3::Hasher::new();
         if recipe.solver() == SolverKind::Local {
@@ -83,7 +85,7 @@ impl FitKey {
     }
 }
 
-/// BLAKE3 of the values of a fit.
+/// BLAKE3 hash of the values of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ValuesKey([u8; 32]);
 
@@ -92,7 +94,7 @@ impl ValuesKey {
         Self::with_mean(values, Mean::Zero)
     }
 
-    /// Values that are fitted by a function with a mean.
+    /// Computes the key of values that are fitted by a function with a mean.
     pub fn with_mean(values: &[f64], mean: Mean) -> Self {
         let mut hasher = blake3::Hasher::new();
         update_with_floats(&mut hasher, values);
@@ -108,7 +110,8 @@ impl ValuesKey {
         Self(hasher.finalize().into())
     }
 
-    /// These values with what is known beforehand of what would be learned from them: the kernel; the noise.
+    /// Extends the key by the given kernel and noise, on which the results of learning from the values
+    /// depend.
     pub fn given(self, kernel: Option<GivenKernel<'_>>, regularization: Option<&Regularization>) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&self.0);
@@ -132,11 +135,11 @@ impl ValuesKey {
     }
 }
 
-/// As much of a kernel as a request gives.
+/// Part of a kernel that a request gives.
 #[derive(Debug, Clone, Copy)]
 pub enum GivenKernel<'a> {
     Whole(&'a Kernel),
-    /// Family and variance: the length scale that the cloud gives is the same whenever it is asked for.
+    /// Family and variance. The length scale follows from the cloud, so it is always the same.
     OfCloud(Family, f64),
 }
 
@@ -163,7 +166,8 @@ fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regu
     }
 }
 
-/// Bytes go through a stack buffer: hashing number by number costs more than the hash.
+/// Adds numbers to a hash. Bytes go through a stack buffer, because hashing number by number costs more than
+/// the hash.
 fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
     let mut bytes = [0u8; 4096];
     for chunk in numbers.chunks(bytes.len() / 8) {

@@ -1,4 +1,4 @@
-//! What fits are served from, and the weights solved with it.
+//! Cache of the models and surfaces that fits are served from, and of the weights solved with them.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
@@ -15,23 +15,26 @@ use gramian_numerics::model::Model;
 use gramian_numerics::solver::{Solution, Solver};
 use gramian_numerics::surface::Surface;
 
-/// The share of the cache that weights may take: they are n numbers beside the n² of a dense solver.
+/// Divisor of the cache size that gives the share of weights: they are n numbers beside the n² of a dense
+/// solver.
 const WEIGHTS_SHARE: usize = 16;
 
-/// What a fit is served from, with the surface of its cloud, once that was asked for, and the time it took. It holds the memory
-/// that it was made in for as long as anybody holds it, kept or not.
+/// A model, the surface of its cloud once that was needed, and the time to make the model.
+///
+/// It holds its reserved memory for as long as anything refers to it, cached or not.
 pub struct PreparedFit {
     model: Model,
     pub gram_time: Duration,
     pub factor_time: Duration,
-    /// It was read, not made.
+    /// Whether the model was read from the store, not made.
     is_restored: bool,
     surface: OnceLock<PreparedSurface>,
     memory: Arc<Reservation>,
 }
 
-/// A surface with the memory that it takes, and that of the solver which it was made from: it may be that of an equal one
-/// which was let go since.
+/// A surface with its reserved memory, and that of the solver from which it was made.
+///
+/// That solver may be an equal one that was evicted since.
 #[derive(Clone)]
 struct PreparedSurface {
     surface: Arc<Surface>,
@@ -40,24 +43,24 @@ struct PreparedSurface {
 }
 
 impl PreparedFit {
-    /// A model that was made in this memory, of which goes back what it does not take.
+    /// Wraps a model that was made in `memory`. Memory that the model does not need goes back.
     pub fn new(model: Model, gram_time: Duration, factor_time: Duration, mut memory: Reservation) -> Self {
         memory.shrink_to(model.n_bytes());
         let (surface, memory) = (OnceLock::new(), Arc::new(memory));
         Self { model, gram_time, factor_time, is_restored: false, surface, memory }
     }
 
-    /// A model that took no time: made without work, or read again.
+    /// Wraps a model that took no time: made without work, or read from the store.
     pub fn at_once(model: Model, memory: Reservation) -> Self {
         Self::new(model, Duration::ZERO, Duration::ZERO, memory)
     }
 
-    /// A model that was made before, and read again.
+    /// Wraps a model that was made before and read from the store.
     pub fn restored(model: Model, memory: Reservation) -> Self {
         Self { is_restored: true, ..Self::at_once(model, memory) }
     }
 
-    /// Whether it was read, not made.
+    /// Returns whether the model was read from the store, not made.
     pub fn is_restored(&self) -> bool {
         self.is_restored
     }
@@ -71,50 +74,51 @@ impl PreparedFit {
         if self.is_restored { "restored" } else { self.model.name() }
     }
 
-    /// The surface of the signature function, once it was asked for.
+    /// Returns the surface, once it was made.
     pub fn surface(&self) -> Option<Arc<Surface>> {
         self.surface.get().map(|stored| stored.surface.clone())
     }
 
-    /// Bytes held on the heap, those of the surface once there is one.
+    /// Bytes held on the heap, including those of the surface once there is one.
     fn n_bytes(&self) -> usize {
         let own = block_bytes(arc_payload::<Self>()) + block_bytes(arc_payload::<Solver>());
         own + self.model.n_bytes() + self.surface().map_or(0, |surface| surface.n_bytes())
     }
 
-    /// Bytes that are given back when it is dropped.
+    /// Bytes that are given back when the fit is dropped.
     fn n_reserved(&self) -> usize {
         self.memory.n_bytes() + self.surface.get().map_or(0, |stored| stored.memory.n_bytes())
     }
 }
 
-/// Where what is prepared came from, in the terms of RFC 9211.
+/// Origin of a model, in the terms of RFC 9211.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CacheOutcome {
     Hit,
     /// Computed for another request at the same time.
     Collapsed,
-    /// Computed for this request and kept.
+    /// Computed for this request and cached.
     Stored,
-    /// Computed for this request, larger than the whole cache.
+    /// Computed for this request, but larger than the whole cache.
     NotStored,
 }
 
-/// Bytes that a [`PreparedStore`] may take.
+/// Byte limits of a [`PreparedStore`].
 #[derive(Debug, Clone, Copy)]
 pub struct PreparedBytes {
-    /// What solvers, surfaces and weights that are kept may take.
+    /// Largest size of cached solvers, surfaces and weights.
     pub kept: usize,
-    /// What is kept for the next factorization, beside the budget.
+    /// Largest size of the buffer that is kept for the next factorization, besides the budget.
     pub spare: usize,
-    /// What everything that is made here may take, kept or in use.
+    /// Largest size of everything that is made here, cached or in use.
     pub budget: usize,
-    /// Owners who share it.
+    /// Number of owners who share the budget.
     pub n_owners: usize,
 }
 
-/// What is prepared, and weights, within one byte budget, that of the work that is done with them included. `E` is what a
-/// computation may fail with.
+/// Cache of models, surfaces and weights within one byte budget. The budget includes the work done with them.
+///
+/// `E` is the error of a computation.
 pub struct PreparedStore<E> {
     fits: Arc<FairCache<FitKey, Arc<PreparedFit>>>,
     solutions: FairCache<(FitKey, ValuesKey), Arc<KeptSolution>>,
@@ -142,22 +146,24 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         }
     }
 
-    /// Bytes that one owner may have for work at most.
+    /// Largest number of bytes for work that one owner may have.
     pub fn memory(&self) -> usize {
         self.budget.largest()
     }
 
-    /// The memory of solvers that were let go.
+    /// Returns the buffer that recycles the memory of evicted solvers.
     pub fn spare(&self) -> &Arc<SpareBuffer> {
         &self.spare
     }
 
-    /// Waits for so many bytes of memory for work, as long as they are wanted; what is kept here and not in use makes room for
-    /// it. `None` if they are not wanted any more: before anything is let go it is asked whether that is what was waited
-    /// for. Whoever waits must hold no other memory of this store, nor wait for anybody who does.
+    /// Waits for `n_bytes` bytes of memory for work, as long as they are wanted.
+    ///
+    /// Cached entries that are not in use make room. Before anything is evicted, `is_wanted` is asked again.
+    /// Returns `None` once it is false. A caller that waits must hold no other memory of this store, nor wait
+    /// for anybody who does.
     ///
     /// # Errors
-    /// [`BeyondBudget`] if there will never be so many.
+    /// Returns [`BeyondBudget`] if the budget can never hold so many.
     pub async fn reserve(
         &self,
         owner: Owner,
@@ -176,17 +182,20 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         self.budget.reserve(owner, n_bytes, look).await
     }
 
-    /// So many bytes of memory for work, if they are to be had without waiting and without letting go of anything.
+    /// Reserves memory for work if it is free, without waiting and without eviction.
     pub fn try_reserve(&self, owner: Owner, n_bytes: usize) -> Option<Reservation> {
         self.budget.try_reserve(owner, n_bytes)
     }
 
-    /// What is prepared for `key`, if it is kept.
+    /// Returns the fit for `key`, if it is cached.
     pub fn get(&self, key: FitKey) -> Option<Arc<PreparedFit>> {
         self.fits.get(key.owner, &key)
     }
 
-    /// Lets go of the least recently used: first of the owner's own, where the owner is over the share, then of whoever has most.
+    /// Evicts the least recently used entries.
+    ///
+    /// Entries of the owner who needs memory go first, if that owner exceeds the share. Then entries of the
+    /// owner who holds most go.
     fn make_room(&self, shortage: Shortage) {
         let let_go = |owner: Option<Owner>, mut n_bytes: usize| {
             while n_bytes > 0 {
@@ -203,12 +212,13 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         let_go(None, shortage.of_all.saturating_sub(shortage.of_owner));
     }
 
-    /// Returns what is prepared for `key`, computing it at most once however many ask, and where it came from. Whoever begins does
-    /// it in `memory`, which goes back if another has begun; without memory nothing is begun, and `None` says that it is
-    /// needed.
+    /// Returns the fit for `key` and its origin, computing it at most once for all concurrent callers.
+    ///
+    /// The caller that begins computes in `memory`. It goes back if another caller has begun. Without memory
+    /// nothing is begun, and `None` says that memory is needed.
     ///
     /// # Errors
-    /// Those of `prepare`; they are not kept.
+    /// Returns the errors of `prepare`. They are not cached.
     pub async fn get_or_prepare<F>(
         &self,
         key: FitKey,
@@ -231,7 +241,7 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
             .join(key, || {
                 let computation = prepare(memory);
                 async move {
-                    // A flight may have landed between the look-up and this one's beginning.
+                    // Another flight may have landed between the look-up and the start of this one.
                     if let Some(found) = fits.get(key.owner, &key) {
                         return Ok((found, true));
                     }
@@ -250,11 +260,13 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         Ok(Some((stored, outcome)))
     }
 
-    /// Returns the surface of a fit, making it at most once however many ask, in `memory`, which goes with the work and
-    /// of which the surface keeps what it takes. Without memory it is not begun, and `None` says that it is needed.
+    /// Returns the surface of a fit, making it at most once for all concurrent callers.
+    ///
+    /// The work takes `memory`, of which the surface keeps what it needs. Without memory it is not begun, and
+    /// `None` says that memory is needed.
     ///
     /// # Errors
-    /// Those of `make`; they are not kept.
+    /// Returns the errors of `make`. They are not cached.
     pub async fn get_or_make_surface<F>(
         &self,
         key: FitKey,
@@ -298,7 +310,7 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         Ok(Some(surface))
     }
 
-    /// What asking for a solver, and for its surface where `with_surface`, would have to make now.
+    /// Returns what is missing now of a solver, and of its surface where `with_surface` is set.
     pub fn missing(&self, key: FitKey, with_surface: bool) -> Missing {
         let solver = match self.fits.get(key.owner, &key) {
             Some(stored) if stored.surface.get().is_some() || !with_surface => return Missing::default(),
@@ -308,12 +320,12 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         Missing { solver, surface: with_surface && !self.surfaces.is_under_way(&key) }
     }
 
-    /// The weights of values solved before.
+    /// Returns the cached weights of values that were solved before.
     pub fn solution(&self, key: FitKey, values: ValuesKey) -> Option<Arc<Solution>> {
         self.solutions.get(key.owner, &(key, values)).map(|kept| kept.solution.clone())
     }
 
-    /// Keeps weights if there is memory for them that nobody waits for.
+    /// Caches weights, if memory for them is free.
     pub fn keep_solution(&self, key: FitKey, values: ValuesKey, solution: Arc<Solution>) {
         let own = block_bytes(arc_payload::<KeptSolution>()) + block_bytes(arc_payload::<Solution>());
         let n_bytes = own + solution.n_bytes();
@@ -323,29 +335,29 @@ impl<E: Clone + Send + Sync + 'static> PreparedStore<E> {
         }
     }
 
-    /// Bytes of all solvers, surfaces and weights that are kept, and of the memory for the next factorization.
+    /// Bytes of all cached solvers, surfaces and weights, and of the buffer for the next factorization.
     pub fn n_bytes(&self) -> usize {
         self.fits.n_bytes() + self.solutions.n_bytes() + self.spare.n_bytes()
     }
 
-    /// How many solvers are kept, and how many made room for others or for work.
+    /// Number of cached solvers, and number of solvers evicted for others or for work.
     pub fn counts(&self) -> Counts {
         self.fits.counts()
     }
 
-    /// Bytes of the budget that are held, by what is kept and by work.
+    /// Bytes of the budget that are held, by cached entries and by work.
     pub fn n_reserved(&self) -> usize {
         self.budget.n_held()
     }
 
-    /// Forgets everything that was computed from a cloud.
+    /// Drops everything that was computed from a cloud.
     pub fn forget_cloud(&self, owner: Owner, id: CloudId) {
         self.fits.remove_if(owner, |key| key.cloud_id == id);
         self.solutions.remove_if(owner, |(key, _)| key.cloud_id == id);
     }
 }
 
-/// What a request would have to make.
+/// Parts that a request would have to make.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Missing {
     pub solver: bool,

@@ -54,3 +54,4 @@ mod surfaces;
 mod tls;
 mod unsolvable;
 mod values;
+mod version_3_0;

@@ -58,6 +58,26 @@ impl Covariance {
 /// A negative result is set to 0 and reported, but only if it is at least −τ(q), with
 /// `τ(q) = 4ε(k₀ + ‖K + αI‖₁|w|²)` and `w = (K + αI)⁻¹k(X, q)`.
 ///
+/// ```
+/// # use std::sync::Arc;
+/// # use gramian_numerics::kernel::{Family, Kernel};
+/// # use gramian_numerics::observer::Unobserved;
+/// # use gramian_numerics::points::cloud::Cloud;
+/// # use gramian_numerics::solver::{Solver, System};
+/// # use gramian_numerics::sums::regularization::Regularization;
+/// use gramian_numerics::function::posterior::variances;
+///
+/// // 20 points of the unit interval.
+/// let cloud = Arc::new(Cloud::new((0..20).map(|i| f64::from(i) / 19.0).collect(), 1)?);
+/// let kernel = Kernel::new(Family::Matern { order: 2 }, 0.5, 1.0)?;
+/// let system = System::new(cloud, kernel, Regularization::uniform(1e-8)?)?;
+/// let solver = Solver::dense(system, &Unobserved)?;
+/// let far = Cloud::new(vec![0.5, 30.0], 1)?;
+/// let found = variances(&solver, &far, &Unobserved)?.latent;
+/// assert!(found[0] < 1e-4 && found[1] > 0.999); // known among the points, the prior far away
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
+///
 /// # Errors
 /// - [`NumericsError::DimensionMismatch`].
 /// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, or if a variance is below −τ.

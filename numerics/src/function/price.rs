@@ -1,4 +1,4 @@
-//! Prices of functions through values, and of how sure they are.
+//! Prices of functions through values, and of their uncertainty.
 
 use super::errors::JUDGED_AT_ONCE;
 use crate::machine::price::{Price, Sizes};
@@ -7,11 +7,12 @@ use crate::solver::price::{numbers_at_point, whitening_flops};
 use crate::sums::many::QUERIES_PER_BLOCK;
 use crate::sums::price::pair_flops;
 
-/// Columns `L⁻¹k(X, ·)` that are held at once, one for a query or a functional. They bound the memory to 512 numbers a
-/// point, and are wide enough for solves to run as matrix products.
+/// Columns `L⁻¹k(X, ·)` that are held at once, one for each query or functional.
+///
+/// They bound the memory to 512 numbers a point, and are wide enough for solves to run as matrix products.
 pub(crate) const COLUMNS_AT_ONCE: usize = 512;
 
-/// The price of a function through new values, with derivatives up to an order.
+/// The price of a function through new values, with derivatives up to `order`.
 pub(crate) fn function_price(order: usize, sizes: Sizes) -> Price {
     let [n, m, _] = sizes.as_f64();
     let at_points = sizes.n_points.saturating_mul(numbers_at_point(sizes.dimension));
@@ -19,7 +20,7 @@ pub(crate) fn function_price(order: usize, sizes: Sizes) -> Price {
     Price::of_numbers(at_points.saturating_add(sizes.jets()), flops)
 }
 
-/// The price of a function as a Gaussian process, with variances or a covariance of all queries.
+/// The price of a function as a Gaussian process, with variances or with a covariance of all queries.
 pub(crate) fn posterior_price(has_variances: bool, has_covariance: bool, sizes: Sizes) -> Price {
     let ([n, m, _], Sizes { n_points, n_queries, dimension }) = (sizes.as_f64(), sizes);
     let whitened = match (has_covariance, has_variances) {
@@ -34,12 +35,14 @@ pub(crate) fn posterior_price(has_variances: bool, has_covariance: bool, sizes: 
     Price::of_numbers(n_numbers.saturating_add(n_queries.saturating_mul(2 + dimension)), flops)
 }
 
-/// Bytes of what is known of a list of values beside numbers at points and queries, and flops of keeping it.
+/// Bytes kept for each list of values, besides its numbers at points and queries. `FLOPS_PER_LIST` is the
+/// work of keeping them.
 const BYTES_PER_LIST: usize = 600;
 const FLOPS_PER_LIST: f64 = 5000.0;
 
-/// The price of k lists of values beside the first: solves and sums in matrix products, and `n_derivatives` of each by
-/// themselves.
+/// The price of k lists of values besides the first.
+///
+/// Solves and sums run as matrix products. The `n_derivatives` derivatives are computed list by list.
 pub fn many_price(n_lists: usize, n_derivatives: usize, sizes: Sizes) -> Price {
     let ([n, m, _], k) = (sizes.as_f64(), n_lists as f64);
     let of_derivatives = if n_derivatives > 0 { 40.0 * n * m } else { 0.0 };
@@ -50,18 +53,18 @@ pub fn many_price(n_lists: usize, n_derivatives: usize, sizes: Sizes) -> Price {
     Price { n_bytes, flops: k * (6.0 * n * n + 2.0 * n * m + of_derivatives + FLOPS_PER_LIST) }
 }
 
-/// The price of so many joint draws at m queries beside their covariance: its factor, and the draws.
+/// The price of `n_draws` joint draws at m queries besides their covariance: its factor, and the draws.
 pub(crate) fn samples_price(n_queries: usize, n_draws: usize) -> Price {
     let (m, count) = (n_queries as f64, n_draws as f64);
     let numbers = n_queries.saturating_mul(n_queries.saturating_mul(3).saturating_add(n_draws));
     Price::of_numbers(numbers, m * m * (m / 3.0 + 2.0 * count))
 }
 
-/// The price of the deviations of so many functionals, which are found as variances are.
+/// The price of the deviations of `n_functionals` functionals, which are found like variances.
 pub(crate) fn deviations_price(n_points: usize, n_functionals: usize, dimension: usize) -> Price {
     let n = n_points as f64;
     let n_at_once = n_functionals.min(COLUMNS_AT_ONCE);
-    // With columns for a mean.
+    // Columns for a mean are included.
     let columns = n_points.saturating_mul(n_at_once + dimension + 5).saturating_mul(size_of::<f64>());
     let found = n_functionals.saturating_mul(4 * size_of::<f64>());
     let n_bytes = columns.saturating_add(found).saturating_add(n_at_once * functional_bytes(dimension));
@@ -69,8 +72,9 @@ pub(crate) fn deviations_price(n_points: usize, n_functionals: usize, dimension:
     Price { n_bytes, flops }
 }
 
-/// The price of judging answers of an operator by so many functionals: their weights, and the covariances of another
-/// process with all values.
+/// The price of judging the answers of an operator by `n_functionals` functionals.
+///
+/// It consists of their weights and of the covariances of another process with all values.
 pub(crate) fn judging_price(n_functionals: usize, sizes: Sizes) -> Price {
     let Sizes { n_points, n_queries, dimension } = sizes;
     let (n, k) = (n_points as f64, n_functionals as f64);
@@ -87,11 +91,11 @@ pub(crate) fn judging_price(n_functionals: usize, sizes: Sizes) -> Price {
             + 2.0 * n * k * covariance_flops(dimension)
             + 1000.0 * n_queries as f64,
     };
-    // The cloud is sampled, if nobody has asked for that before.
+    // The cloud is sampled unless that was done before.
     judging.and(sampling_price(n_points, dimension))
 }
 
-/// Bytes of a functional of jets while it is looked at, twice.
+/// Bytes of a functional of jets while it is evaluated, counted twice.
 fn functional_bytes(dimension: usize) -> usize {
     let beyond_the_stack = if dimension * dimension > 16 { dimension * dimension } else { 0 };
     2 * (400 + beyond_the_stack * size_of::<f64>())

@@ -1,4 +1,4 @@
-//! Kernels for clients that choose none, from the cloud alone.
+//! Default kernels, derived from the cloud alone, for clients that choose none.
 //!
 //! Everything scales with the cloud: millimetres and kilometres get the same geometry.
 
@@ -6,30 +6,35 @@ use super::{Family, Kernel};
 use crate::error::NumericsError;
 use crate::points::sampling::Scales;
 
-/// What a fit is for.
+/// Purpose of a fit, which decides its default kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// Interpolation or regression of values.
     Values,
     /// Normals of a surface.
     Normals,
-    /// Curvatures and operators of a surface, which see the kernel's cusp at the points of the cloud.
+    /// Curvatures and operators of a surface, which are sensitive to the kernel's cusp at the points of the
+    /// cloud.
     Curvatures,
 }
 
-/// α where none is given.
+/// Default α for values, where none is given.
 pub const DEFAULT_ALPHA: f64 = 1e-10;
 
-/// Least α of the rules for surfaces: what it costs on exact data is far below what the sampling costs, and where the
-/// estimate of the noise fails (coarse clouds) it keeps the fit from following the noise (docs/defaults.md).
+/// Least α of the rules for surfaces.
+///
+/// On exact data, its error is far below the error of sampling. The noise estimate may fail on coarse clouds.
+/// There, this α keeps the fit from following the noise (docs/defaults.md).
 const SURFACE_ALPHA: f64 = 1e-3;
 
-/// α of noisy surfaces, `5 (σ/h₄)^1.5`: between the linear law that is best for smooth surfaces and the square one of
-/// α = (σ|∇u|)² (docs/defaults.md).
+/// Factor of the law for α on noisy surfaces: α = 5 (σ/h₄)^1.5.
+///
+/// It lies between the linear law, which is best for smooth surfaces, and the quadratic law α = (σ|∇u|)²
+/// (docs/defaults.md).
 const NOISE_FACTOR: f64 = 5.0;
 const NOISE_EXPONENT: f64 = 1.5;
 
-/// A rule for a surface: ℓ is the greater of `extents` times the extent and `spacings` times h₄; √ε ℓ is `smoothing` h₄.
+/// Kernel rule for a surface: ℓ = max(`extents` · extent, `spacings` · h₄), and √ε ℓ = `smoothing` · h₄.
 struct SurfaceRule {
     extents: f64,
     spacings: f64,
@@ -39,11 +44,12 @@ struct SurfaceRule {
 /// Sharp enough for the edges of scans (docs/defaults.md).
 const NORMALS: SurfaceRule = SurfaceRule { extents: 0.45, spacings: 4.0, smoothing: 0.4 };
 
-/// Smooth enough for second derivatives at the points, which see the kernel's cusp.
+/// Smooth enough for second derivatives at the points, which are sensitive to the kernel's cusp.
 const CURVATURES: SurfaceRule = SurfaceRule { extents: 0.9, spacings: 8.0, smoothing: 3.0 };
 
-/// The kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces. `noise` is asked for surfaces
-/// only: the standard deviation of the points across the surface, unit L.
+/// Returns the default kernel and α for a purpose: Matérn 5/2 for values, regularised Laplace for surfaces.
+/// `noise` is called for surfaces only. It returns the standard deviation of the points across the surface,
+/// unit L.
 ///
 /// # Errors
 /// [`NumericsError::InvalidKernelParameter`] if the cloud is too small or large for any length scale.
@@ -117,7 +123,7 @@ mod tests {
             for query in 0..n {
                 let cosine: f64 =
                     geometry.normal(query).iter().zip(cloud.point(query)).map(|(a, b)| a * b).sum();
-                // By symmetry exact but for rounding.
+                // By symmetry, normals are exact up to rounding.
                 assert!(cosine > 1.0 - 1e-9, "{n} points: {cosine}");
             }
         }

@@ -41,6 +41,15 @@ pub(crate) const MAX_SLOPE: f64 = 4.0;
 /// With a length scale ℓ_c for each axis, ℓ is the shortest of them. The kernel is that of ℓ in stretched
 /// coordinates, `u_c = s_c x_c` with `s_c = ℓ/ℓ_c ≤ 1`. Sums over pairs use differences of u, and the chain
 /// rule turns derivatives back.
+///
+/// ```
+/// use gramian_numerics::kernel::{Family, Kernel};
+///
+/// let kernel = Kernel::new(Family::Gauss, 0.5, 2.0)?; // ℓ = 0.5, variance 2
+/// assert_eq!(kernel.at_zero(), 2.0);
+/// assert!(Kernel::new(Family::Gauss, -0.5, 2.0).is_err());
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     family: Family,
@@ -118,7 +127,7 @@ impl Kernel {
     }
 
     /// Returns this kernel with variance 1, i.e. with the same correlations.
-    pub fn of_variance_one(self) -> Self {
+    pub(crate) fn of_variance_one(self) -> Self {
         Self { variance: 1.0, ..self }
     }
 

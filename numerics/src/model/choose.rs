@@ -1,23 +1,24 @@
-//! When `auto` takes the local solver.
+//! Rules by which `auto` takes the local solver.
 
 use crate::patches::MAX_LOCAL_DIMENSION;
 
-/// Points from which `auto` regresses a surface locally where nothing else is given: the factorization alone takes more
-/// than a second.
+/// Number of points from which `auto` regresses a surface locally, unless kernel or α are given.
+///
+/// The factorization alone would take more than a second.
 pub const LOCAL_FROM: usize = 5_000;
 
-/// Why `auto` chose the local solver.
+/// Reason why `auto` chose the local solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AutoLocal {
-    /// The cloud has more points than are factorized.
+    /// The cloud has more points than the dense solver accepts.
     BeyondDense,
-    /// The work of regressions is linear in the points, of which there are many.
+    /// The cloud has many points, and the work of regressions is linear in them.
     ManyPoints,
-    /// Standard deviations are asked for, which only regressions have.
+    /// Standard deviations are requested, which only regressions have.
     Deviations,
 }
 
-/// Whether a surface of which nothing is given but its points is better regressed locally, and why.
+/// Returns why a surface known only by its points is better regressed locally, or `None` if it is not.
 pub fn prefers_local(
     n_points: usize,
     dimension: usize,

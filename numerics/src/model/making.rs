@@ -1,4 +1,4 @@
-//! From a recipe to a model.
+//! Preparation of a model from its recipe.
 
 use std::sync::Arc;
 
@@ -10,22 +10,22 @@ use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
 use crate::solver::{Solver, System, Workspace};
 
-/// What a model is made from, beside its recipe.
+/// Inputs of a model besides its recipe.
 pub struct Making<'a> {
     pub cloud: Arc<Cloud>,
-    /// How the cloud is sampled, if that is known.
+    /// Sampling of the cloud, if it is known.
     pub sampling: Option<Arc<Sampling>>,
-    /// The memory of a factorization.
+    /// Memory for a factorization.
     pub workspace: Workspace<'a>,
 }
 
 impl Recipe {
-    /// Whether making it looks at the neighbours of points.
+    /// Returns whether making the model needs the neighbours of points.
     pub fn needs_sampling(&self) -> bool {
         self.is_kriged_locally()
     }
 
-    /// The model, where making it takes no work.
+    /// Returns the model if making it takes no work.
     pub fn made_at_once(&self) -> Option<Model> {
         match self {
             Self::LocalSurface { .. } => Some(Model::LocalSurface),
@@ -36,7 +36,7 @@ impl Recipe {
     /// Makes the model ready.
     ///
     /// # Errors
-    /// Those of [`System::new`] and [`Solver::dense_in`]; [`NumericsError::Cancelled`].
+    /// Returns the errors of [`System::new`] and [`Solver::dense_in`], and [`NumericsError::Cancelled`].
     pub fn make(self, making: Making<'_>, observer: &dyn Observer) -> Result<Model, NumericsError> {
         let Making { cloud, sampling, workspace } = making;
         match self {

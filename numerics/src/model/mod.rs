@@ -1,8 +1,9 @@
-//! How a fit is served: one choice among the solvers, and the verbs that differ between them.
+//! Models: the choice among solvers, and the operations that differ between them.
 //!
-//! A [`Recipe`] is complete: with the cloud it names everything that preparation depends on. A [`Model`] is the recipe made
-//! ready. All that depends on which solver it is stands in this folder, so a new solver is a variant of both enums, and an arm in
-//! each verb. A verb that a solver lacks refuses with [`NumericsError::Unsupported`].
+//! A [`Recipe`] is complete: together with the cloud it determines everything that preparation depends on. A
+//! [`Model`] is a recipe made ready. Everything that depends on the solver is in this folder. So a new solver
+//! is a variant of both enums and an arm in each method. A method that a solver lacks returns
+//! [`NumericsError::Unsupported`].
 
 pub mod choose;
 mod making;
@@ -31,22 +32,22 @@ pub use recipe::Recipe;
 pub use report::{Regressions, Report};
 pub use values::{EachAt, FittedValues, JetRequest, ValuesAt};
 
-/// A [`Recipe`] made ready.
+/// A [`Recipe`] made ready to answer.
 pub enum Model {
     /// Weights for values from one system over all points.
     System(Arc<Solver>),
-    /// A small system around each query.
+    /// A small system, solved around each query.
     LocalKriging(Arc<Moving>),
-    /// Nothing: local regressions are made with their surface.
+    /// Nothing to prepare: local regressions are made with their surface.
     LocalSurface,
 }
 
-/// What a surface is made from, beside its model.
+/// Inputs of a surface besides its model.
 pub struct SurfaceMaking<'a> {
     pub cloud: &'a Arc<Cloud>,
     pub sampling: Arc<Sampling>,
     pub given: Given<'a>,
-    /// The weights of the constant 1, if they are known.
+    /// Weights of the signature function, which interpolates the constant 1, if they are known.
     pub signature: Option<Arc<Solution>>,
 }
 
@@ -58,7 +59,10 @@ impl Model {
         }
     }
 
-    /// The label of the model in metrics: a factorization of all of the matrix or of its pivots, neighbourhoods, or nothing.
+    /// Returns the label of the model in metrics.
+    ///
+    /// `dense` is a factorization of the whole matrix, `pivoted` one of its pivots. `moving` is local
+    /// kriging, and `local` stands for local regressions.
     pub fn name(&self) -> &'static str {
         match self {
             Self::System(solver) if solver.rank() < solver.n_points() => "pivoted",
@@ -68,7 +72,7 @@ impl Model {
         }
     }
 
-    /// Bytes held on the heap, those of the cloud included.
+    /// Bytes held on the heap, including those of the cloud.
     pub fn n_bytes(&self) -> usize {
         match self {
             Self::System(solver) => solver.n_bytes(),
@@ -77,10 +81,10 @@ impl Model {
         }
     }
 
-    /// The solver that has weights for values at all points.
+    /// Returns the solver that has weights for values at all points.
     ///
     /// # Errors
-    /// [`NumericsError::Unsupported`] where there is none.
+    /// [`NumericsError::Unsupported`] where the model has no such solver.
     pub fn solver(&self) -> Result<&Arc<Solver>, NumericsError> {
         match self {
             Self::System(solver) => Ok(solver),
@@ -88,7 +92,7 @@ impl Model {
         }
     }
 
-    /// The system that is solved around each query.
+    /// Returns the local kriging of this model, which solves a system around each query.
     pub fn kriging(&self) -> Option<&Arc<Moving>> {
         match self {
             Self::LocalKriging(moving) => Some(moving),
@@ -96,10 +100,13 @@ impl Model {
         }
     }
 
-    /// The function with values `[n]`, unit V, at the fitted points; `known` are its weights, if they were solved before.
+    /// Returns the function with values `[n]`, unit V, at the fitted points.
+    ///
+    /// `known` holds its weights, if they were solved before.
     ///
     /// # Errors
-    /// Those of [`Interpolant::fit_with_mean`]; [`NumericsError::Unsupported`] where each query has a function of its own.
+    /// Returns the errors of [`Interpolant::fit_with_mean`], and [`NumericsError::Unsupported`] where each
+    /// query has a function of its own.
     pub fn interpolant(
         &self,
         values: &[f64],
@@ -114,10 +121,11 @@ impl Model {
         }
     }
 
-    /// The surface that the points sample: the level of the signature function, or local regressions.
+    /// Returns the surface that the points sample: a level of the signature function, or local regressions.
     ///
     /// # Errors
-    /// Those of [`SignatureSurface::over`] and [`LocalSurface::of`]; [`NumericsError::Unsupported`] for local kriging of values.
+    /// Returns the errors of [`SignatureSurface::over`] and [`LocalSurface::of`], and
+    /// [`NumericsError::Unsupported`] for local kriging of values.
     pub fn surface(
         &self,
         making: SurfaceMaking<'_>,

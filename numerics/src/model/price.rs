@@ -1,4 +1,4 @@
-//! Prices of a model, and of what it is asked, by the solver that it will have: known before anything is made.
+//! Prices of a model and of its answers for each solver, known before anything is computed.
 
 use super::Recipe;
 use crate::error::SolverKind;
@@ -12,23 +12,23 @@ use crate::surface::price::{
     self as surfaces, AskedOfSurface, local_geometry_price, local_surface_price, signature_surface_price,
 };
 
-/// A cloud that is fitted.
+/// Size of a cloud that is fitted.
 #[derive(Debug, Clone, Copy)]
 pub struct CloudSize {
     pub n_points: usize,
     pub dimension: usize,
-    /// Whether it is the client's cloud without its duplicates, so that nothing is known of its neighbours.
+    /// Whether the cloud is the client's without its duplicates, so that nothing is known of its neighbours.
     pub is_merged: bool,
 }
 
-/// What making a model and its surface ready takes.
+/// Price of making a model and its surface ready.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MakingPrice {
-    /// The price of the model as nearly always; `usize::MAX` bytes for what cannot be counted.
+    /// Price of the model in nearly all cases; `usize::MAX` bytes where they cannot be counted.
     pub expected: Price,
-    /// The price of the model at most.
+    /// Largest possible price of the model.
     pub at_most: Price,
-    /// The price of the surface with its quadrics and normals.
+    /// Price of the surface with its quadrics and normals.
     pub surface: Price,
 }
 
@@ -43,7 +43,7 @@ impl Recipe {
                 MakingPrice { expected: price, at_most: price, surface: Price::default() }
             }
             Self::LocalSurface { .. } => {
-                // A trifle, but something: what takes nothing is not missing.
+                // Small but not zero: a model with a price of zero would not count as missing.
                 let trifle = Price { n_bytes: 1 << 10, flops: 0.0 };
                 let surface = local_surface_price(n_points, dimension);
                 MakingPrice { expected: trifle, at_most: trifle, surface }
@@ -58,31 +58,31 @@ pub fn system_price(n_points: usize, dimension: usize) -> MakingPrice {
     MakingPrice { expected, at_most, surface: signature_surface_price(n_points, dimension) }
 }
 
-/// A posterior of k lists of values.
+/// Request for a posterior of k lists of values.
 #[derive(Debug, Clone, Copy)]
 pub struct PosteriorAsked {
     pub has_variances: bool,
     pub has_covariance: bool,
     pub n_lists: usize,
-    /// Derivatives of each list at each query.
+    /// Number of derivatives of each list at each query.
     pub n_derivatives: usize,
-    /// Deviations at each query.
+    /// Number of deviations at each query.
     pub n_deviations: usize,
-    /// Joint samples of each list.
+    /// Number of joint samples of each list.
     pub n_samples: usize,
 }
 
-/// An operator applied to values over a surface.
+/// Request for an operator applied to values over a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct OperatorAsked {
     pub n_surface_points: usize,
-    /// Numbers that the operator has at all queries together.
+    /// Count of the operator's numbers at all queries together.
     pub n_numbers: usize,
     pub surface: AskedOfSurface,
     pub has_deviations: bool,
 }
 
-/// The price of a function with derivatives up to an order, and so many deviations, at queries.
+/// The price of a function at queries, with derivatives up to `order` and `n_deviations` deviations at each.
 pub fn function_price(solver: SolverKind, order: usize, n_deviations: usize, sizes: Sizes) -> Price {
     match solver {
         SolverKind::Local => kriging_price(n_deviations, sizes),
@@ -107,7 +107,7 @@ pub fn posterior_price(solver: SolverKind, asked: PosteriorAsked, sizes: Sizes) 
     price
 }
 
-/// The price of deviations of so many functionals at each query.
+/// The price of the deviations of `per_query` functionals at each query.
 fn of_deviations(per_query: usize, sizes: Sizes) -> Price {
     let Sizes { n_points, n_queries, dimension } = sizes;
     match per_query {

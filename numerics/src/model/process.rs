@@ -1,4 +1,4 @@
-//! The Gaussian process that a model stands for, up to a factor.
+//! Gaussian process of a model, up to a factor.
 
 use std::ops::RangeInclusive;
 
@@ -11,10 +11,10 @@ use crate::sums::regularization::Regularization;
 /// Ratios of noise to variance that lose no digit.
 const RATIOS: RangeInclusive<f64> = 1e-280..=1e280;
 
-/// Kernel and noise of a model, and the factor by which both are scaled afterwards, unit V².
+/// Kernel and noise of a model, with the factor by which both are scaled afterwards, unit V².
 ///
-/// A factor of K + αI depends on the ratio of noise and variance alone. So a process is fitted with variance 1 where that is exact, and
-/// one factorization serves values of any size.
+/// A factor of K + αI depends only on the ratio of noise to variance. So a process is fitted with variance 1
+/// where that is exact, and one factorization serves values of any size.
 #[derive(Debug, Clone)]
 pub struct ScaledProcess {
     pub kernel: Kernel,
@@ -23,7 +23,8 @@ pub struct ScaledProcess {
 }
 
 impl ScaledProcess {
-    /// A process with a kernel that is given, and α = 1e-10 where no noise is. Noise per point is never scaled.
+    /// Returns the process with a given kernel. If no noise is given, α = 1e-10. Noise per point is never
+    /// scaled.
     ///
     /// # Errors
     /// [`NumericsError::InvalidRegularization`].
@@ -38,7 +39,7 @@ impl ScaledProcess {
         }
     }
 
-    /// A process with a kernel that was learned from values, and noise that was learned where none is given.
+    /// Returns the process with a kernel learned from values, and with learned noise where none is given.
     ///
     /// # Errors
     /// [`NumericsError::InvalidKernelParameter`], [`NumericsError::InvalidRegularization`].
@@ -46,7 +47,8 @@ impl ScaledProcess {
         let Learned { family, length_scale, ratio, variance, .. } = *learned;
         let kernel = |variance| Kernel::new(family, length_scale, variance);
         match given_or(given, ratio * variance)? {
-            // A variance that is learned may leave what kernels take.
+            // A learned variance may leave the range of kernels, so it becomes the scale of a kernel of
+            // variance 1.
             Regularization::Uniform(alpha) => {
                 let regularization = Regularization::uniform(alpha / variance)?;
                 Ok(Self { kernel: kernel(1.0)?, regularization, scale: variance })
@@ -55,7 +57,8 @@ impl ScaledProcess {
         }
     }
 
-    /// A kernel of variance 1 by a rule, and noise by the same rule where none is given.
+    /// Returns the process with a kernel of variance 1 from a rule, and with `alpha` of that rule if no noise
+    /// is given.
     ///
     /// # Errors
     /// [`NumericsError::InvalidRegularization`].

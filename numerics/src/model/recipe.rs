@@ -1,4 +1,4 @@
-//! A choice of solver, with everything that its preparation depends on beside the cloud.
+//! Recipe of a model: a solver, with everything that its preparation depends on besides the cloud.
 
 use std::sync::Arc;
 
@@ -8,19 +8,20 @@ use crate::points::cloud::Cloud;
 use crate::solver::System;
 use crate::sums::regularization::Regularization;
 
-/// How a fit is served. Equal recipes over equal clouds give equal models.
+/// Choice of a solver and its parameters. Equal recipes over equal clouds give equal models.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Recipe {
-    /// One system over all points, factorized.
+    /// A single system over all points, factorized.
     System { kernel: Kernel, regularization: Regularization },
     /// A small system around each query, from its nearest points.
     LocalKriging { kernel: Kernel, regularization: Regularization },
-    /// A surface by local regressions, which choose kernel and noise by themselves: at sites, if these are given.
+    /// A surface by local regressions, which choose kernel and noise by themselves. They learn at `sites`, if
+    /// given.
     LocalSurface { sites: Option<Arc<Cloud>> },
 }
 
 impl Recipe {
-    /// The recipe of values, or of a signature function, by a solver.
+    /// Returns the recipe by which a solver serves values or a signature function.
     pub fn of_values(solver: SolverKind, kernel: Kernel, regularization: Regularization) -> Self {
         match solver {
             SolverKind::Dense => Self::System { kernel, regularization },
@@ -35,7 +36,7 @@ impl Recipe {
         }
     }
 
-    /// Kernel and regularization, unless they follow from the points.
+    /// Returns kernel and regularization, or `None` where they follow from the points.
     pub fn process(&self) -> Option<(&Kernel, &Regularization)> {
         match self {
             Self::System { kernel, regularization } | Self::LocalKriging { kernel, regularization } => {
@@ -45,7 +46,7 @@ impl Recipe {
         }
     }
 
-    /// Where local regressions learn, if that is given.
+    /// Returns the sites where local regressions learn, if they are given.
     pub fn sites(&self) -> Option<&Cloud> {
         match self {
             Self::LocalSurface { sites } => sites.as_deref(),
@@ -53,15 +54,16 @@ impl Recipe {
         }
     }
 
-    /// Whether values are seen a neighbourhood at a time, never all at once.
+    /// Returns whether values are used a neighbourhood at a time, never all at once.
     pub fn is_kriged_locally(&self) -> bool {
         matches!(self, Self::LocalKriging { .. })
     }
 
-    /// The system over a cloud whose factor can be kept and read again; `None` where nothing is factorized.
+    /// Returns the system over a cloud whose factor can be stored and read again, or `None` if nothing is
+    /// factorized.
     ///
     /// # Errors
-    /// Those of [`System::new`].
+    /// Returns the errors of [`System::new`].
     pub fn factorized_system(&self, cloud: &Arc<Cloud>) -> Result<Option<System>, NumericsError> {
         match self {
             Self::System { kernel, regularization } => {

@@ -1,4 +1,4 @@
-//! What a model says of itself and of a function that it served: the numbers by which an answer is trusted.
+//! Quality numbers of a model and of a function that it served. They show how far to trust an answer.
 
 use std::sync::Arc;
 
@@ -7,27 +7,27 @@ use crate::solver::trend::Trend;
 use crate::solver::{Disagreement, Method, Solution, Solver};
 use crate::surface::Surface;
 
-/// Numbers of a model and of the function that it served; absent where the solver has none.
+/// Quality numbers of a model and of the function that it served. Absent where the solver has none.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
-    /// How the matrix was factorized.
+    /// Method by which the matrix was factorized.
     pub method: Option<Method>,
     pub rank: Option<usize>,
     pub reciprocal_condition: Option<f64>,
     pub relative_residual: Option<f64>,
-    /// `Λᵀ K Λ` for the kernel of the model.
+    /// `Λᵀ K Λ` with the kernel of the model.
     pub native_norm_squared: Option<f64>,
-    /// `|u(X) − Y|₂`, unit of the values; for local regressions the distance of the points from the surface.
+    /// `|u(X) − Y|₂`, unit V. For local regressions, the distance of the points from the surface.
     pub misfit: Option<f64>,
     pub is_refined: bool,
     pub trend: Option<Trend>,
-    /// How values contradict kernel and noise; points are those that are fitted.
+    /// Disagreement of the values with kernel and noise. Points are those of the fit.
     pub disagreement: Option<Disagreement>,
-    /// Points of a neighbourhood.
+    /// Number of points in a neighbourhood.
     pub n_neighbours: usize,
-    /// Queries where some neighbours follow from nearer ones to rounding, and were left out.
+    /// Number of queries where neighbours were left out, because they follow from nearer ones up to rounding.
     pub n_dependent: usize,
-    /// By how many deviations answers from half of the neighbours differ, where that is too much.
+    /// Difference from answers by half of the neighbours, in deviations. `None` unless it is too large.
     pub unsettled: Option<f64>,
     /// Kernel and noise that local regressions chose.
     pub regressions: Option<Regressions>,
@@ -42,7 +42,8 @@ pub struct Regressions {
 }
 
 impl Report {
-    /// The report of a solver with one function; kernel and noise are `scale` times those of the solver.
+    /// Returns the report of a solver with one function. Kernel and noise are `scale` times those of the
+    /// solver.
     pub fn of_function(solver: &Solver, solution: &Arc<Solution>, scale: f64) -> Self {
         Self {
             method: Some(solver.method()),
@@ -58,7 +59,7 @@ impl Report {
         }
     }
 
-    /// The report of a surface: of its signature function, or of the regressions.
+    /// Returns the report of a surface: of its signature function, or of its local regressions.
     pub fn of_surface(surface: &Surface) -> Self {
         match surface {
             Surface::Signature(surface) => {

@@ -1,4 +1,4 @@
-//! Functions through values at queries, from whichever solver there is.
+//! Functions through values, evaluated at queries by the solver of the model.
 
 use std::sync::Arc;
 
@@ -15,59 +15,62 @@ use crate::solver::Solution;
 use crate::solver::trend::{Mean, Trend};
 use crate::sums::jets::{JetOrder, Jets};
 
-/// Values at the fitted points, with what is known of the process that they come from.
+/// Values at the fitted points, with the known parameters of their process.
 #[derive(Clone, Copy)]
 pub struct FittedValues<'a> {
-    /// `[n]`, unit V; `[k, n]` where each of k lists has a function of its own.
+    /// Shape `[n]`, unit V. With k lists, each with a function of its own, shape `[k, n]`.
     pub values: &'a [f64],
     pub mean: Mean,
-    /// The mean as learned from the values, for solvers that never see all of them at once.
+    /// Mean learned from the values, for solvers that never see all of them at once.
     pub trend: Option<&'a Trend>,
-    /// Kernel and noise are so many times those of the model, unit V².
+    /// Ratio of kernel and noise to those of the model, unit V².
     pub scale: f64,
 }
 
-/// What is asked at queries.
+/// Quantities requested at queries.
 #[derive(Clone, Copy)]
 pub struct JetRequest<'a> {
     /// `[m, d]`, unit L.
     pub queries: &'a Cloud,
     pub order: JetOrder,
     pub has_variances: bool,
-    /// Deviations of value and derivatives that are wanted, up to this order.
+    /// Order up to which deviations of value and derivatives are requested.
     pub deviations: Option<JetOrder>,
 }
 
-/// A function at queries, and how sure it is.
+/// A function evaluated at queries, with its uncertainty.
 pub struct ValuesAt {
     pub jets: Jets,
-    /// If asked for.
+    /// Present if requested.
     pub variances: Option<Variances>,
-    /// If asked for.
+    /// Present if requested.
     pub deviations: Option<JetDeviations>,
     pub report: Report,
-    /// The function, where there is one for all queries.
+    /// The function, if a single one serves all queries.
     pub interpolant: Option<Interpolant>,
 }
 
-/// k functions at queries, and how sure all of them are.
+/// k functions evaluated at queries, with the uncertainty that they share.
 pub struct EachAt {
     pub jets: BatchJets,
-    /// If asked for.
+    /// Present if requested.
     pub variances: Option<Variances>,
-    /// If asked for.
+    /// Present if requested.
     pub deviations: Option<JetDeviations>,
-    /// Of the solver, with the residual of the worst list and the disagreement of the first that has one.
+    /// Report of the solver, with the residual of the worst list and the disagreement of the first that has
+    /// one.
     pub report: Report,
     pub batch: Batch,
 }
 
 impl Model {
-    /// The function with these values at queries; `known` are its weights, if they were solved before.
+    /// Returns the function with these values, evaluated at queries. `known` holds its weights, if solved
+    /// before.
     ///
     /// # Errors
-    /// Those of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of [`Moving::at`]; those of the variances and deviations that
-    /// are asked for; [`NumericsError::Unsupported`] for local regressions.
+    /// Returns the errors of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of [`Moving::at`],
+    /// and those of the requested variances and deviations. Returns [`NumericsError::Unsupported`] for local
+    /// regressions.
     pub fn values_at(
         &self,
         fitted: FittedValues<'_>,
@@ -85,11 +88,11 @@ impl Model {
         }
     }
 
-    /// The functions with these lists of values `[k, n]`, k at least 1, at queries.
+    /// Returns the functions with these lists of values `[k, n]`, k ≥ 1, evaluated at queries.
     ///
     /// # Errors
-    /// Those of [`Batch::fit`] and [`Batch::at`]; those of the variances and deviations that are asked for;
-    /// [`NumericsError::Unsupported`] where each query has a function of its own.
+    /// Returns the errors of [`Batch::fit`] and [`Batch::at`], and those of the requested variances and
+    /// deviations. Returns [`NumericsError::Unsupported`] where each query has a function of its own.
     pub fn each_at(
         &self,
         fitted: FittedValues<'_>,
@@ -107,7 +110,7 @@ impl Model {
         let expected = NumericsError::LengthMismatch { expected: batch.solver.n_points(), found: 0 };
         let worst = batch.interpolants().max_by(worse).ok_or(expected)?;
         let (variances, deviations) = uncertainty(&worst, fitted.scale, request, observer)?;
-        // Norm, misfit and mean are those of each list.
+        // Norm, misfit and mean differ from list to list.
         let report = Report {
             native_norm_squared: None,
             misfit: None,
@@ -131,7 +134,8 @@ fn of_one_function(
     Ok(ValuesAt { jets, variances, deviations, report, interpolant: Some(interpolant) })
 }
 
-/// Variances and deviations, as far as they are asked for. All functions with one mean on one cloud have the same.
+/// Returns the requested variances and deviations. All functions with one mean on one cloud have the same
+/// ones.
 fn uncertainty(
     function: &Interpolant,
     scale: f64,
@@ -156,7 +160,7 @@ fn around_queries(
     observer: &dyn Observer,
 ) -> Result<ValuesAt, NumericsError> {
     let FittedValues { values, trend, scale, .. } = fitted;
-    // Deviations are those of the derivatives that are found.
+    // Only computed derivatives have deviations, so the order is raised to that of the deviations.
     let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
     let request = MovingRequest {
         order,

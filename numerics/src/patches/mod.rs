@@ -212,7 +212,7 @@ impl Patches {
     }
 
     /// Greatest number of points of the cloud that a neighbourhood draws on.
-    pub fn n_points_used(&self) -> usize {
+    pub(crate) fn n_points_used(&self) -> usize {
         self.count * self.group
     }
 

@@ -2,8 +2,8 @@
 
 use super::MAX_LOCAL_DIMENSION;
 
-/// Flops of a local regression at one query by all models of the mixture. None is made beyond the dimensions
-/// that have one.
+/// Flops of a local regression at one query by all models of the mixture. Dimensions without local
+/// regressions take none.
 pub(crate) fn regression_flops(dimension: usize) -> f64 {
     match dimension {
         ..=2 => 2e5,
@@ -13,12 +13,12 @@ pub(crate) fn regression_flops(dimension: usize) -> f64 {
     }
 }
 
-/// Regressions that choosing neighbourhoods and hyperparameters takes, of large clouds and for each point of
-/// small ones.
+/// Regressions that choosing neighbourhoods and hyperparameters takes in large clouds. Small clouds take
+/// `REGRESSIONS_PER_POINT` for each point.
 const REGRESSIONS_TO_CHOOSE: usize = 500;
 const REGRESSIONS_PER_POINT: usize = 5;
 
-/// Flops of choosing them.
+/// Flops of choosing neighbourhoods and hyperparameters.
 pub(crate) fn choosing_flops(n_points: usize, dimension: usize) -> f64 {
     let n_regressions = n_points.saturating_mul(REGRESSIONS_PER_POINT).min(REGRESSIONS_TO_CHOOSE);
     n_regressions as f64 * regression_flops(dimension)

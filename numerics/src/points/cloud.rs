@@ -5,12 +5,21 @@ use crate::machine::heap::vec_bytes;
 
 /// Largest coordinate accepted, in magnitude. Squared distances, and length scales chosen from them, then
 /// stay well inside float64.
-pub const MAX_COORDINATE: f64 = 1e100;
+pub(crate) const MAX_COORDINATE: f64 = 1e100;
 
 /// A list of n ≥ 1 points with d ≥ 1 finite coordinates each.
 ///
 /// Row-major storage, shape `[n, d]`, unit L (the client's length unit). The order of the points is the
 /// client's and is preserved in every answer. `-0.0` is stored as `0.0`, so equal points have equal bytes.
+///
+/// ```
+/// use gramian_numerics::points::cloud::Cloud;
+///
+/// let cloud = Cloud::new(vec![0.0, 0.0, 3.0, 4.0], 2)?; // two points of the plane, row by row
+/// assert_eq!((cloud.n_points(), cloud.point(1)), (2, &[3.0, 4.0][..]));
+/// assert!(Cloud::new(vec![0.0, f64::NAN], 2).is_err());
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
     coordinates: Vec<f64>,
@@ -133,7 +142,7 @@ impl Cloud {
     ///
     /// # Errors
     /// [`NumericsError::DimensionMismatch`] if it does not.
-    pub fn check_same_dimension(&self, other: &Cloud) -> Result<(), NumericsError> {
+    pub(crate) fn check_same_dimension(&self, other: &Cloud) -> Result<(), NumericsError> {
         let (expected, found) = (self.dimension, other.dimension);
         if expected == found { Ok(()) } else { Err(NumericsError::DimensionMismatch { expected, found }) }
     }
@@ -142,7 +151,7 @@ impl Cloud {
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`] if it does not.
-    pub fn check_one_per_point<T>(&self, entries: &[T]) -> Result<(), NumericsError> {
+    pub(crate) fn check_one_per_point<T>(&self, entries: &[T]) -> Result<(), NumericsError> {
         let (expected, found) = (self.n_points(), entries.len());
         if expected == found { Ok(()) } else { Err(NumericsError::LengthMismatch { expected, found }) }
     }

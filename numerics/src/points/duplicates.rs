@@ -77,6 +77,8 @@ pub(crate) fn coinciding_points(cloud: &Cloud, counts: impl Fn(usize) -> bool) -
 pub struct Merge {
     group_of: Vec<usize>,
     group_sizes: Vec<usize>,
+    /// The first point of each group.
+    first_points: Vec<usize>,
 }
 
 impl Merge {
@@ -90,12 +92,14 @@ impl Merge {
         let mut coordinates = Vec::with_capacity(positions.n_distinct() * cloud.dimension());
         let mut group_of = vec![0; cloud.n_points()];
         let mut group_sizes = Vec::with_capacity(positions.n_distinct());
+        let mut first_points = Vec::with_capacity(positions.n_distinct());
         for (point, x) in cloud.points().enumerate() {
             // The table holds every point's position, so the default is never used.
             let first = positions.find(x).unwrap_or(point);
             if first == point {
                 group_of[point] = group_sizes.len();
                 group_sizes.push(1);
+                first_points.push(point);
                 coordinates.extend_from_slice(x);
             } else {
                 group_of[point] = group_of[first];
@@ -103,7 +107,7 @@ impl Merge {
             }
         }
         let merged = Cloud::new(coordinates, cloud.dimension()).ok()?;
-        Some((merged, Merge { group_of, group_sizes }))
+        Some((merged, Merge { group_of, group_sizes, first_points }))
     }
 
     /// Number of points before merging, n.
@@ -118,7 +122,7 @@ impl Merge {
 
     /// Returns the first point of a group.
     pub fn first_point(&self, group: usize) -> usize {
-        self.group_of.iter().position(|&g| g == group).unwrap_or(group)
+        self.first_points[group]
     }
 
     /// Returns the mean of the values over each group, `[n] → [n′]`.

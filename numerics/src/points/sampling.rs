@@ -10,9 +10,20 @@ use crate::machine::price::Price;
 use crate::observer::Observer;
 
 /// Number of positions around a point that define the spacing there.
-pub const SPACING_NEIGHBOURS: usize = 4;
+pub(crate) const SPACING_NEIGHBOURS: usize = 4;
 
 /// The neighbour tree, spacings and lengths of a cloud, computed once and shared.
+///
+/// ```
+/// use gramian_numerics::observer::Unobserved;
+/// use gramian_numerics::points::cloud::Cloud;
+/// use gramian_numerics::points::sampling::Sampling;
+///
+/// let line = Cloud::new((0..100).map(f64::from).collect(), 1)?;
+/// let sampling = Sampling::of(&line, &Unobserved)?;
+/// assert_eq!(sampling.scales().nearest, 1.0); // median distance to the nearest point
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
 pub struct Sampling {
     neighbours: Neighbours,
     spacings: Vec<f64>,
@@ -70,7 +81,7 @@ impl Sampling {
     ///
     /// Points are taken at equal steps in the order of [`Sampling::spacing`]. Neither the order of the points
     /// nor the axes changes that order, except that ties are broken by index.
-    pub fn of_every_spacing(&self, count: usize) -> Vec<usize> {
+    pub(crate) fn of_every_spacing(&self, count: usize) -> Vec<usize> {
         let n = self.spacings.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.par_sort_unstable_by(|&a, &b| self.spacings[a].total_cmp(&self.spacings[b]).then(a.cmp(&b)));

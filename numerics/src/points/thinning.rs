@@ -21,7 +21,7 @@ pub(crate) fn n_coarse(n_points: usize) -> usize {
 ///
 /// The cloud is halved again and again into parts with equally many points, as many as points are wanted.
 /// Each part contributes the point in the middle along its last halving.
-pub fn thinned(cloud: &Cloud, count: usize) -> Cloud {
+pub(crate) fn thinned(cloud: &Cloud, count: usize) -> Cloud {
     if count >= cloud.n_points() {
         return cloud.clone();
     }

@@ -69,8 +69,8 @@ pub fn alpha_path_price(
     }
 }
 
-/// Returns the cost of predicting every value from all others, beside a solver or with a factorization of its
-/// own.
+/// Returns the cost of predicting every value from all others, with an existing solver or a factorization of
+/// its own.
 pub fn leave_one_out_price(n_points: usize, n_functions: usize) -> Price {
     let n = n_points as f64;
     let n_numbers = n_points.saturating_mul(3 * n_points.min(512) + 3 * n_functions + 20);

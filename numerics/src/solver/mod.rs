@@ -1,4 +1,4 @@
-//! `(K + αI) Λ = Y`: a system made ready, so that weights for values are cheap, and what else it can.
+//! Solvers of `(K + αI) Λ = Y`: systems prepared so that weights for values are cheap.
 
 pub(crate) mod price;
 pub mod system;
@@ -30,16 +30,16 @@ pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;
 pub use system::System;
 
-/// A system made ready. It keeps the system, so that it cannot be used with another.
+/// A system prepared for solving. It keeps the system, so that it cannot be used with another.
 ///
-/// An enum and no trait: the set is closed, the store needs sized values with bytes, and what a solver lacks is an arm of a
-/// match.
+/// This is an enum and no trait, because the set is closed and the store needs sized values of known bytes.
+/// An operation that a solver lacks is an arm of a match.
 pub enum Solver {
     /// A factorization of the whole matrix.
     Dense(Box<Dense>),
 }
 
-/// Points up to which the diagonal of the inverse is computed: it costs three factorizations.
+/// Number of points up to which the diagonal of the inverse is computed. It costs three factorizations.
 pub(crate) const MAX_INVERSE_DIAGONAL: usize = 512;
 
 impl Solver {
@@ -52,10 +52,11 @@ impl Solver {
         Self::dense_in(Workspace { spare: &spare, may_take: &mut may_take }, system, observer)
     }
 
-    /// [`Solver::dense`] in memory that is somebody's to give.
+    /// Factorizes the whole matrix in memory that `workspace` grants.
     ///
     /// # Errors
-    /// Those of [`Solver::dense`]; [`NumericsError::OutOfMemory`] also if it needs more than it may take.
+    /// Returns the errors of [`Solver::dense`], and [`NumericsError::OutOfMemory`] also if it needs more than
+    /// it may take.
     pub fn dense_in(
         workspace: Workspace<'_>,
         system: System,
@@ -64,12 +65,13 @@ impl Solver {
         Dense::factorize(workspace, system, observer).map(|dense| Self::Dense(Box::new(dense)))
     }
 
-    /// The factor, to be taken elsewhere; nothing where there is none but its substitute.
+    /// Returns the factor for storage elsewhere, or `None` if the fallback took its place.
     pub fn factor(&self) -> Option<Factor<'_>> {
         self.as_dense().factor()
     }
 
-    /// A solver as it was, from its [`Factor`]; nothing unless that is whole and has the size of the system.
+    /// Restores a solver from its [`Factor`]. Returns `None` unless that is complete and has the size of the
+    /// system.
     pub fn restore(
         factor: FactorBuilder,
         system: System,
@@ -106,7 +108,7 @@ impl Solver {
         self.system().n_points()
     }
 
-    /// How the matrix was factorized.
+    /// Method by which the matrix was factorized.
     pub fn method(&self) -> Method {
         self.as_dense().method()
     }
@@ -121,18 +123,18 @@ impl Solver {
         self.as_dense().reciprocal_condition()
     }
 
-    /// Bytes held on the heap, those of the cloud included.
+    /// Bytes held on the heap, including those of the cloud.
     pub fn n_bytes(&self) -> usize {
         size_of::<Dense>() + self.as_dense().n_bytes()
     }
 
-    /// The function with these weights, one for each of its centres.
+    /// Returns the function with given weights, one for each of its centres.
     pub(crate) fn expansion<'a>(&'a self, weights: &'a [f64]) -> Expansion<'a> {
         let (centres, _) = self.as_dense().centres();
         Expansion { centres, kernel: self.kernel(), weights }
     }
 
-    /// Weights at all points, `[n]`, as weights of the centres, `[r]`.
+    /// Restricts weights at all points, `[n]`, to weights of the centres, `[r]`.
     fn at_centres(&self, weights: &[f64]) -> Vec<f64> {
         match self.as_dense().centres() {
             (_, None) => weights.to_vec(),
@@ -155,8 +157,10 @@ impl Solver {
         self.as_dense().solve_in_place(values);
     }
 
-    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them: turns functionals of the weights into functionals of the
-    /// values, which is how operators become matrices.
+    /// Overwrites the columns of `[n, k]` by `Wᵀ` times them.
+    ///
+    /// This turns functionals of the weights into functionals of the values, so that operators become
+    /// matrices.
     pub(crate) fn solve_transposed_in_place(&self, functionals: MatMut<'_, f64>) {
         self.as_dense().solve_transposed_in_place(functionals);
     }
@@ -177,7 +181,8 @@ impl Solver {
     /// The diagonal of `(K + αI)⁻¹`, `[n]`.
     ///
     /// # Errors
-    /// [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points; those of [`Solver::whiten_in_place`].
+    /// Returns [`NumericsError::Unsupported`] for more than [`MAX_INVERSE_DIAGONAL`] points, and the errors
+    /// of [`Solver::whiten_in_place`].
     pub(crate) fn inverse_diagonal(&self) -> Result<Vec<f64>, NumericsError> {
         if self.n_points() > MAX_INVERSE_DIAGONAL {
             let solver = SolverKind::Dense;
@@ -189,12 +194,12 @@ impl Solver {
     /// `ln det(K + αI)`.
     ///
     /// # Errors
-    /// Those of [`Solver::whiten_in_place`].
+    /// Returns the errors of [`Solver::whiten_in_place`].
     pub(crate) fn log_determinant(&self) -> Result<f64, NumericsError> {
         self.as_dense().log_determinant()
     }
 
-    /// The refusal with its remedy, an α that is enough.
+    /// Returns the refusal with its remedy: an α that is large enough.
     pub(crate) fn not_positive_definite(&self, reason: NotDefinite) -> NumericsError {
         self.as_dense().not_positive_definite(reason)
     }

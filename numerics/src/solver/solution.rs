@@ -93,7 +93,7 @@ impl Solution {
     ///
     /// # Errors
     /// [`NumericsError::Overflow`] of derivatives, and the errors of [`Solution::of`].
-    pub fn with_jets(
+    pub(crate) fn with_jets(
         solver: &Solver,
         values: &[f64],
         order: JetOrder,

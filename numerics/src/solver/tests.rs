@@ -52,7 +52,8 @@ fn the_fallback_serves_what_cholesky_cannot() {
 
 #[test]
 fn the_fallback_asks_before_it_takes_all_of_its_matrix() {
-    // Pairs so close that the kernel cannot tell them apart: rank n/2. A smooth kernel has rank n/20 and asks for nothing.
+    // Pairs are so close that the kernel cannot tell them apart, so the rank is n/2. A smooth kernel has rank
+    // n/20 and asks for nothing.
     let base = fibonacci_sphere(100);
     let pairs: Vec<f64> = base.points().flat_map(|x| [x[0], x[1], x[2], x[0] + 1e-10, x[1], x[2]]).collect();
     let cloud = Arc::new(Cloud::new(pairs, 3).unwrap());
@@ -85,7 +86,7 @@ fn the_fallback_asks_before_it_takes_all_of_its_matrix() {
 
 #[test]
 fn the_transposed_solve_is_the_transpose() {
-    // Cholesky; the fallback with more and with fewer pivots than other points.
+    // Cholesky, then the fallback with more and with fewer pivots than other points.
     for (length_scale, ranks) in [(0.3, 90..91), (5.0, 46..90), (20.0, 1..45)] {
         let cloud = fibonacci_sphere(90);
         let solver = dense(&cloud, Family::Gauss, length_scale, 0.0);
@@ -154,7 +155,7 @@ fn a_cancelled_factorization_stops() {
     assert!(matches!(outcome, Err(NumericsError::Cancelled)));
 }
 
-/// Stops at the checkpoint of this number; counts them.
+/// An observer that cancels at the checkpoint of this number, and counts checkpoints.
 struct StopAt {
     checkpoint: usize,
     n_checkpoints: std::sync::atomic::AtomicUsize,
@@ -180,7 +181,7 @@ fn the_fallback_stops_at_every_checkpoint() {
     };
     let (method, n_checkpoints) = outcome(usize::MAX);
     assert_eq!(method, Ok(Method::PivotedCholesky));
-    // The Gram matrix and Cholesky look less than 60 times; a pivot block three times.
+    // The Gram matrix and Cholesky have fewer than 60 checkpoints. A pivot block has three.
     assert!(n_checkpoints > 100, "{n_checkpoints}");
     for checkpoint in (0..n_checkpoints).step_by(7) {
         assert_eq!(outcome(checkpoint).0, Err(NumericsError::Cancelled), "checkpoint {checkpoint}");
@@ -189,7 +190,8 @@ fn the_fallback_stops_at_every_checkpoint() {
 
 #[test]
 fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
-    // L₁₁L₁₁ᵀ is (K + D)(Z, Z): solving for a column of it gives a unit vector, noise variances included.
+    // L₁₁L₁₁ᵀ is (K + D)(Z, Z). So solving for one of its columns gives a unit vector, noise variances
+    // included.
     let cloud = fibonacci_sphere(200);
     let kernel = Kernel::new(Family::Gauss, 1.0, 1.0).unwrap();
     let noise: Vec<f64> = (0..200).map(|i| if i % 4 == 0 { 0.5 } else { 0.0 }).collect();
@@ -210,7 +212,7 @@ fn rows_above_the_tolerance_are_reproduced_by_the_pivots() {
 
 #[test]
 fn the_reciprocal_condition_is_one_for_the_identity() {
-    // Points far apart in a compactly supported kernel: K is the identity.
+    // Points are far apart for a compactly supported kernel, so K is the identity.
     let cloud = Cloud::new((0..30).map(|i| 10.0 * f64::from(i)).collect(), 1).unwrap();
     let kernel_family = Family::Wendland { smoothness: crate::kernel::WendlandSmoothness::C2 };
     assert!((dense(&cloud, kernel_family, 1.0, 0.0).reciprocal_condition() - 1.0).abs() < 1e-14);

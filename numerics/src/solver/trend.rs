@@ -29,7 +29,7 @@ pub enum Mean {
 
 impl Mean {
     /// Returns the number of functions in dimension d.
-    pub fn n_functions(self, dimension: usize) -> usize {
+    pub(crate) fn n_functions(self, dimension: usize) -> usize {
         match self {
             Self::Zero => 0,
             Self::Constant => 1,
@@ -246,7 +246,7 @@ impl Trend {
     }
 
     /// Returns the number of functions of the mean.
-    pub fn n_functions(&self) -> usize {
+    pub(crate) fn n_functions(&self) -> usize {
         self.coefficients.len()
     }
 

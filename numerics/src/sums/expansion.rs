@@ -11,7 +11,7 @@ use crate::points::cloud::Cloud;
 ///
 /// The centres are all points of a system, or those to which its solver gives weights.
 #[derive(Clone, Copy)]
-pub struct Expansion<'a> {
+pub(crate) struct Expansion<'a> {
     /// The centres z, `[r, d]`.
     pub centres: &'a Cloud,
     pub kernel: &'a Kernel,

@@ -40,7 +40,7 @@ impl Regularization {
     ///
     /// # Errors
     /// [`NumericsError::LengthMismatch`] if the number of entries differs.
-    pub fn check_matches(&self, cloud: &Cloud) -> Result<(), NumericsError> {
+    pub(crate) fn check_matches(&self, cloud: &Cloud) -> Result<(), NumericsError> {
         match self {
             Self::Uniform(_) => Ok(()),
             Self::PerPoint(variances) => cloud.check_one_per_point(variances),

@@ -4,6 +4,9 @@ use crate::machine::eigen::symmetric_eigen;
 use crate::machine::small::{Small, zeros};
 use crate::machine::vector::{dot, norm, tangent_basis};
 
+/// Curvature times the radius of the cloud up to which a surface counts as flat.
+pub(super) const FLAT: f64 = 0.1;
+
 /// Computes the principal curvatures `[d−1]`, ascending, 1/L, and their directions `[d−1, d]`.
 ///
 /// They are the eigenpairs of `S = σ P D²u P/|∇u|` on the tangent space, with `P = I − ννᵀ` and ν = σ∇u/|∇u|

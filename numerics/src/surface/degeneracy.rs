@@ -52,7 +52,7 @@ pub struct Degeneracy {
 
 /// Quality of the nodes around a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Resolution {
+pub(crate) enum Resolution {
     Resolved,
     /// The nodes misrepresent the curvature of the surface.
     Unresolved,

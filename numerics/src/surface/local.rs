@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::NearNormals;
 use super::coarse::outward_directions;
-use super::curvature::principal_curvatures;
+use super::curvature::{FLAT, principal_curvatures};
 use super::degeneracy::{DegeneracyReason, is_far};
 use super::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
 use super::request::{GeometryRequest, Orientation};
@@ -29,9 +30,6 @@ const SAYS_SIGN: f64 = 0.2;
 /// among them seven tenths of the normals that are off by 30°.
 const UNCERTAIN_NORMAL: f64 = 0.3;
 
-/// Curvature times the radius of the cloud up to which a surface counts as flat.
-const FLAT: f64 = 0.1;
-
 /// Optional knowledge of a surface beside its points.
 #[derive(Clone, Copy, Default)]
 pub struct Given<'a> {
@@ -42,6 +40,28 @@ pub struct Given<'a> {
 }
 
 /// Local regressions of a cloud with consistently oriented normals, d ≥ 2.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use gramian_numerics::observer::Unobserved;
+/// use gramian_numerics::points::cloud::Cloud;
+/// use gramian_numerics::points::sampling::Sampling;
+/// use gramian_numerics::surface::Surface;
+/// use gramian_numerics::surface::geometry::{Geometry, GeometryRequest};
+/// use gramian_numerics::surface::local::{Given, LocalSurface};
+///
+/// // 500 points of a circle of radius 2, for which nothing is chosen: no kernel, no noise.
+/// let angles = (0..500).map(|i| std::f64::consts::TAU * f64::from(i) / 500.0);
+/// let points = angles.flat_map(|t| [2.0 * t.cos(), 2.0 * t.sin()]).collect();
+/// let cloud = Arc::new(Cloud::new(points, 2)?);
+/// let sampling = Arc::new(Sampling::of(&cloud, &Unobserved)?);
+/// let given = Given { normals: None, sites: None };
+/// let surface: Surface = LocalSurface::of(cloud.clone(), sampling, given, &Unobserved)?.into();
+/// let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved)?;
+/// assert!(geometry.curvatures(&Unobserved)?.mean.iter().all(|mean| (mean - 0.5).abs() < 1e-3));
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
 pub struct LocalSurface {
     cloud: Arc<Cloud>,
     sampling: Arc<Sampling>,
@@ -196,21 +216,10 @@ impl LocalSurface {
 
     /// Turns normals to the side of the normals of nearby points.
     fn turn_outward(&self, queries: &Cloud, geometry: &mut PatchGeometry) {
-        let d = self.cloud.dimension();
         let mut found = Vec::new();
         geometry.turn(|query, normal| {
-            let neighbours = self.sampling.neighbours();
-            neighbours.nearest_into(queries.point(query), SPACING_NEIGHBOURS, &mut found);
-            let along: f64 = found
-                .iter()
-                .map(|found| {
-                    // Near a thin sheet this lets the point on the query's side decide.
-                    let spacing = self.sampling.spacing(found.point);
-                    let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
-                    weight * dot(&self.at_points.normals[found.point * d..][..d], normal)
-                })
-                .sum();
-            if along < 0.0 { -1.0 } else { 1.0 }
+            let near = NearNormals { sampling: &self.sampling, normals: &self.at_points.normals };
+            if near.along(queries.point(query), normal, &mut found) < 0.0 { -1.0 } else { 1.0 }
         });
     }
 }

@@ -17,8 +17,10 @@ mod request;
 use super::error::NumericsError;
 use super::function::interpolant::Interpolant;
 use super::observer::Observer;
+use crate::machine::vector::dot;
 use crate::points::cloud::Cloud;
-use crate::points::neighbours::Neighbours;
+use crate::points::neighbours::{Neighbour, Neighbours};
+use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 use geometry::GeometryRequest;
 use local::LocalSurface;
 pub use orientation::SurfaceOrientation;
@@ -97,6 +99,31 @@ impl Surface {
             Self::Signature(surface) => signature::serve(surface, queries, request, observer),
             Self::Local(surface) => surface.serve(queries, request, observer),
         }
+    }
+}
+
+/// Normals at the points of a cloud, `[n, d]`, with a side.
+struct NearNormals<'a> {
+    sampling: &'a Sampling,
+    normals: &'a [f64],
+}
+
+/// Squared distance, in spacings, at which a point has half of the greatest weight. Near a thin sheet the point on the
+/// side of the query decides.
+const SOFTENING: f64 = 1e-3;
+
+impl NearNormals<'_> {
+    /// Returns how much a direction at x goes along the normals of the nearest points, each weighted by the inverse
+    /// of its squared distance. `found` is a buffer.
+    fn along(&self, x: &[f64], direction: &[f64], found: &mut Vec<Neighbour>) -> f64 {
+        let d = direction.len();
+        self.sampling.neighbours().nearest_into(x, SPACING_NEIGHBOURS, found);
+        let of_point = |found: &Neighbour| {
+            let spacing = self.sampling.spacing(found.point);
+            let weight = 1.0 / (found.squared_distance + SOFTENING * spacing.powi(2));
+            weight * dot(&self.normals[found.point * d..][..d], direction)
+        };
+        found.iter().map(of_point).sum()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Prices of surfaces, and of geometry at queries: quadrics, offset models and local regressions.
 //!
-//! Constants are times measured in dimensions 2 to 16, in flops of the unit that [`Price`] has.
+//! Constants are times measured in dimensions 2 to 16, expressed in the flops of [`Price`].
 
 use crate::machine::price::{Price, Sizes};
 use crate::patches::MAX_LOCAL_DIMENSION;
@@ -11,25 +11,30 @@ use crate::points::thinning::n_coarse;
 use crate::solver::price::FactorPrice;
 use crate::sums::price::pair_flops;
 
-/// Queries at which one request may ask the offset model: as much work as a factorization of 8,500 points.
+/// Number of queries at which one request may use the offset model. This is as much work as a factorization
+/// of 8,500 points.
 pub const MAX_OFFSETS: usize = 20_000;
 
-/// At how many queries the offset model is asked, which is known only afterwards.
+/// Queries at which the offset model is used. Their number is known only afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Offsets {
-    /// Where the gradient of the signature function vanishes: nowhere on spheres, tori and the bunny,
-    /// everywhere on a plane.
+    /// Queries where the gradient of the signature function vanishes. There are none on spheres, tori and the
+    /// bunny. On a plane, all queries are of this kind.
     Rescues,
-    /// Where quadrics do not confirm curvatures as well. By the time that it takes: nearly nowhere on spheres
-    /// of 1,000 points and more, at some tenth of a random torus of 3,000, nearly everywhere on one of 1,000,
-    /// on a sphere of 256, and on the bunny.
+    /// Queries without a gradient, and queries where quadrics do not confirm curvatures.
+    ///
+    /// Their share, estimated by the time taken:
+    /// - nearly none on spheres of 1,000 points and more,
+    /// - about a tenth on a random torus of 3,000 points,
+    /// - nearly all on a random torus of 1,000 points, on a sphere of 256, and on the bunny.
     Confirmations,
     /// At every query.
     Everywhere,
 }
 
 impl Offsets {
-    /// A number between the extremes: 2 in 100 queries, a quarter, all.
+    /// Estimates the number of queries with an offset model, between the extremes: 2 in 100, a quarter, or
+    /// all.
     fn n_asked(self, n_queries: usize) -> usize {
         let n_asked = match self {
             Self::Rescues => n_queries / 50,
@@ -40,29 +45,32 @@ impl Offsets {
     }
 }
 
-/// What is asked of a surface at queries.
+/// Quantities requested of a surface at queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AskedOfSurface {
     pub offsets: Offsets,
-    /// Whether curvatures are held against a quadric of each query: those at the points of the surface are
-    /// made with it.
+    /// Whether curvatures are compared with a quadric at each query. Points of the surface get theirs with
+    /// the surface.
     pub has_own_quadrics: bool,
-    /// Whether local regressions say how far off the geometry is.
+    /// Whether local regressions estimate the errors of the geometry.
     pub has_deviations: bool,
 }
 
-/// The price of a surface by its signature function: the sums at the points, two searches and a quadric at each.
+/// The price of a surface by its signature function: the sums at the points, two searches and a quadric at
+/// each.
 ///
-/// Jets, normals and quadrics are kept; while they are made, half as much again is there beside the lists of neighbours.
+/// Jets, normals and quadrics are kept. While they are made, they take half as much again, besides the lists
+/// of neighbours.
 pub(crate) fn signature_surface_price(n_points: usize, dimension: usize) -> Price {
     let n = n_points as f64;
     let at_points = n * pair_flops(dimension, 2) + quadric_flops(n_points, dimension);
     let flops = n * at_points + 2.0 * sampling_flops(n_points, dimension);
-    // 4.5 kB in three dimensions were measured when quadrics were small vectors (tests/it/memory.rs); now it is a bound.
+    // In three dimensions, 4.5 kB were measured when quadrics were small vectors (tests/it/memory.rs). Now it
+    // is a bound.
     Price { n_bytes: n_points.saturating_mul(1500 + 400 * dimension * dimension), flops }
 }
 
-/// The price of a surface by local regressions, with the side chosen by a coarse signature function.
+/// The price of a surface by local regressions, whose side is chosen by a coarse signature function.
 pub(crate) fn local_surface_price(n_points: usize, dimension: usize) -> Price {
     let (n, coarse) = (n_points as f64, n_coarse(n_points));
     let of_coarse = FactorPrice::of(coarse, dimension).expected;
@@ -91,8 +99,8 @@ pub(crate) fn local_geometry_price(sizes: Sizes) -> Price {
     Price::of_numbers(at_queries, regression_flops(sizes.dimension) * sizes.n_queries as f64)
 }
 
-/// Numbers that the geometry at a query takes: two jets, normal, curvatures, directions, what is said about it, and its
-/// neighbours.
+/// Count of numbers held for the geometry at a query: two jets, normal, curvatures, directions, reports on
+/// it, and its neighbours.
 pub(super) fn numbers_at_query(dimension: usize) -> usize {
     20 + 6 * dimension * dimension + 2 * n_quadric_neighbours(dimension)
 }
@@ -102,8 +110,8 @@ pub(super) fn geometry_flops(asked: AskedOfSurface, sizes: Sizes) -> f64 {
     let ([n, queries, d], Sizes { n_points, n_queries, dimension }) = (sizes.as_f64(), sizes);
     let quadrics = if asked.has_own_quadrics { quadric_flops(n_points, dimension) } else { 0.0 };
     let regressions = choosing_flops(n_points, dimension) + queries * regression_flops(dimension);
-    // Without deviations regressions are asked for where a normal is in doubt: nowhere on smooth surfaces, everywhere
-    // on rough scans. Small clouds are not doubted.
+    // Without deviations, regressions run only where a normal is in doubt: nowhere on smooth surfaces,
+    // everywhere on rough scans. Normals of small clouds are never in doubt.
     let may_doubt = n_points >= 4 * n_quadric_neighbours(dimension);
     let share = match (asked.has_deviations, asked.offsets) {
         (true, _) => 1.0,
@@ -116,11 +124,13 @@ pub(super) fn geometry_flops(asked: AskedOfSurface, sizes: Sizes) -> f64 {
         + share * regressions
 }
 
-/// Threads that regress batches at most, as far as memory is counted.
+/// Largest number of threads with batches of regressions, as far as memory is counted.
 const MAX_REGRESSING_THREADS: usize = 64;
 
-/// Numbers of the deviations of geometry, if they are asked for: those of the regressions, the normals and shapes that
-/// come with them, and the room of threads that make them.
+/// Count of numbers held for deviations of the geometry, or 0 unless they are requested.
+///
+/// These are the numbers of the regressions, the normals and shapes that come with them, and the memory of
+/// threads that make them.
 pub(super) fn deviation_numbers(asked: AskedOfSurface, sizes: Sizes) -> usize {
     let Sizes { n_queries, dimension, .. } = sizes;
     if !asked.has_deviations {
@@ -136,19 +146,20 @@ pub(super) fn deviation_numbers(asked: AskedOfSurface, sizes: Sizes) -> usize {
     at_queries.saturating_add(n_threads * 8 * count * (count + 4 * n_terms + 16))
 }
 
-/// Flops of a quadric through the nearest points, by orthogonal factorization, with the search for them.
+/// Flops of a quadric through the nearest points, by orthogonal factorization, including the search for them.
 fn quadric_flops(n_points: usize, dimension: usize) -> f64 {
     let n_columns = n_coefficients(dimension);
     let n_rows = n_quadric_neighbours(dimension).min(n_points);
-    // Fewer points than coefficients have none.
+    // There is no quadric with fewer points than coefficients.
     let factorization = if n_rows < n_columns { 0.0 } else { 12.5 * (n_rows * n_columns * n_columns) as f64 };
     1e5 + 500.0 * (n_columns as f64).powi(2) + factorization
 }
 
-/// Points of an offset model at most that count: larger ones reach other sheets, and are given up.
+/// Largest number of points in an offset model that counts. Larger models reach other sheets and are given
+/// up.
 const MAX_COUNTED: usize = 150;
 
-/// Flops of the offset model at one query: layers of seven points a coefficient.
+/// Flops of the offset model at one query. Its layers have seven points for each coefficient.
 fn offset_flops(n_points: usize, dimension: usize) -> f64 {
     let n_counted = (7 * n_coefficients(dimension)).min(n_points).min(MAX_COUNTED);
     1e6 + 2e3 * (n_counted as f64).powi(2)

@@ -8,7 +8,6 @@ mod formats;
 mod headers;
 mod links;
 pub mod responses;
-pub mod version_3_0;
 
 use serde_json::Value;
 use utoipa::openapi::RefOr;

@@ -1,4 +1,4 @@
-//! `/v1/clouds`: registered clouds, named by their content.
+//! `/v1/clouds`: clouds registered under the hash of their content.
 
 use std::fmt;
 use std::sync::Arc;
@@ -33,19 +33,21 @@ use crate::store::objects::{ListWindow, Listed};
 use gramian_numerics::points::sampling::sampling_price;
 use gramian_numerics::points::sampling::{NearestRange, Scales};
 
-/// Clouds in a page when the client names no number.
+/// Default number of clouds in a page.
 const DEFAULT_PAGE: usize = 50;
-/// Clouds in a page at most.
+/// Largest number of clouds in a page.
 const MAX_PAGE: usize = 1000;
 
 /// Points to register.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CloudRequest {
-    /// The points, one row of coordinates each, all of the same length.
+    /// The points, one row of coordinates each. All rows have the same length.
     #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
     pub points: Points,
-    /// Normals at the points, one row each, of any length but 0. Their side is outward. An empty list counts as absent.
+    /// Normals at the points, one row each.
+    ///
+    /// They may have any length but 0. The side they point to is outward. An empty list counts as absent.
     #[serde(default, deserialize_with = "present_unless_empty")]
     #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
     pub normals: Option<Points>,
@@ -54,20 +56,20 @@ pub struct CloudRequest {
 /// The smallest box around a cloud.
 #[derive(Serialize, ToSchema)]
 pub struct BoundingBox {
-    /// The least value of each coordinate.
+    /// The smallest value of each coordinate.
     min: Vec<f64>,
-    /// The greatest value of each coordinate.
+    /// The largest value of each coordinate.
     max: Vec<f64>,
 }
 
-/// Distances from each point to the nearest point elsewhere.
+/// Statistics of the distance from each point to the nearest point elsewhere.
 #[derive(Serialize, ToSchema)]
 pub struct Spacing {
-    /// The least of them.
+    /// The smallest distance.
     min: f64,
-    /// The middle one.
+    /// The median distance.
     median: f64,
-    /// The greatest of them.
+    /// The largest distance.
     max: f64,
 }
 
@@ -79,18 +81,20 @@ pub struct Cloud {
     cloud_id: String,
     /// Number of points, n.
     n_points: usize,
-    /// Coordinates of each point, d.
+    /// Number of coordinates of each point, d.
     dimension: usize,
     /// The smallest box around the points.
     bounding_box: BoundingBox,
-    /// Distances between nearest points; absent if all points coincide, and in lists until the cloud was registered or
-    /// described by itself, or a kernel chosen for it.
+    /// Distances between nearest points.
+    ///
+    /// Absent if all points coincide. A list of clouds has it only once a kernel was chosen for the cloud, or
+    /// the cloud was registered or described by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     spacing: Option<Spacing>,
-    /// Points that coincide with an earlier one.
+    /// Number of points that coincide with an earlier point.
     n_duplicates: usize,
-    /// When it was registered, in UTC.
+    /// The time of registration, in UTC.
     #[schema(format = DateTime)]
     created_at: String,
 }
@@ -104,7 +108,7 @@ impl From<&RegisteredCloud> for Cloud {
 }
 
 impl Cloud {
-    /// As its head in the store has it.
+    /// Describes a cloud by its head in the store, which knows no spacing.
     fn of_head(id: CloudId, head: CloudHead) -> Self {
         let (min, max) = head.bounding_box;
         Self {
@@ -137,7 +141,7 @@ fn written(time: SystemTime) -> String {
 pub struct CloudList {
     /// The clouds of this page.
     clouds: Vec<Cloud>,
-    /// The cursor of the next page; absent on the last one.
+    /// The cursor of the next page. Absent on the last page.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, value_type = Option<CursorSchema>)]
     next: Option<String>,
@@ -145,8 +149,9 @@ pub struct CloudList {
 
 /// Register a cloud
 ///
-/// Keeps the points under an id that is the hash of their coordinates, so that later requests need not repeat them. Posting
-/// the same points again answers 200 with the same id. Clouds live in a bounded store, least recently used out first.
+/// Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+/// coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded store,
+/// which drops the least recently used first.
 #[utoipa::path(
     post,
     path = "/v1/clouds",
@@ -174,7 +179,7 @@ pub async fn create_cloud(
         let (request, mut memory) = intake.parse::<CloudRequest>(&shared, observer)?;
         let planner = Planner::new(&shared, owner);
         let (stored, is_new) = planner.register(request.points, request.normals, "")?;
-        // With what looking at its neighbours takes.
+        // `describe` samples the cloud, which takes memory beside the cloud itself.
         memory.shrink_to(
             stored
                 .n_bytes()
@@ -183,7 +188,7 @@ pub async fn create_cloud(
         Ok::<_, Problem>((stored, is_new, memory))
     };
     let (stored, is_new, _memory) = app.compute.run(&admission, flops, job).await?.0?;
-    // With a store it is the store that knows: memory lets go of clouds, and other processes delete them.
+    // The store decides if there is one. Memory drops clouds, and other processes delete them.
     let is_new_to_store = keep(&app, owner, &stored).await?;
     let is_new = if app.durable.is_some() { is_new_to_store } else { is_new };
     let cloud = describe(&app, &admission, &stored).await?;
@@ -195,8 +200,9 @@ pub async fn create_cloud(
 
 /// Describe a cloud
 ///
-/// Its size, the box around it and the distances between its points, not the points. `ETag` and `If-None-Match` save the
-/// body; asking keeps the cloud from being dropped as the least recently used.
+/// Returns the size of the cloud, the box around it and the distances between its points, but not the points.
+/// `ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to be
+/// dropped.
 #[utoipa::path(
     get,
     path = "/v1/clouds/{cloud_id}",
@@ -226,7 +232,7 @@ pub async fn get_cloud(
     Ok(([(header::ETAG, etag)], Json(cloud)).into_response())
 }
 
-/// Describes a cloud, with what its positions say.
+/// Describes a cloud, including its spacing. Samples the cloud unless it was sampled before.
 async fn describe(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -242,7 +248,7 @@ async fn describe(
 
 /// Check for a cloud
 ///
-/// As GET, without the body.
+/// Answers like GET on the same path, without the body.
 #[utoipa::path(
     head,
     path = "/v1/clouds/{cloud_id}",
@@ -269,7 +275,7 @@ pub async fn check_cloud(
 
 /// Delete a cloud
 ///
-/// Forgets the points and everything that was computed from them.
+/// Deletes the points and everything that was computed from them.
 #[utoipa::path(
     delete,
     path = "/v1/clouds/{cloud_id}",
@@ -293,7 +299,7 @@ pub async fn delete_cloud(
 
 /// List clouds
 ///
-/// The clouds registered with this key, oldest first.
+/// Returns the clouds registered with this key, oldest first.
 #[utoipa::path(
     get,
     path = "/v1/clouds",
@@ -318,17 +324,21 @@ pub async fn list_clouds(
     Ok(Json(CloudList { clouds: clouds.into_iter().map(Cloud::from).collect(), next }))
 }
 
-/// The place of the last cloud of a page in the order of the list: it holds when that cloud is gone. Opaque to clients.
+/// The place of the last cloud of a page in the order of the list. Opaque to clients.
+///
+/// A cursor stays valid after its cloud was deleted.
 struct Cursor(Listed);
 
 impl Cursor {
-    /// As the pattern of the document: from_str_radix alone takes a sign, capitals and any number of zeros too.
+    /// Parses a cursor that matches the pattern in the OpenAPI document.
+    ///
+    /// `from_str_radix` alone would also accept a sign, capitals and any number of zeros.
     fn parse(text: &str) -> Option<Self> {
         let (nanoseconds, id) = text.split_once('-')?;
         let is_plain =
             nanoseconds.len() <= 32 && nanoseconds.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f'));
         let nanoseconds = u128::from_str_radix(nanoseconds, 16).ok().filter(|_| is_plain)?;
-        // Behind all of them, where nothing is.
+        // A time beyond u64 nanoseconds lies behind all clouds, so its page is empty.
         let nanoseconds = u64::try_from(nanoseconds).unwrap_or(u64::MAX);
         let since = SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
         Some(Self(Listed { since, id: CloudId::parse(id)? }))
@@ -342,7 +352,7 @@ impl fmt::Display for Cursor {
     }
 }
 
-/// The window that a query asks for.
+/// Parses the window of the list from a query string.
 fn parse_window(query: &str) -> Result<ListWindow, Problem> {
     let mut window = ListWindow { after: None, n: DEFAULT_PAGE };
     for pair in query.split('&').filter(|pair| !pair.is_empty()) {
@@ -368,7 +378,10 @@ fn parse_window(query: &str) -> Result<ListWindow, Problem> {
     Ok(window)
 }
 
-/// Weak: a cloud that was deleted and posted again has the same points, but another `created_at`.
+/// Returns the entity tag of a cloud.
+///
+/// The tag is weak because a cloud that was deleted and posted again has the same points, but another
+/// `created_at`.
 fn etag_of(stored: &RegisteredCloud) -> String {
     format!("W/\"{}\"", stored.id)
 }
@@ -383,7 +396,9 @@ async fn find(
     find_cloud(app, admission, id).await?.ok_or_else(unknown)
 }
 
-/// RFC 9110, section 13.1.2: a list of tags, weak or strong, or `*`.
+/// Returns whether `If-None-Match` has the tag.
+///
+/// The header is a list of tags, weak or strong, or `*` (RFC 9110, section 13.1.2).
 fn is_known(headers: &HeaderMap, etag: &str) -> bool {
     let opaque = |tag: &str| tag.strip_prefix("W/").unwrap_or(tag).to_owned();
     let lines = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());

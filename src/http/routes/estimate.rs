@@ -1,4 +1,4 @@
-//! `POST /v1/estimate`.
+//! `POST /v1/estimate`: the cost of a request of another operation.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ use crate::http::wire::write::json::Json;
 use crate::store::Owner;
 use gramian_numerics::error::SolverKind;
 
-/// A request of another operation, with the name of that operation.
+/// A request of another operation, with the name of that operation as a further member.
 pub struct EstimateRequest;
 
 impl PartialSchema for EstimateRequest {
@@ -74,32 +74,35 @@ impl PartialSchema for OperationName {
 
 impl ToSchema for OperationName {}
 
-/// What a request would take.
+/// The expected cost of a request.
 #[derive(Serialize, ToSchema)]
 pub struct EstimateResponse {
     /// The operation, repeated.
     operation: &'static str,
-    /// What it would be served by.
+    /// The solver that would be used.
     solver: SolverUsed,
-    /// Floating-point operations, as counted beforehand.
+    /// Number of floating-point operations, counted beforehand.
     #[schema(minimum = 0.0)]
     flops: f64,
-    /// Memory that it would take beside what is held already.
+    /// Memory that the request would need beside what is held already, bytes.
     bytes: u64,
-    /// Seconds from its turn to its answer, by what ran on this machine since the server started.
+    /// Expected seconds from the request's turn in the queue to its answer.
+    ///
+    /// They are learned from what ran on this machine since the server started.
     #[schema(minimum = 0.0)]
     seconds: f64,
-    /// Whether all factorizations that it needs are there.
+    /// True if all factorizations that the request needs are there.
     cached: bool,
-    /// Whether there is memory and time enough for it, if nothing else is under way.
+    /// True if memory and time suffice for the request when nothing else runs.
     admissible: bool,
 }
 
 /// Estimate a request
 ///
-/// What another request would take, before it is sent: the body is that of the other request, with the name of its operation as one member
-/// more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the request itself would do. What
-/// would be refused is refused here as well, with the same problem; times are learned from what ran on this machine.
+/// Returns the cost of another request before it is sent. The body is that of the other request, with
+/// `operation` as a further member. Nothing is factorized. Points in the body are registered and their
+/// neighbours are searched, as the request itself would do. A request that would be refused is refused here
+/// with the same problem. Times are learned from what ran on this machine.
 #[utoipa::path(
     post,
     path = "/v1/estimate",
@@ -123,7 +126,7 @@ pub async fn estimate(
     estimate_of(&operation, &app, &admission, intake).await
 }
 
-/// The operation, and the body to be read once more as a request of it.
+/// Returns the name of the operation, and the body to be read again as a request of that operation.
 fn name_of(intake: Intake, app: &App, observer: &JobObserver) -> Result<(String, Intake), Problem> {
     let (body, memory) = intake.unpack(app, observer)?;
     let named: WithOperation<IgnoredAny> = body.parse(&ParseContext::new(&app.config, observer))?;
@@ -134,7 +137,7 @@ fn name_of(intake: Intake, app: &App, observer: &JobObserver) -> Result<(String,
 
 macro_rules! operations {
     ($($request:ty),* $(,)?) => {
-        /// All operations that can be estimated.
+        /// Names of all operations that can be estimated.
         pub const NAMES: &[&str] = &[$(<$request as Operation>::NAME),*];
 
         async fn estimate_of(
@@ -151,10 +154,11 @@ macro_rules! operations {
             Err(Problem::invalid_request("/operation", detail))
         }
 
-        /// Reads a body as a request of an operation, and forgets it.
+        /// Parses a body as a request of an operation, and drops the request. Any name outside [`NAMES`]
+        /// means the registration of a cloud.
         ///
         /// # Errors
-        /// What the request would be refused with.
+        /// Returns the problem that the request would be refused with.
         pub fn read_as(operation: &str, body: &UnpackedBody, context: &ParseContext<'_>) -> Result<(), Problem> {
             $(if operation == <$request as Operation>::NAME {
                 return body.parse::<$request>(context).map(drop);

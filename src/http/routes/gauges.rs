@@ -1,4 +1,4 @@
-//! What holds at a moment, and what others count: read anew each time it is asked for.
+//! Metrics that are read at each scrape: the current state of the app, and counts that its parts keep.
 
 use prometheus::core::Collector;
 use prometheus::process_collector::ProcessCollector;
@@ -9,10 +9,10 @@ use crate::http::state::app::App;
 use crate::store::Counts;
 use crate::store::objects::Verb;
 
-/// Load, memory, stores and process, as they are now.
+/// Reads the metrics of load, memory, stores and process.
 ///
 /// # Errors
-/// None but for two families of one name.
+/// Fails only if two families have the same name.
 pub fn gather(app: &App) -> Result<Vec<MetricFamily>, Error> {
     let moment = Moment::default();
     moment.gauges(
@@ -30,7 +30,7 @@ pub fn gather(app: &App) -> Result<Vec<MetricFamily>, Error> {
 
 fn read_load(app: &App, moment: &Moment) -> Result<(), Error> {
     let (load, jobs) = (app.compute.load(), app.jobs.load());
-    // Jobs wait for a turn of their own before they come to a lane.
+    // Jobs wait in a queue of their own before they enter a lane.
     let n_waiting = load.lanes.iter().map(|lane| lane.n_waiting).sum::<usize>() + jobs.n_waiting;
     let (running, waiting): (Vec<_>, Vec<_>) =
         load.lanes.iter().map(|lane| ((lane.name, lane.n_running), (lane.name, lane.n_waiting))).unzip();
@@ -98,7 +98,7 @@ fn read_store(app: &App, moment: &Moment) -> Result<(), Error> {
     moment.counters("gramian_store_damaged_total", help, &[], &[(vec![], n_damaged)])
 }
 
-/// Families that were set once.
+/// A registry for one scrape. Each family is added with its values, and never changes.
 #[derive(Default)]
 struct Moment(Registry);
 
@@ -109,14 +109,14 @@ impl Moment {
         Ok(())
     }
 
-    /// A gauge for each value of a label.
+    /// Adds a family with a gauge for each value of a label.
     fn gauges(&self, name: &str, help: &str, label: &str, values: &[(&str, usize)]) -> Result<(), Error> {
         let gauges = self.add(IntGaugeVec::new(Opts::new(name, help), &[label])?)?;
         values.iter().for_each(|&(of, value)| gauges.with_label_values(&[of]).set(value as i64));
         Ok(())
     }
 
-    /// A counter for each combination of labels.
+    /// Adds a family with a counter for each combination of label values.
     fn counters(
         &self,
         name: &str,

@@ -1,4 +1,4 @@
-//! `/v1/jobs`: work that was asked for with `Prefer: respond-async`.
+//! `/v1/jobs`: requests that were sent with `Prefer: respond-async`.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -26,19 +26,20 @@ use crate::store::Owner;
 use crate::store::budget::Reservation;
 use crate::store::objects::jobs::{JobId, Outcome};
 
-/// How often those who follow a job are told how far it is, if it is any further.
+/// Interval at which a followed job is checked for progress.
 const TELLING: Duration = Duration::from_millis(500);
 
-/// How much sooner than the deadline of its request a wait for a result ends.
+/// Time by which a wait for a result ends before the deadline of its request.
 const MARGIN: Duration = Duration::from_secs(1);
 
 /// Bytes of a result that one reader may hold: pieces in the buffers of hyper, and one on its way from the
-/// store. They are reserved until the answer is sent.
+/// store. They stay reserved until the answer is sent.
 const BYTES_UNDER_WAY: usize = 256 << 10;
 
 /// Look at a job
 ///
-/// Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+/// Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how long
+/// it will take.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}",
@@ -58,7 +59,7 @@ pub async fn get_job(
 
 /// Delete a job
 ///
-/// Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+/// Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its result.
 #[utoipa::path(
     delete,
     path = "/v1/jobs/{job_id}",
@@ -87,8 +88,8 @@ pub async fn delete_job(
 
 /// Follow a job
 ///
-/// Server-sent events: `progress`, with the job as its data, whenever it is further than before; `done`, with the job, when it has ended, and
-/// then nothing more.
+/// Sends server-sent events whose data is the job. `progress` is sent whenever the job is further than
+/// before. `done` is sent when the job has ended, and is the last event.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}/events",
@@ -107,7 +108,7 @@ pub async fn follow_job(
     let first = look(&app, owner, id).await?;
     let followed = follow(&app, owner)?;
     let events = futures_util::stream::unfold(Following::First(Box::new(first)), move |following| {
-        // For as long as there are events.
+        // The client counts as a follower until the stream ends.
         let _ = &followed;
         let app = app.clone();
         async move {
@@ -126,14 +127,17 @@ pub async fn follow_job(
     Ok(Sse::new(events).keep_alive(KeepAlive::default()))
 }
 
-/// What somebody who follows a job is told next.
+/// The next event for a client that follows a job.
 enum Following {
     First(Box<JobView>),
     Further(Box<JobView>),
     Ended,
 }
 
-/// The job when it is any further; nothing if it is gone, or this process is to end: who follows asks again.
+/// Waits until a job differs from its last view, and returns the new view.
+///
+/// Returns `None` if the job is gone or this process shuts down. The stream then ends, and the client asks
+/// again.
 async fn further(app: &App, owner: Owner, id: JobId, last: &JobView) -> Option<JobView> {
     loop {
         tokio::select! {
@@ -150,8 +154,9 @@ async fn further(app: &App, owner: Owner, id: JobId, last: &JobView) -> Option<J
 
 /// Fetch the result of a job
 ///
-/// What the request is answered with, its problem included; a success is 200 with the media type that the request asked for. Waits for the job
-/// to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+/// Answers as the request of the job would have been answered, problems included. A success is 200 with the
+/// media type that the request asked for. Waits for the job to end. If that takes longer than the deadline of
+/// requests, the answer is 504, and the job goes on.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{job_id}/result",
@@ -175,7 +180,7 @@ pub async fn get_job_result(
 ) -> Result<Response, Problem> {
     let id = parse(&job_id)?;
     let first = look(&app, owner, id).await?;
-    // Who waits has a connection for as long as who follows.
+    // A waiting client holds its connection as long as a follower does, so it counts as one.
     let waiting = if first.has_ended() { None } else { Some(follow(&app, owner)?) };
     let deadline = app.config.deadline();
     let patience = deadline.saturating_sub(MARGIN).max(deadline / 2);
@@ -190,7 +195,7 @@ pub async fn get_job_result(
     let name = app.keys.name_of(owner);
     let found = app.jobs.objects.get_result(&name, id).await.map_err(|error| unavailable(&error))?;
     let Some(found) = found else {
-        // The job was deleted meanwhile, or its result was damaged.
+        // Either the job was deleted meanwhile, which is 404 here, or its result was damaged.
         find_known(&app, &name, id).await?;
         return Err(Problem::unavailable("the result was damaged, and is made again", SECONDS_UNTIL_BACK));
     };
@@ -215,7 +220,7 @@ pub async fn get_job_result(
     Ok(response)
 }
 
-/// A place among those who wait for jobs.
+/// Takes a place among the clients that follow jobs or wait for them.
 fn follow(app: &App, owner: Owner) -> Result<Reservation, Problem> {
     app.jobs.follow(owner).ok_or_else(|| app.compute.out_of_memory())
 }

@@ -1,4 +1,4 @@
-//! `GET /v1/kernels`.
+//! `GET /v1/kernels`: the kernel families, as a list for clients.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -8,46 +8,50 @@ use crate::http::openapi::responses::ReadProblems;
 use crate::http::wire::write::json::Json;
 use gramian_numerics::kernel::{Family, WendlandSmoothness};
 
-/// A parameter that a family takes beside `length_scale` and `variance`.
+/// A parameter of a kernel family beside `length_scale` and `variance`.
 #[derive(Serialize, ToSchema)]
 pub struct KernelParameter {
-    /// Its name in a kernel object.
+    /// The name of the parameter in a kernel object.
     name: &'static str,
-    /// The value if absent.
+    /// The default.
     default: f64,
-    /// The values it may take.
+    /// The values that the parameter may take.
     range: &'static str,
 }
 
 /// A family of kernels.
 #[derive(Serialize, ToSchema)]
 pub struct KernelDescription {
-    /// The name in a kernel object.
+    /// The name of the family in a kernel object.
     family: KernelFamily,
-    /// φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel is variance · φ.
+    /// φ as a function of r. The kernel is variance · φ(r).
+    ///
+    /// r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c².
     formula: &'static str,
-    /// How smooth functions fitted with it are.
+    /// The smoothness of functions fitted with the kernel.
     smoothness: &'static str,
     /// Parameters beside `length_scale`, or `length_scales`, and `variance`.
     parameters: Vec<KernelParameter>,
-    /// The greatest dimension in which it is positive definite; absent if every one.
+    /// The largest dimension in which the kernel is positive definite. Absent if there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     max_dimension: Option<usize>,
-    /// Whether it has derivatives at the points of the cloud, as geometry and operators need there.
+    /// The condition under which the kernel has derivatives at the points of the cloud.
+    ///
+    /// Geometry and operators need derivatives there.
     differentiable_at_points: &'static str,
 }
 
-/// All families.
+/// All kernel families.
 #[derive(Serialize, ToSchema)]
 pub struct KernelList {
-    /// The families, in the order of their names in the documentation.
+    /// The families, in the order in which the documentation names them.
     kernels: Vec<KernelDescription>,
 }
 
 /// List kernels
 ///
-/// The families of kernels with their formulas, parameters and smoothness.
+/// Returns the kernel families with their formulas, parameters and smoothness.
 #[utoipa::path(
     get,
     path = "/v1/kernels",

@@ -1,4 +1,4 @@
-//! One file per resource: request, response, handler, in that order.
+//! Routes, one file per resource. Each file has request, response and handler, in that order.
 
 pub mod clouds;
 pub mod estimate;

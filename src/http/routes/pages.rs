@@ -1,6 +1,6 @@
-//! Pages for people: where to begin, and what problems mean. None of them needs a key.
+//! HTML pages for people: the start page, and explanations of problems. No page needs a key.
 //!
-//! Links are relative, so that they hold behind a proxy that serves all of it below a path of its own.
+//! Links are relative, so that they work behind a proxy that serves everything below a path prefix.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use crate::http::problem::slug::Slug;
 
 /// Begin here
 ///
-/// A page that leads to the documentation, the documents for generators and the problems.
+/// Returns a page with links to the documentation, the OpenAPI documents for generators and the problems.
 #[utoipa::path(
     get,
     path = "/",
@@ -42,7 +42,7 @@ pub async fn get_start_page() -> Html<String> {
 
 /// List the problems
 ///
-/// A page with every type of problem that there is, and a link to the page of each.
+/// Returns a page with every type of problem, and a link to the page of each.
 #[utoipa::path(
     get,
     path = "/problems",
@@ -62,7 +62,7 @@ pub async fn list_problem_pages() -> Html<String> {
 
 /// Explain a problem
 ///
-/// The page behind the `type` of a problem document: what it means and what to do.
+/// Returns the page behind the `type` of a problem document: its meaning, and what to do.
 #[utoipa::path(
     get,
     path = "/problems/{slug}",

@@ -1,4 +1,4 @@
-//! What the process says of itself: health and version. None of it needs a key.
+//! State of the process: health, metrics and version. None of these needs a key.
 
 use std::sync::Arc;
 
@@ -23,24 +23,24 @@ pub struct Health {
     status: &'static str,
 }
 
-/// What is running.
+/// The build that is running, and what it runs on.
 #[derive(Serialize, ToSchema)]
 pub struct Version {
     /// The name of the service.
     name: &'static str,
-    /// Its version.
+    /// The version of the service.
     version: &'static str,
-    /// The interface it serves.
+    /// The version of the interface.
     api: &'static str,
-    /// The instruction set that the kernel loops run on, chosen at start.
+    /// The instruction set of the kernel loops, chosen at start.
     instruction_set: &'static str,
-    /// Compute threads.
+    /// Number of compute threads.
     threads: usize,
 }
 
 /// Check that the process lives
 ///
-/// 200 as long as it answers at all, whatever it is busy with.
+/// Answers 200 as long as the process answers at all, whatever it is busy with.
 #[utoipa::path(
     get,
     path = "/health/live",
@@ -55,8 +55,12 @@ pub async fn check_live() -> Json<Health> {
 
 /// Check that the process takes requests
 ///
-/// 503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the store is required, while that
-/// does not take what it is given.
+/// Answers 503 in each of these cases:
+///
+/// - the queue is full
+/// - the process shuts down
+/// - the compute threads make no progress
+/// - the store is required and does not take what it is given
 #[utoipa::path(
     get,
     path = "/health/ready",
@@ -78,8 +82,9 @@ pub async fn check_ready(State(app): State<Arc<App>>) -> Result<Json<Health>, Pr
 
 /// Read the metrics
 ///
-/// Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route and status, the queue, memory,
-/// caches, solvers, refusals, the store and the process. No label takes what clients send.
+/// Returns counters, histograms and gauges in the text format of Prometheus, version 0.0.4. They cover
+/// requests by route and status, the queue, memory, caches, solvers, refusals, the store and the process. No
+/// label has text that clients send.
 #[utoipa::path(
     get,
     path = "/metrics",
@@ -98,7 +103,8 @@ pub async fn get_metrics(State(app): State<Arc<App>>) -> Result<Response, Proble
 
 /// Describe the build
 ///
-/// The version of the service and what it chose to run on this machine.
+/// Returns the version of the service, and the instruction set and number of threads that it chose on this
+/// machine.
 #[utoipa::path(
     get,
     path = "/version",

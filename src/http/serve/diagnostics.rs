@@ -1,4 +1,4 @@
-//! Diagnostics of an answer, from what its fit is and what the model reports.
+//! Diagnostics of an answer, from the plan of its fit and the report of its model.
 
 use super::fitted::Fitted;
 use super::plan::words;
@@ -9,7 +9,7 @@ use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::solver::{Disagreement, Method, Outlier};
 use gramian_numerics::sums::regularization::Regularization;
 
-/// Below this reciprocal condition fewer than three digits of the weights are sure.
+/// Reciprocal condition below which fewer than three digits of the weights are certain.
 const ILL_CONDITIONED: f64 = 1e-13;
 
 const TOO_SMALL: &str = "squares of the values leave float64: their variance is taken to be 1e-290, and deviations are too long; scale the values";
@@ -18,7 +18,7 @@ const MISFIT_OF_LEARNED: &str =
 const MISFIT_OF_GIVEN: &str = "deviations are too short: leave out kernel and alpha, so that they are learned, or raise variance and alpha";
 
 impl Fitted {
-    /// What the answer says of this fit and of what was served from it.
+    /// Returns the diagnostics of this fit and of the function or surface served from it.
     pub fn diagnostics(&self, report: &Report, n_queries: usize) -> Diagnostics {
         let plan = &self.plan;
         let (cloud, scale) = (&plan.stored.cloud, plan.process.scale);
@@ -54,7 +54,8 @@ impl Fitted {
         }
     }
 
-    /// Kernel and α of the request or of the values; of local regressions those of the heights.
+    /// Returns kernel and α of the request, or those learned from the values. Local regressions have those of
+    /// heights.
     fn process_used(&self, report: &Report) -> (KernelUsed, Option<f64>) {
         match self.plan.recipe.process() {
             Some((kernel, regularization)) => {
@@ -86,7 +87,7 @@ impl Fitted {
             );
             warn(WarningCode::IllConditioned, detail);
         } else if reciprocal_condition < ILL_CONDITIONED && !plan.process.is_learned {
-            // Where the values decided, the least noise is what float64 bears, and the weights follow it on purpose.
+            // Where the values decided, float64 sets the least noise. The weights follow it on purpose.
             let detail = format!("the reciprocal condition is {reciprocal_condition:.1e}");
             warn(WarningCode::IllConditioned, detail);
         }
@@ -111,9 +112,11 @@ impl Fitted {
         warnings
     }
 
-    /// Warns where values contradict kernel and noise: those of a function that was solved, or else those that were
-    /// learned from. Where kernel and noise are given, only answers with deviations have the warning: the values
-    /// alone depend on nothing but the ratio of the two.
+    /// Warns where values contradict kernel and noise.
+    ///
+    /// The contradiction is that of the solved function, or else the one found when learning. Where kernel
+    /// and noise are given, only answers with deviations get the warning. Without deviations, an answer
+    /// depends only on the ratio of the two.
     pub fn warn_of_misfit(
         &self,
         diagnostics: &mut Diagnostics,
@@ -121,7 +124,7 @@ impl Fitted {
         has_deviations: bool,
     ) {
         let plan = &self.plan;
-        // Learning sees the points as they were sent, a solver sees them merged.
+        // Learning uses the points as they were sent, a solver uses them merged.
         let as_sent = |point: usize| plan.merge.as_ref().map_or(point, |merge| merge.first_point(point));
         let of_solution = of_solution.map(|found| {
             let outlier = found.outlier.map(|found| Outlier { point: as_sent(found.point), ..found });

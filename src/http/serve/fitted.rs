@@ -1,4 +1,4 @@
-//! The fits of a request, made ready.
+//! Fits of a request with their models.
 
 use std::sync::Arc;
 
@@ -21,11 +21,11 @@ use gramian_numerics::surface::Surface;
 /// The fits of one request.
 pub struct Fits {
     pub app: Arc<App>,
-    /// The fit of the values, or of the surface where there are no values.
+    /// Fit of the values, or of the surface where there are no values.
     pub main: Fitted,
-    /// The fit of the surface, where it is another one.
+    /// Fit of the surface, where it differs from the main fit.
     pub surface: Option<Fitted>,
-    /// The surface, of operations that ask about one.
+    /// The surface, for operations that need one.
     pub made: Option<Arc<Surface>>,
 }
 
@@ -36,15 +36,15 @@ pub struct Fitted {
 }
 
 impl Fits {
-    /// The fit of the surface.
+    /// Returns the fit of the surface.
     pub fn surface(&self) -> &Fitted {
         self.surface.as_ref().unwrap_or(&self.main)
     }
 
-    /// The function with these values.
+    /// Returns the function with these values.
     ///
     /// # Errors
-    /// Those of [`Solution::of`] as a [`Problem`].
+    /// Returns the errors of [`Solution::of`] as a [`Problem`].
     pub fn interpolant(&self, values: &Values, observer: &JobObserver) -> Result<Interpolant, Problem> {
         let solve = |known| {
             let merged = self.main.plan.merged(&values.list);
@@ -53,10 +53,11 @@ impl Fits {
         self.with_known_weights(values.key, solve, |function| Some(&function.solution))
     }
 
-    /// The function through the constant 1, without a mean: what the quality of a fit without values is judged by.
+    /// Returns the function through the constant 1, without a mean. It shows the quality of a fit without
+    /// values.
     ///
     /// # Errors
-    /// Those of [`Solution::of`] as a [`Problem`].
+    /// Returns the errors of [`Solution::of`] as a [`Problem`].
     pub fn interpolant_of_one(&self, observer: &JobObserver) -> Result<Interpolant, Problem> {
         let ones = vec![1.0; self.main.plan.stored.cloud.n_points()];
         let solve = |known| {
@@ -66,7 +67,7 @@ impl Fits {
         self.with_known_weights(ValuesKey::of(&ones), solve, |function| Some(&function.solution))
     }
 
-    /// Solves with the weights of values that were solved before, if they are kept, and keeps those that are new.
+    /// Solves with cached weights of these values, if there are any. New weights are cached.
     pub(super) fn with_known_weights<T>(
         &self,
         values: ValuesKey,
@@ -83,10 +84,11 @@ impl Fits {
         Ok(found)
     }
 
-    /// What is learned from the values, where the kernel is given and they were not asked.
+    /// Learns kernel and noise from the values where the kernel is given. Returns `None` if they were learned
+    /// already.
     ///
     /// # Errors
-    /// Those of [`learn`].
+    /// Returns the errors of [`learn`].
     pub fn learned_beside(
         &self,
         values: &[f64],
@@ -97,7 +99,8 @@ impl Fits {
             return Ok(None);
         }
         let observer = Beside(observer);
-        // In the coordinates of a kernel that stretches them: what it says of the axes is not judged.
+        // Learning uses the coordinates of a kernel that stretches them, so the ratios between axes are not
+        // judged.
         let stretched = recipe.process().and_then(|(kernel, _)| kernel.stretched_cloud(fitted));
         let cloud = stretched.as_ref().unwrap_or(fitted);
         let sampling = match stored.sampling().filter(|_| merge.is_none() && stretched.is_none()) {
@@ -115,18 +118,18 @@ impl Fitted {
         self.stored.model()
     }
 
-    /// A refusal of the numerics, with pointers into this fit.
+    /// Returns a refusal of the numerics, with pointers into this fit.
     pub fn refused(&self, error: NumericsError) -> Problem {
         self.plan.refused(error)
     }
 
-    /// Values at the fitted points, with the process that they are taken to come from.
+    /// Returns values at the fitted points, with their assumed process.
     pub fn fitted_values<'a>(&'a self, merged: &'a [f64]) -> FittedValues<'a> {
         let process = &self.plan.process;
         FittedValues { values: merged, mean: process.mean, trend: self.plan.trend(), scale: process.scale }
     }
 
-    /// A matrix of this fit with one column per point of the client's cloud.
+    /// Returns a matrix of this fit with one column per point of the client's cloud.
     pub fn unmerge(&self, matrix: Vec<f64>) -> Vec<f64> {
         match &self.plan.merge {
             None => matrix,

@@ -1,4 +1,4 @@
-//! From plans to factorizations and surfaces: found, or made once for all who ask, in memory that was taken for them.
+//! Models and surfaces for plans: found in the cache, or made once for all who ask, in reserved memory.
 
 use std::sync::{Arc, OnceLock};
 
@@ -20,18 +20,18 @@ use gramian_numerics::solver::Workspace;
 use gramian_numerics::surface::Surface;
 use gramian_numerics::surface::local::Given;
 
-/// Bytes that a request takes whatever its size: small vectors, headers, the text of its diagnostics.
+/// Bytes that a request takes whatever its size: small vectors, headers, and the text of its diagnostics.
 const LEAST_BYTES: usize = 16 << 10;
 
-/// Brings the factorizations of one request.
+/// Preparation of the models of one request: found in the cache, or made.
 pub struct Fitting<'a> {
     pub app: &'a Arc<App>,
     pub admission: &'a Arc<Admission>,
-    /// Whether the surface is asked for as well.
+    /// Whether the operation needs the surface as well.
     pub has_surface: bool,
 }
 
-/// What a request takes of the memory for work, taken at once: who waits for a part while holding another may wait for ever.
+/// Memory of a request, reserved all at once. Waiting for a part while holding another could deadlock.
 struct Memory {
     work: Reservation,
     main: Option<Reservation>,
@@ -40,10 +40,10 @@ struct Memory {
 }
 
 impl Fitting<'_> {
-    /// The fits with their factorizations, and the memory for the work with them.
+    /// Returns the fits with their models, and the memory for the work with them.
     ///
     /// # Errors
-    /// 413 if it takes more memory than there is, and what factorizing refuses.
+    /// 413 if the request takes more memory than there is, and the refusals of the factorization.
     pub async fn fits(
         &self,
         main: &FitPlan,
@@ -56,12 +56,12 @@ impl Fitting<'_> {
             if let Some(found) = self.attempt(&mut wanted, report).await? {
                 return Ok(found);
             }
-            // However often that happens, others have their turn.
+            // Other tasks get their turn, however often this repeats.
             tokio::task::yield_now().await;
         }
     }
 
-    /// The same where nothing is missing, and there is memory for the work that nobody waits for: without waiting.
+    /// Returns the fits without waiting, if nothing is missing and memory for the work is free.
     pub fn at_hand(
         &self,
         main: &FitPlan,
@@ -90,8 +90,10 @@ impl Fitting<'_> {
         Some((fits, memory))
     }
 
-    /// `None` if what was there when the memory was counted is gone, or what was missing is there, or the memory was not enough:
-    /// then everything goes back, and is counted again.
+    /// Tries once to reserve memory and to bring all fits.
+    ///
+    /// Returns `None` if the cache changed after the memory was counted, or if the memory was not enough.
+    /// Then all memory goes back and is counted again.
     async fn attempt(
         &self,
         wanted: &mut Wanted<'_>,
@@ -116,7 +118,7 @@ impl Fitting<'_> {
         Ok(Some((fits, memory.work)))
     }
 
-    /// `None` if what is missing has changed while it waited.
+    /// Reserves the memory of the request. Returns `None` if the missing parts changed during the wait.
     async fn reserve(&self, wanted: &Wanted<'_>) -> Result<Option<Memory>, Problem> {
         let counted = self.count(wanted);
         let work = n_bytes_of_work(wanted.cost);
@@ -128,10 +130,10 @@ impl Fitting<'_> {
         Ok(Some(Memory { work, main, other, surface }))
     }
 
-    /// What is missing now of the solver and the surface of each fit, with what making it ready takes.
+    /// Returns what is missing now of the model and surface of each fit, with the price of making it.
     fn missing<'w>(&self, wanted: &Wanted<'w>) -> impl Iterator<Item = (Missing, MakingPrice, Extent)> {
         let fits = [(Some(wanted.main), wanted.of_main), (wanted.other, wanted.of_other)];
-        // The surface is that of the last of them.
+        // The last fit is the one of the surface.
         let of_surface = wanted.other.unwrap_or(wanted.main).key;
         fits.into_iter().filter_map(move |(plan, extent)| {
             let plan = plan?;
@@ -140,7 +142,7 @@ impl Fitting<'_> {
         })
     }
 
-    /// Bytes for the solvers and the surface that are missing now.
+    /// Counts the bytes of the models and the surface that are missing now.
     fn count(&self, wanted: &Wanted<'_>) -> [usize; 3] {
         let mut counted = [0; 3];
         for (at, (missing, price, extent)) in self.missing(wanted).enumerate() {
@@ -157,7 +159,7 @@ impl Fitting<'_> {
         counted
     }
 
-    /// What a request will compute and take by itself, as far as can be seen beforehand.
+    /// Returns the work and memory of a request, as far as they can be foreseen.
     pub fn outlook(&self, main: &FitPlan, surface: Option<&FitPlan>, cost: Cost) -> Outlook {
         let wanted = Wanted::of(main, surface, cost);
         let mut outlook = Outlook { flops: cost.work.flops, n_bytes: n_bytes_of_work(cost), is_cached: true };
@@ -172,7 +174,10 @@ impl Fitting<'_> {
         outlook
     }
 
-    /// `None` if it is to be factorized, without memory for it, or for more of it as the extent then says.
+    /// Finds or makes a model.
+    ///
+    /// Returns `None` if the model has to be made and there is no memory for it. Returns `None` also if
+    /// making it needs more, and raises `extent`.
     async fn fitted(
         &self,
         plan: &FitPlan,
@@ -188,7 +193,7 @@ impl Fitting<'_> {
                     self.app.metrics.prepared(stored.kind());
                     factors::keep(self.app, plan, &stored);
                     if stored.is_restored() {
-                        // How long that took says nothing of how long it takes to make one.
+                        // The time for reading a factor does not predict the time for making one.
                         self.admission.forget_work();
                     }
                 }
@@ -204,7 +209,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// `None` if it is to be made, without memory for it.
+    /// Finds or makes a surface. Returns `None` if it has to be made and there is no memory for it.
     async fn surface(
         &self,
         fitted: &Fitted,
@@ -224,10 +229,10 @@ impl Fitting<'_> {
     }
 }
 
-/// The fits that one request wants, and how much of their matrices they are given memory for.
+/// The fits that one request needs, and the extent of memory for each.
 struct Wanted<'a> {
     main: &'a FitPlan,
-    /// That of the surface, where it is another one.
+    /// Fit of the surface, where it differs from the main fit.
     other: Option<&'a FitPlan>,
     of_main: Extent,
     of_other: Extent,
@@ -241,29 +246,29 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// What lies before a request.
+/// Expected work and memory of a request.
 #[derive(Debug, Clone, Copy)]
 pub struct Outlook {
     pub flops: f64,
-    /// Of memory that is not held yet.
+    /// Bytes that are not reserved yet.
     pub n_bytes: usize,
-    /// Nothing is missing.
+    /// Whether nothing is missing.
     pub is_cached: bool,
 }
 
 impl Outlook {
-    /// As work of an operation.
+    /// Returns this outlook as work of an operation.
     pub fn as_work(self, operation: &'static str) -> Work {
         Work { operation, is_cached: self.is_cached, flops: self.flops }
     }
 }
 
-/// How much memory a solver is given.
+/// Amount of memory reserved for a model.
 #[derive(Clone, Copy)]
 enum Extent {
-    /// As much as is nearly always enough. It takes the rest as well if that is to be had at that moment.
+    /// Enough in nearly all cases. The solver takes the rest as well if it is free at that moment.
     Expected,
-    /// All that it may need, from the start: it is known that it needs it.
+    /// All that the model may need, from the start, because it is known to need it.
     AtMost,
 }
 
@@ -291,7 +296,7 @@ async fn prepare(
     let spare = app.prepared.spare().clone();
     let job = move |observer: &JobObserver| {
         let (n_taken, mut is_short) = (memory.n_bytes(), false);
-        // It never waits for memory: it holds some already.
+        // The job holds memory already, so it never waits for more.
         let mut may_take = |n_bytes: usize| {
             is_short = n_bytes > n_taken && !memory.try_grow(n_bytes - n_taken);
             !is_short
@@ -299,7 +304,7 @@ async fn prepare(
         let workspace = Workspace { spare: &spare, may_take: &mut may_take };
         let making = Making { cloud: plan.fitted, sampling, workspace };
         match plan.recipe.make(making, observer) {
-            // The memory goes with the job: it may run on for a moment when nobody waits any more.
+            // The memory goes with the job, which may run on for a moment after the last client has left.
             Ok(model) => Ok((model, memory)),
             Err(_) if is_short => Err(FitFailure::NeedsAll),
             Err(error) => Err(FitFailure::Refused(error)),
@@ -310,7 +315,7 @@ async fn prepare(
     Ok(PreparedFit::new(model, times.gram, times.factor, memory))
 }
 
-/// How the cloud of a fit is sampled; without the merged points it is another cloud, of which nobody knows.
+/// Returns the cached sampling, or `None` if duplicates were merged. The merged cloud is not registered.
 async fn sampling_unless_merged(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -322,7 +327,7 @@ async fn sampling_unless_merged(
     }
 }
 
-/// The surface of the signature function, with the client's normals if there are any.
+/// Makes the surface, with the client's normals if there are any.
 fn make_surface(
     app: Arc<App>,
     admission: Arc<Admission>,
@@ -350,7 +355,7 @@ fn make_surface(
             if let Some(signature) = surface.signature().filter(|_| is_new) {
                 shared.prepared.keep_solution(plan.key, ones, signature.solution.clone());
             }
-            // As with a factor, the memory goes with the job.
+            // The memory goes with the job, which may run on for a moment after the last client has left.
             Ok((surface, memory))
         };
         let (surface, taken) = app.compute.run(&admission, flops, job).await.map_err(FitFailure::Broken)?;

@@ -1,4 +1,4 @@
-//! Bodies as they come: within their limit, in memory that was taken for them, and at a rate that ends.
+//! Request bodies, received within their size limit, at a least rate, and in reserved memory.
 
 use std::time::Duration;
 
@@ -19,27 +19,29 @@ use crate::store::Owner;
 use crate::store::budget::Reservation;
 use gramian_numerics::observer::Observer;
 
-/// Bytes that are asked for at first; then the buffer doubles as bytes come, whatever was announced.
+/// Bytes reserved at first. The buffer doubles as bytes come, whatever length was announced.
 const FIRST_BYTES: usize = 64 << 10;
 
-/// Bytes a second that a body must come at, but for the seconds that it may be late by.
+/// Least rate of a body in bytes per second. The configured body timeout is added to the time that this rate
+/// allows.
 const LEAST_BYTES_PER_SECOND: f64 = 16384.0;
 
-/// How long a body waits for memory before it is refused: it holds memory that others wait for.
+/// Time for which a body waits for memory before it is refused, because it holds memory that others wait for.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A body with the memory that it takes.
+/// A body with its reserved memory.
 pub struct Intake {
     pub body: RequestBody,
     pub memory: Reservation,
 }
 
 impl Intake {
-    /// Parses it, and says what memory it holds. A body that is unpacked to more than usual takes the rest of its memory here,
-    /// where it cannot wait for it.
+    /// Parses the body. Returns the result with the memory that it holds.
+    ///
+    /// A body that unpacks to more than usual takes the rest of its memory here, where it cannot wait for it.
     ///
     /// # Errors
-    /// Those of [`Intake::unpack`] and [`UnpackedBody::parse`].
+    /// Returns the errors of [`Intake::unpack`] and [`UnpackedBody::parse`].
     pub fn parse<T: DeserializeOwned>(
         self,
         app: &App,
@@ -49,10 +51,12 @@ impl Intake {
         Ok((body.parse(&ParseContext::new(&app.config, observer))?, memory))
     }
 
-    /// Unpacks it, likewise.
+    /// Unpacks the body. Returns it with the memory that it holds.
+    ///
+    /// Memory beyond the usual is taken without waiting.
     ///
     /// # Errors
-    /// Those of [`RequestBody::unpack`], 503 if there is no memory for what it is unpacked to.
+    /// Returns the errors of [`RequestBody::unpack`], and 503 if there is no memory for the unpacked body.
     pub fn unpack(self, app: &App, observer: &dyn Observer) -> Result<(UnpackedBody, Reservation), Problem> {
         let Self { body, mut memory } = self;
         let (n_packed, parsing) = (body.n_bytes(), body.parsing());
@@ -69,8 +73,13 @@ impl Intake {
 /// Reads a body of at most `app.memory.body` bytes, in one of the formats.
 ///
 /// # Errors
-/// 415 unless the headers announce one of them, 413 beyond the limit, 400 if the connection breaks off, 408 if it comes too
-/// slowly, 503 if there is no place for the request, or no memory. What the headers tell is answered before a byte is read.
+/// - 415 unless the headers announce one of the formats.
+/// - 413 beyond the limit.
+/// - 400 if the connection breaks off.
+/// - 408 if the body comes too slowly.
+/// - 503 if there is no place for the request, or no memory.
+///
+/// Refusals that follow from the headers are sent before a byte is read.
 pub async fn read_body(
     app: &App,
     owner: Owner,
@@ -81,7 +90,7 @@ pub async fn read_body(
     let (format, coding) = announced(headers, formats)?;
     let (bytes, mut memory) = read_bytes(app, owner, headers, body).await?;
     let body = RequestBody::new(format, coding, bytes, app.memory.body);
-    // All that parsing takes is taken before it begins, as far as can be seen.
+    // All memory for parsing is reserved before it begins, as far as it can be foreseen.
     let n_to_parse = body.parsing().n_bytes(body.n_bytes_expected(), &app.config);
     if !app.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
         return Err(app.compute.out_of_memory());
@@ -89,10 +98,10 @@ pub async fn read_body(
     Ok(Intake { body, memory })
 }
 
-/// Reads a body whatever is in it.
+/// Reads a body of any content.
 ///
 /// # Errors
-/// Those of [`read_body`] but 415.
+/// Returns the errors of [`read_body`] except 415.
 pub async fn read_bytes(
     app: &App,
     owner: Owner,
@@ -101,7 +110,7 @@ pub async fn read_bytes(
 ) -> Result<(Vec<u8>, Reservation), Problem> {
     let limit = app.memory.body;
     let length = announced_length(headers);
-    // At once: the connection hears out a client that only listens after sending.
+    // The refusal is immediate. The connection still reads on for a client that only listens after sending.
     if let Some(required) = length.filter(|&length| length > limit) {
         return Err(too_large(limit, Some(required)));
     }
@@ -138,12 +147,12 @@ struct Reader<'a> {
     began: Instant,
     memory: Reservation,
     bytes: Vec<u8>,
-    /// What the body may have.
+    /// Largest number of bytes that the body may have.
     most: usize,
 }
 
 impl Reader<'_> {
-    /// The next piece of the body, if it comes in time.
+    /// Returns the next piece of the body, if it comes in time.
     async fn next(&self, body: &mut Body) -> Result<Option<bytes::Bytes>, Problem> {
         let in_time = Duration::from_secs_f64(self.bytes.len() as f64 / LEAST_BYTES_PER_SECOND);
         let until = self.began + in_time + self.app.config.body_timeout();
@@ -158,7 +167,7 @@ impl Reader<'_> {
             };
             let Some(frame) = frame else { return Ok(None) };
             let frame = frame.map_err(|_| Problem::new(Slug::MalformedBody, "the body broke off"))?;
-            // What is no data are trailers.
+            // Frames without data are trailers.
             if let Ok(data) = frame.into_data() {
                 return Ok(Some(data));
             }

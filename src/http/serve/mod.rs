@@ -1,4 +1,4 @@
-//! How requests are served: the way of each from its body to its answer.
+//! The way of a request from its body to its answer, the same for every operation.
 
 mod diagnostics;
 pub mod durable;

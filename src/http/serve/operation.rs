@@ -1,5 +1,7 @@
-//! How a compute request is served, the same for every operation: read, admit, parse, plan, look at the cloud, reserve,
-//! factorize or find, compute, encode. An operation only says what its plan and its answer are.
+//! The way of a compute request, the same for every operation.
+//!
+//! The steps are: read, admit, parse, plan, look at the cloud, reserve memory, factorize or find, compute,
+//! encode. An operation only defines its plan and its answer.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -32,22 +34,22 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::CloudId;
 use gramian_numerics::error::SolverKind;
 
-/// A request that needs a factorization.
+/// A request that needs a model.
 pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {
-    /// Its name in the document.
+    /// Operation id in the OpenAPI document.
     const NAME: &'static str;
 
-    /// What is left of the request once it is checked.
+    /// Inputs of `compute` that remain after the request is checked.
     type Work: Send + 'static;
     type Answer: Answer;
 
-    /// What answers may be written as, the preferred one first; npy where there is one matrix.
+    /// Formats of answers, the preferred one first. Answers of one matrix also have npy.
     const FORMATS: &'static [Format] = &[Format::Json, Format::Safetensors];
 
-    /// Whether it asks about a surface: that of the plan's surface, or of its main fit.
+    /// Whether the operation needs a surface: that of the plan's `surface`, or else of its `main` fit.
     const HAS_SURFACE: bool;
 
-    /// The cloud of the surface, where it may be another one.
+    /// The cloud of the surface, where it may differ from that of the values.
     fn surface_cloud(&self) -> Option<&CloudRef> {
         None
     }
@@ -55,45 +57,45 @@ pub trait Operation: HasCloud + DeserializeOwned + Send + 'static {
     /// Checks everything that can be checked without computing, the cost included.
     ///
     /// # Errors
-    /// The [`Problem`] that the client is told.
+    /// Returns the [`Problem`] for the client.
     fn plan(self, planner: &Planner<'_>) -> Result<Plan<Self::Work>, Problem>;
 
-    /// Computes the answer on the pool, with the factorizations at hand.
+    /// Computes the answer on the pool, from models that are ready.
     ///
     /// # Errors
-    /// The [`Problem`] that the client is told.
+    /// Returns the [`Problem`] for the client.
     fn compute(work: Self::Work, fits: &Fits, observer: &JobObserver) -> Result<Self::Answer, Problem>;
 }
 
-/// What requests that compute may be written as.
+/// Formats of compute requests.
 pub const REQUEST_FORMATS: [Format; 2] = [Format::Json, Format::Safetensors];
 
-/// The factorizations that an operation needs, what it does with them, and what that costs.
+/// Fits that an operation needs, the work on them, and its cost.
 pub struct Plan<W> {
-    /// The fit of the values, or of the surface where there are no values.
+    /// Fit of the values, or of the surface where there are no values.
     pub main: PlannedFit,
-    /// The fit of the surface, if values and surface both play a part.
+    /// Fit of the surface, if the operation needs both values and a surface.
     pub surface: Option<PlannedFit>,
     pub work: W,
     pub cost: Cost,
 }
 
-/// A plan with nothing left out of its fits.
+/// A plan whose fits are complete.
 pub struct Resolved<W> {
     pub main: FitPlan,
     pub surface: Option<FitPlan>,
     work: W,
     pub cost: Cost,
-    /// The memory of the request, for as long as it is held.
+    /// Memory of the parsed request, for as long as it is held.
     intake: Reservation,
-    /// Clouds that came with the request, and are in memory alone.
+    /// Clouds that came with the request and are only in memory.
     fresh: Vec<Arc<RegisteredCloud>>,
 }
 
 /// Serves one request.
 ///
 /// # Errors
-/// The [`Problem`] that the client is told.
+/// Returns the [`Problem`] for the client.
 pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let wanted = Wanted::of(&parts.headers, O::FORMATS)?;
@@ -111,12 +113,12 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     };
     let fresh = plan.fresh.clone();
     let answering = compute::<O>(&app, &admission, plan, wanted, began);
-    // The store takes what it is given while the answer is computed.
+    // The store receives new clouds while the answer is computed.
     let (answered, ()) = futures_util::future::join(answering, keep_all(&app, owner, &fresh)).await;
     Ok(answered?.respond(&app, &admission))
 }
 
-/// Factorizes or finds, computes and encodes.
+/// Factorizes or finds, then computes and encodes.
 async fn compute<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -135,8 +137,10 @@ async fn compute<O: Operation>(
     app.compute.run(admission, flops, job).await?.0
 }
 
-/// Work that will not be done in time is not begun. Estimates are within a factor of two in the median, and further off where nothing like
-/// it ran yet.
+/// Factor by which the estimated time may exceed the deadline. Work beyond it is refused before it begins.
+///
+/// Estimates are within a factor of two in the median. They are further off where nothing similar has run
+/// yet.
 const DOUBT: f64 = 4.0;
 
 fn within_deadline(app: &App, admission: &Admission, seconds: f64) -> Result<(), Problem> {
@@ -151,20 +155,22 @@ fn within_deadline(app: &App, admission: &Admission, seconds: f64) -> Result<(),
     Err(Problem::new(Slug::DeadlineExceeded, detail))
 }
 
-/// What a request would take.
+/// Estimated needs of a request.
 pub struct Estimate {
     pub solver: SolverKind,
     pub outlook: Outlook,
-    /// Once its turn has come.
+    /// Seconds of work, without the wait for a turn.
     pub seconds: f64,
-    /// Whether there is memory and time enough for it, if nothing else is under way.
+    /// Whether memory and time are enough for the request, if nothing else runs.
     pub is_admissible: bool,
 }
 
-/// Plans a request without answering it. What its clouds say is looked at as for the request itself, which finds that done then.
+/// Plans a request without answering it.
+///
+/// Clouds and values are examined as for the request itself, which then finds the results.
 ///
 /// # Errors
-/// What the request itself would be refused for before anything is computed.
+/// Returns the refusals that the request itself would get before anything is computed.
 pub async fn estimate<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -191,7 +197,7 @@ pub async fn estimate<O: Operation>(
     })
 }
 
-/// An answer that only needs to be sent, with its memory.
+/// An encoded answer with its memory, ready to be sent.
 struct Answered {
     encoded: Encoded,
     memory: Reservation,
@@ -205,7 +211,7 @@ impl Answered {
     }
 }
 
-/// Computes and encodes, on the pool.
+/// Computes and encodes on the pool.
 fn answer<O: Operation>(
     plan: Resolved<O::Work>,
     fits: &Fits,
@@ -229,8 +235,10 @@ enum Prepared<W> {
     Answered(Box<Answered>, Vec<Arc<RegisteredCloud>>),
 }
 
-/// Parses and plans, and looks at the clouds if something was left out that follows from them. What is small, and has all it
-/// needs at hand, is answered at once: each job more is a thread more to wait for.
+/// Parses and plans, and examines clouds and values where the fits depend on them.
+///
+/// Small requests whose models are ready are answered in the same job, because each further job waits for a
+/// thread.
 async fn prepare<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -276,7 +284,7 @@ async fn prepare<O: Operation>(
         .map(|plan| Prepared::Ready(Box::new(plan)))
 }
 
-/// Plans what was parsed, with clouds that were found elsewhere than in memory.
+/// Plans a parsed request, with clouds that were read from the store.
 fn planned<O: Operation>(
     (app, admission): (&Arc<App>, &Arc<Admission>),
     (request, mut memory): (O, Reservation),
@@ -313,7 +321,7 @@ fn planned<O: Operation>(
     })
 }
 
-/// The clouds that a request names and that memory does not have, where there is a store to look in.
+/// Finds the clouds that a request names and memory does not have, if there is a store to look in.
 fn elsewhere<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<CloudId> {
     if app.durable.is_none() {
         return Vec::new();
@@ -326,13 +334,13 @@ fn elsewhere<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<CloudId>
 
 enum Parsed<O: Operation> {
     Done(Prepared<O::Work>),
-    /// Its fits need to know more of their clouds.
+    /// The fits need to know more of their clouds or values.
     Lacking(Box<Plan<O::Work>>, Reservation, Vec<Arc<RegisteredCloud>>),
-    /// Some of its clouds are not in memory.
+    /// Some clouds of the request are not in memory.
     Elsewhere(Box<O>, Reservation, Vec<CloudId>),
 }
 
-/// A fit that needs to know more of its cloud or of its values.
+/// Returns a fit that needs to know more of its cloud or its values.
 fn lacking_mut<W>(plan: &mut Plan<W>) -> Option<&mut PlannedFit> {
     let mut fits = [Some(&mut plan.main), plan.surface.as_mut()].into_iter().flatten();
     fits.find(|fit| fit.lack().is_some())
@@ -348,7 +356,7 @@ fn resolve<W>(
     Ok(Resolved { main, surface, work: plan.work, cost: plan.cost, intake, fresh })
 }
 
-/// Bytes that a request holds until it is answered: values, queries, and clouds that may not be kept.
+/// Bytes that a request holds until it is answered: values, queries, and clouds that the cache may drop.
 fn n_bytes_held<W>(plan: &Plan<W>) -> usize {
     let clouds = [Some(&plan.main), plan.surface.as_ref()].into_iter().flatten();
     let n_bytes = clouds.map(|fit| {

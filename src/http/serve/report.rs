@@ -1,4 +1,4 @@
-//! What the headers say of how an answer came about.
+//! Response headers that report how an answer came about.
 
 use std::time::Duration;
 
@@ -10,25 +10,26 @@ use crate::http::compute::StageTimes;
 use crate::store::key::CloudId;
 use crate::store::prepared::{CacheOutcome, PreparedFit};
 
-/// Times and cache, as `Server-Timing` and `Cache-Status`.
+/// Times and cache outcome of an answer, for `Server-Timing` and `Cache-Status`.
 #[derive(Default)]
 pub struct Report {
     parse: Duration,
     stages: StageTimes,
-    /// Absent if encoding goes on while the answer is sent.
+    /// Encoding time, absent if encoding continues while the answer is sent.
     encode: Option<Duration>,
     cache: Option<CacheOutcome>,
-    /// The cloud that the answer is about.
+    /// Cloud of the answer.
     cloud: Option<CloudId>,
 }
 
 impl Report {
-    /// Parsing and planning took so long, the wait for a turn included.
+    /// Starts a report after parsing and planning, which took `parse` including the wait for a turn.
     pub fn parsed_in(parse: Duration, cloud: CloudId) -> Self {
         Self { parse, cloud: Some(cloud), ..Self::default() }
     }
 
-    /// Adds a factor. With two of them the answer is a hit only if both are: the outcomes are ordered by cost.
+    /// Adds a model. With two models, the answer is a hit only if both are hits: outcomes are ordered by
+    /// cost.
     pub fn found(&mut self, stored: &PreparedFit, outcome: CacheOutcome) {
         self.cache = self.cache.max(Some(outcome));
         if outcome != CacheOutcome::Hit {
@@ -37,7 +38,7 @@ impl Report {
         }
     }
 
-    /// Adds the stages of the surface.
+    /// Adds the stage times of making the surface.
     pub fn made_surface(&mut self, times: StageTimes) {
         self.stages.solve += times.solve;
         self.stages.evaluate += times.evaluate;
@@ -48,7 +49,7 @@ impl Report {
         self.encode = encode;
     }
 
-    /// Adds the headers.
+    /// Adds the headers to a response.
     pub fn head(&self, mut response: Response) -> Response {
         let headers = response.headers_mut();
         let cache = match self.cache {

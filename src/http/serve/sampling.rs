@@ -1,4 +1,4 @@
-//! What the positions of a cloud and the values at them say, looked at once for all who ask.
+//! Facts about a cloud and its values that fits depend on, found once for all who ask.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::points::sampling::sampling_flops;
 use gramian_numerics::selection::{Learned, learning_price};
 
-/// Finds what a fit lacks of its cloud.
+/// Finds the facts about cloud or values that a fit lacks.
 ///
 /// # Errors
-/// 413 `problem-too-large` if it takes more memory than there is, 500 `internal` if the work was cancelled while
-/// somebody waits for it, which is a bug.
+/// - 413 `problem-too-large` if it takes more memory than there is.
+/// - 500 `internal` if the work was cancelled while a request waits for it. That is a bug.
 pub async fn find_lacking(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -44,7 +44,7 @@ pub async fn find_lacking(
     Ok(())
 }
 
-/// Kernel, noise and mean of values.
+/// Learns kernel, noise and mean of values.
 async fn find_learned(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -58,7 +58,7 @@ async fn find_learned(
     let (shared, admitted) = (app.clone(), admission.clone());
     let looking = async move {
         let memory = shared.reserve(admitted.owner, price.n_bytes, || true).await?;
-        // The memory goes with the job: it may run on for a moment when nobody waits any more.
+        // The memory goes with the job, which may run on for a moment after the last client has left.
         let learn = move |observer: &JobObserver| {
             let learned = asked.learn(observer);
             drop(memory);
@@ -69,10 +69,10 @@ async fn find_learned(
     app.learned.get_or_learn(key, || looking).await
 }
 
-/// How a cloud is sampled.
+/// Finds the sampling of a cloud.
 ///
 /// # Errors
-/// Those of [`find_lacking`].
+/// Returns the errors of [`find_lacking`].
 pub async fn find_sampling(
     app: &Arc<App>,
     admission: &Arc<Admission>,
@@ -85,7 +85,7 @@ pub async fn find_sampling(
     app.clouds.sampling(admission.owner, stored, || looking).await
 }
 
-/// A look at a cloud on the pool, which outlives whoever began it if others wait.
+/// Runs work on a cloud on the pool. It outlives the request that began it, if others wait.
 fn look_at<T: Send + 'static>(
     app: &Arc<App>,
     admission: &Arc<Admission>,

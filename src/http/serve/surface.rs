@@ -1,4 +1,4 @@
-//! A surface at the queries of a request: flags, arrays and diagnostics of its answers.
+//! Surfaces at the queries of a request: flags, arrays and diagnostics of their answers.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use gramian_numerics::surface::served::ServedBy;
 pub struct SurfaceGeometry {
     pub surface: Arc<Surface>,
     pub geometry: Geometry,
-    /// Rows of the sparse operator over it, once there is one.
+    /// Rows of the sparse operator over the surface, once there is one.
     pub stencils: Option<StencilsUsed>,
     request: GeometryRequest,
 }
@@ -37,10 +37,10 @@ pub struct DeviationArrays {
 }
 
 impl Fits {
-    /// The geometry of the surface at queries.
+    /// Computes the geometry of the surface at queries.
     ///
     /// # Errors
-    /// Those of [`Geometry::of`] as a [`Problem`].
+    /// Returns the errors of [`Geometry::of`] as a [`Problem`].
     pub fn geometry(
         &self,
         queries: &Cloud,
@@ -56,7 +56,7 @@ impl Fits {
 }
 
 impl SurfaceGeometry {
-    /// The queries without answer or with a flag.
+    /// Returns the queries that have no answer or a flag.
     pub fn degenerate(&self) -> Vec<Degenerate> {
         let entry = |d: &Degeneracy| Degenerate {
             query: d.query,
@@ -73,7 +73,9 @@ impl SurfaceGeometry {
         self.geometry.degenerate().iter().map(entry).collect()
     }
 
-    /// Flags queries, unless they are flagged already, where what was found of values is doubtful: all of them where nobody can tell.
+    /// Flags queries where results for the values are doubtful, unless they are flagged already.
+    ///
+    /// If the judgement itself failed, all queries are flagged.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
@@ -100,7 +102,8 @@ impl SurfaceGeometry {
         Ok(())
     }
 
-    /// Deviations per query, null where there is no answer, and where those of the surface are not known.
+    /// Array of deviations per query. Null where there is no answer, or where those of the surface are
+    /// unknown.
     pub fn known_per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
         let is_null: Vec<bool> = match self.geometry.deviations() {
             None => self.geometry.is_null().to_vec(),
@@ -112,12 +115,12 @@ impl SurfaceGeometry {
         Array::new(data, shape).with_nulls(0, &is_null)
     }
 
-    /// Numbers per query, null where there is no answer.
+    /// Array of numbers per query, null where there is no answer.
     pub fn per_query(&self, data: Vec<f64>, shape: &[usize]) -> Array {
         Array::new(data, shape).with_nulls(0, self.geometry.is_null())
     }
 
-    /// The function that serves each query.
+    /// Returns which function serves each query.
     pub fn surfaces(&self) -> Vec<SurfaceUsed> {
         let used = |query| match self.geometry.served_by(query) {
             ServedBy::Signature => SurfaceUsed::Signature,
@@ -127,7 +130,7 @@ impl SurfaceGeometry {
         (0..self.geometry.n_queries()).map(used).collect()
     }
 
-    /// What the answer says of the fit of this surface.
+    /// Returns the diagnostics of the fit of this surface.
     pub fn diagnostics(&self, fits: &Fits) -> Diagnostics {
         let (fitted, m) = (fits.surface(), self.geometry.n_queries());
         let mut diagnostics = fitted.diagnostics(&Report::of_surface(&self.surface), m);
@@ -136,7 +139,7 @@ impl SurfaceGeometry {
         diagnostics
     }
 
-    /// Deviations per query, null where there is no answer or no deviation of it.
+    /// Arrays of deviations per query, null where there is no answer or no deviation of it.
     pub fn deviations(&self) -> Option<DeviationArrays> {
         let deviations = self.geometry.deviations()?;
         let (m, k) = (self.geometry.n_queries(), self.geometry.dimension() - 1);
@@ -155,7 +158,7 @@ impl SurfaceGeometry {
         })
     }
 
-    /// What was changed, and what the flags of single queries amount to.
+    /// Warnings about repairs, and counts of the flags of single queries.
     fn warnings(&self) -> Vec<Warning> {
         let (m, n) = (self.geometry.n_queries(), self.surface.cloud().n_points());
         let flagged =

@@ -11,10 +11,10 @@ use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::solver::trend::Trend;
 
 impl Fits {
-    /// The function with these values at queries.
+    /// Computes the function with these values at queries.
     ///
     /// # Errors
-    /// What the numerics refuses as a [`Problem`].
+    /// Returns the refusals of the numerics as a [`Problem`].
     pub fn values_at(
         &self,
         values: &Values,
@@ -35,10 +35,10 @@ impl Fits {
         Ok((found, diagnostics))
     }
 
-    /// The functions with these lists of values at queries.
+    /// Computes the functions with these lists of values at queries.
     ///
     /// # Errors
-    /// What the numerics refuses as a [`Problem`].
+    /// Returns the refusals of the numerics as a [`Problem`].
     pub fn each_at(
         &self,
         values: &Values,
@@ -57,7 +57,7 @@ impl Fits {
     }
 }
 
-/// Coefficients of the mean of each function, `[k, p]`; none where the functions have no mean.
+/// Coefficients of the mean of each function, `[k, p]`, or `None` where the functions have no mean.
 pub fn mean_coefficients(batch: &Batch) -> Option<Array> {
     let trends = batch.solutions.iter().map(|solution| solution.trend.as_ref().map(Trend::of_coordinates));
     let rows: Vec<Vec<f64>> = trends.collect::<Option<_>>()?;

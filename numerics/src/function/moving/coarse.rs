@@ -29,7 +29,7 @@ const COMPARED: usize = 32;
 const SURER: f64 = 0.95;
 
 /// Local kriging of means of near points, one mean for each cell.
-pub struct Coarse {
+pub(crate) struct Coarse {
     cells: Cells,
     moving: Moving,
 }
@@ -60,7 +60,7 @@ impl Moving {
     ///
     /// # Errors
     /// Returns the errors of [`Moving::at`].
-    pub fn surest(
+    pub(crate) fn surest(
         &self,
         queries: &Cloud,
         order: JetOrder,

@@ -56,6 +56,31 @@ use quantities::Quantities;
 pub const NEIGHBOURS: usize = 128;
 
 /// Local kriging of a system: a small solve around each query.
+///
+/// ```
+/// # use std::sync::Arc;
+/// # use gramian_numerics::kernel::{Family, Kernel};
+/// # use gramian_numerics::observer::Unobserved;
+/// # use gramian_numerics::points::cloud::Cloud;
+/// # use gramian_numerics::solver::{Solver, System};
+/// # use gramian_numerics::sums::regularization::Regularization;
+/// use gramian_numerics::function::moving::{Moving, MovingRequest};
+/// use gramian_numerics::points::sampling::Sampling;
+/// use gramian_numerics::sums::jets::JetOrder;
+///
+/// // Nothing is factorized beforehand: a cloud may have a million points.
+/// let cloud = Arc::new(Cloud::new((0..20).map(|i| f64::from(i) / 19.0).collect(), 1)?);
+/// let kernel = Kernel::new(Family::Matern { order: 2 }, 0.5, 1.0)?;
+/// let system = System::new(cloud, kernel, Regularization::uniform(1e-8)?)?;
+/// let sampling = Arc::new(Sampling::of(system.cloud(), &Unobserved)?);
+/// let values: Vec<f64> = system.cloud().points().map(|x| x[0].sin()).collect();
+/// let kriging = Moving::new(system, sampling, &Unobserved)?;
+/// let request =
+///     MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false, trend: None };
+/// let found = kriging.at(&values, &Cloud::new(vec![0.3], 1)?, request, &Unobserved)?;
+/// assert!((found.jets.values()[0] - 0.3f64.sin()).abs() < 1e-4);
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
 pub struct Moving {
     system: System,
     near: Near,

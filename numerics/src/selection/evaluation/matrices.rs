@@ -15,13 +15,10 @@ use crate::machine::parallelism::parallelism;
 use crate::machine::vector::dot;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
-use crate::solver::{estimate_norm1, factorize_in_place};
+use crate::solver::{SMALLEST_PIVOT, estimate_norm1, factorize_in_place};
 use crate::sums::gram::{fill_kernel_column, fill_lower_gram};
 use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
-
-/// Multiple of k₀ up to which a pivot counts as rounding, as for the factors of solvers.
-const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
 /// Columns of a matrix product between two checks for cancellation.
 const COLUMNS_PER_CHECKPOINT: usize = 512;

@@ -110,6 +110,22 @@ const LEAST_VALUES: usize = 8;
 /// Constant values decide nothing, nor do fewer than eight. The result is then Matérn 5/2 of the default
 /// length scale with the least noise.
 ///
+/// ```
+/// use gramian_numerics::observer::Unobserved;
+/// use gramian_numerics::points::cloud::Cloud;
+/// use gramian_numerics::points::sampling::Sampling;
+/// use gramian_numerics::selection::{Noise, Observed, learn};
+/// use gramian_numerics::solver::trend::Mean;
+///
+/// let cloud = Cloud::new((0..100).map(|i| f64::from(i) / 10.0).collect(), 1)?;
+/// let values: Vec<f64> = cloud.points().map(|x| x[0].sin()).collect();
+/// let sampling = Sampling::of(&cloud, &Unobserved)?;
+/// let (noise, mean) = (Noise::Unknown, Mean::Constant);
+/// let learned = learn(Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean }, &Unobserved)?;
+/// assert!(learned.length_scale > 0.5 && learned.ratio < 1e-3); // a wave that is nearly without noise
+/// # Ok::<(), gramian_numerics::error::NumericsError>(())
+/// ```
+///
 /// # Errors
 /// [`NumericsError::Cancelled`], [`NumericsError::LengthMismatch`], [`NumericsError::MeanNotDetermined`].
 /// [`NumericsError::WeightsOverflow`] for values whose squares exceed float64.

@@ -51,7 +51,7 @@ pub struct Workspace<'a> {
 ///
 /// The limit is below `minimum_alpha`, which is at least 16 ε k₀ and enters a pivot twice where two points
 /// coincide.
-const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
+pub(crate) const SMALLEST_PIVOT: f64 = 16.0 * f64::EPSILON;
 
 /// A factorization of `K(X, X) + αI`, kept with its system so that it cannot be used with another one.
 pub struct Dense {

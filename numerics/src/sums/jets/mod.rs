@@ -208,7 +208,12 @@ impl Jets {
     }
 
     /// Adds a linear function, given by its value at a query and its gradient `[d]`.
-    pub fn plus_linear(mut self, queries: &Cloud, gradient: &[f64], value: impl Fn(&[f64]) -> f64) -> Self {
+    pub(crate) fn plus_linear(
+        mut self,
+        queries: &Cloud,
+        gradient: &[f64],
+        value: impl Fn(&[f64]) -> f64,
+    ) -> Self {
         let layout = self.layout;
         for (jet, x) in self.packed.chunks_exact_mut(layout.width()).zip(queries.points()) {
             jet[0] += value(x);
@@ -288,7 +293,7 @@ impl Jets {
 ///
 /// # Errors
 /// [`NumericsError::KernelNotSmooth`] with the first query that is a point of the cloud.
-pub fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<(), NumericsError> {
+pub(crate) fn check_smooth_at(cloud: &Cloud, kernel: &Kernel, queries: &Cloud) -> Result<(), NumericsError> {
     if !kernel.has_kink() {
         return Ok(());
     }

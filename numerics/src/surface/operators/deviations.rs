@@ -26,8 +26,9 @@ impl Operator {
     /// Kernel and noise are `factor` times those of the solver.
     ///
     /// # Errors
-    /// [`NumericsError::DerivativesVary`] where the process has no such derivatives,
-    /// [`NumericsError::NotPositiveDefinite`] without a Cholesky factor, and the errors of [`Interpolant::at`].
+    /// - [`NumericsError::DerivativesVary`] where the process has no such derivatives.
+    /// - [`NumericsError::NotPositiveDefinite`] without a Cholesky factor.
+    /// - Errors of [`Interpolant::at`].
     pub fn deviations(
         self,
         geometry: &Geometry,
@@ -43,7 +44,8 @@ impl Operator {
         Ok(total)
     }
 
-    /// Adds the deviations of the surface, if known, to those of the operator on a function known by its jets.
+    /// Adds the deviations of the surface, if known, to deviations of the operator on a function. The
+    /// function is known by its jets.
     pub(super) fn add_surface(self, geometry: &Geometry, jets: &Jets, total: &mut [f64]) {
         match self {
             Self::SurfaceGradient => add_surface_to_gradient(geometry, jets, total),

@@ -25,7 +25,7 @@ use crate::sums::regularization::Regularization;
 
 /// Most functionals whose errors are computed. They cost little beside a factorization of as many points as
 /// need them.
-pub const JUDGED_FUNCTIONALS: usize = 256;
+pub(crate) const JUDGED_FUNCTIONALS: usize = 256;
 
 /// Nearest judged queries of a query that is not judged itself. It takes the greatest of their errors.
 const AROUND: usize = 4;

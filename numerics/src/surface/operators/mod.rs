@@ -37,9 +37,9 @@ pub use stencils::{RowKind, SparseMatrix, Stencils};
 /// An operator on functions u over a surface. Answers at null queries are zero.
 ///
 /// - The surface gradient `∇_M u = ∇u − (∇u·ν)ν`, `[m, d]`, unit V/L.
-/// - The Laplace–Beltrami operator `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu`, `[m]`, unit V/L². The last term has a
-///   minus (errata.md, 1). On the unit circle Δ cos θ = −cos θ. The result does not depend on the orientation
-///   of ν.
+/// - The Laplace–Beltrami operator `Δ_M u = tr D²u − νᵀD²uν − tr(Dν) ∂_νu`, `[m]`, unit V/L². The last term
+///   has a minus (errata.md, 1). On the unit circle Δ cos θ = −cos θ. The result does not depend on the
+///   orientation of ν.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operator {
     SurfaceGradient,

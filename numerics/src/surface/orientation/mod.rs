@@ -17,7 +17,6 @@
 //! 4. Points whose winding numbers or neighbours still contradict their side are marked as ambiguous.
 
 mod areas;
-mod cell;
 mod consistent;
 mod edges;
 mod field;

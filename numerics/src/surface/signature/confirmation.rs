@@ -14,7 +14,7 @@ use super::offset::offset_jet_at;
 use crate::machine::vector::dot;
 use crate::points::local_quadrics::LocalQuadric;
 use crate::points::sampling::SPACING_NEIGHBOURS;
-use crate::surface::curvature::principal_curvatures;
+use crate::surface::curvature::{FLAT, principal_curvatures};
 
 /// Differences, over the largest curvature, up to which the quadric confirms, and up to which the patch does.
 const CONFIRMED_BY_QUADRIC: f64 = 0.07;
@@ -34,9 +34,6 @@ const NOISY: f64 = 0.1;
 /// Curvature times radius below which the quartic terms that a quadric leaves out are small: `(κr)²/4` of a
 /// sphere's curvature.
 const QUADRIC_BEND: f64 = 0.6;
-
-/// Curvatures below this fraction of one over the radius of the cloud count as zero.
-const FLAT: f64 = 0.1;
 
 /// Angle, radians, by which the normal may turn from one point to the next for neighbours to show the surface
 /// at all.

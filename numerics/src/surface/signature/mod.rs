@@ -10,6 +10,7 @@ mod serving;
 
 use std::sync::{Arc, OnceLock};
 
+use super::NearNormals;
 use super::degeneracy::is_too_rough;
 use super::orientation::{Oriented, Sampled, SurfaceOrientation};
 use crate::error::NumericsError;
@@ -36,7 +37,7 @@ pub(crate) use serving::serve;
 ///
 /// Building it costs one evaluation at all points and a quadric through the neighbours of each. So it is made
 /// once per factorization.
-pub struct SignatureSurface {
+pub(crate) struct SignatureSurface {
     signature: Signature,
     sampling: Arc<Sampling>,
     quadrics: LocalQuadrics,
@@ -208,17 +209,8 @@ impl SignatureSurface {
         if !self.oriented.is_consistent && !self.orientation().is_given {
             return -1.0;
         }
-        self.sampling.neighbours().nearest_into(x, SPACING_NEIGHBOURS, found);
-        let along: f64 = found
-            .iter()
-            .map(|found| {
-                // Near a thin sheet this lets the point on x's side decide.
-                let spacing = self.sampling.spacing(found.point);
-                let weight = 1.0 / (found.squared_distance + 1e-3 * spacing.powi(2));
-                weight * dot(self.normal(found.point), gradient)
-            })
-            .sum();
-        if along > 0.0 { 1.0 } else { -1.0 }
+        let near = NearNormals { sampling: &self.sampling, normals: &self.oriented.normals };
+        if near.along(x, gradient, found) > 0.0 { 1.0 } else { -1.0 }
     }
 
     /// Returns +1 if ∇u at the points near x goes along `outward`, else −1. `found` is a buffer.

@@ -1,4 +1,4 @@
-//! What operations on surfaces share: what is asked of the geometry, and its price.
+//! Planning shared by operations on surfaces: the request for geometry, and its price.
 
 use std::sync::Arc;
 
@@ -22,10 +22,11 @@ pub struct GeometryWork {
     pub request: GeometryRequest,
 }
 
-/// Plans normals or curvatures, with so many numbers of answer per query.
+/// Plans normals or curvatures. `numbers_per_query` maps the dimension d to the numbers of an answer per
+/// query.
 ///
 /// # Errors
-/// A [`Problem`] with a pointer to the field.
+/// Returns a [`Problem`] with a pointer to the field.
 pub fn plan_geometry(
     planner: &Planner<'_>,
     fit: Fit,
@@ -45,7 +46,7 @@ pub fn plan_geometry(
     Ok(Plan { main: main.into(), surface: None, work: GeometryWork { queries, request }, cost })
 }
 
-/// What a request asks of the geometry of its surface.
+/// Translates the options of a request into options of the numerics, with defaults for absent ones.
 pub fn geometry_request(
     surface: Option<SurfaceChoice>,
     orientation: Option<OrientationChoice>,
@@ -69,7 +70,7 @@ pub fn geometry_request(
     }
 }
 
-/// What a request takes of its surface, as far as its price goes.
+/// Returns the parts of a surface that a request uses, as far as its price depends on them.
 pub fn asked_of(request: &GeometryRequest, surface: &PlannedSurface, queries: &Cloud) -> AskedOfSurface {
     let offsets = match (request.model, request.checks_curvatures) {
         (SurfaceModel::Offset, _) => Offsets::Everywhere,

@@ -1,4 +1,4 @@
-//! `POST /v1/curvatures`.
+//! `POST /v1/curvatures`: curvatures of the surface that a cloud samples.
 
 use std::sync::Arc;
 
@@ -25,27 +25,28 @@ use crate::store::Owner;
 use gramian_numerics::kernel::defaults::Purpose;
 
 request! {
-    /// A cloud that samples a hypersurface, and where its curvatures are wanted.
+    /// A cloud that samples a hypersurface, and queries at which to compute its curvatures.
     pub struct CurvaturesRequest {
-        /// Where answers are wanted; the points of the cloud if absent.
+        /// The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// Which function's level surface is meant; `auto` if absent.
+        /// The function whose level set is the surface. Default: `auto`.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub surface: Option<SurfaceChoice>,
-        /// Which way normals point, and with them the sign of curvatures; `outward` if absent.
+        /// The direction of normals, which determines the sign of curvatures. Default: `outward`.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub orientation: Option<OrientationChoice>,
-        /// What is wanted beside what every answer has.
+        /// Optional parts of the answer. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<GeometryInclude>>,
-        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-        /// 191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-        /// learn the same.
+        /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+        ///
+        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+        /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
@@ -55,31 +56,38 @@ request! {
 answer! {
     /// Curvatures of the surface at the queries.
     pub struct CurvaturesResponse {
-        /// The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
+        /// The d − 1 principal curvatures at each query, ascending, 1/length. Null where there is none.
         #[schema(value_type = Vec<Option<Vec<f64>>>)]
         principal_curvatures: Array,
-        /// A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
+        /// A unit direction for each principal curvature, its largest component positive.
+        ///
+        /// Where curvatures coincide, their directions are an arbitrary basis.
         #[schema(value_type = Vec<Option<Vec<Vec<f64>>>>)]
         principal_directions: Array,
-        /// Their average at each query, 1/length; null where there are none.
+        /// The average of the principal curvatures at each query, 1/length. Null where there are none.
         #[schema(value_type = Vec<Option<f64>>)]
         mean_curvatures: Array,
-        /// Their product at each query, 1/length to the d − 1; null where there are none.
+        /// The product of the principal curvatures at each query, 1/length to the d − 1. Null where there are
+        /// none.
         #[schema(value_type = Vec<Option<f64>>)]
         gaussian_curvatures: Array,
-        /// The normal at each query, of length 1; null where there is none.
+        /// The normal at each query, of length 1. Null where there is none.
         #[schema(value_type = Vec<Option<Vec<f64>>>)]
         normals: Array,
-        /// |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        /// |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
+        /// `offset`.
         #[schema(value_type = Vec<f64>)]
         gradient_norms: Array,
         /// The signature function at each query: 1 on the surface, usually more inside a closed one.
         #[schema(value_type = Vec<f64>)]
         levels: Array,
-        /// The function whose level surface was used at each query; `signature` where there is no answer.
+        /// The function whose level surface was used at each query. It is `signature` where there is no
+        /// answer.
         surfaces: Vec<SurfaceUsed>,
-        /// Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
-        /// there is no answer or none is known.
+        /// Standard deviation of the angle of the normal at each query, radians.
+        ///
+        /// 95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
+        /// deviation is not known.
         #[schema(value_type = Option<Vec<Option<f64>>>, nullable = false)]
         normal_deviations: Option<Array>,
         /// Standard deviations of the principal curvatures at each query, in their order, 1/length.
@@ -93,17 +101,18 @@ answer! {
         gaussian_curvature_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Compute curvatures
 ///
-/// Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator S = σPD²uP/|∇u| of
-/// the level surface of the signature function u, or of an offset model of the nearest points where the gradient of u
-/// vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around a query
-/// do not confirm are flagged.
+/// Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
+/// curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the signature
+/// function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes the
+/// place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around
+/// a query do not confirm are flagged.
 #[utoipa::path(
     post,
     path = "/v1/curvatures",

@@ -1,4 +1,4 @@
-//! Which answers of operators on values are flagged.
+//! Flags for doubtful answers of operators on values.
 
 use crate::http::compute::JobObserver;
 use crate::http::fields::Degenerate;
@@ -13,15 +13,17 @@ pub struct Doubted<'a> {
     pub judged: Judged<'a>,
     /// Values at the points of the client's cloud.
     pub values: &'a [f64],
-    /// Deviations of the answers, if they are known.
+    /// Standard deviations of the answers, if they are known.
     pub deviations: Option<&'a [f64]>,
 }
 
-/// The queries that the surface flags, and those at which the values do not bear out the answers: by deviations, where they
-/// are known, and by what is learned from the values, unless deviations say all of it.
+/// Returns the queries that the surface flags, and those at which the values do not support the answers.
+///
+/// Support is judged by the deviations, if they are known, and by a process learned from the values.
+/// Deviations alone suffice if their kernel was learned from the values.
 ///
 /// # Errors
-/// 503 and 504 where nobody waits any more.
+/// 503 or 504 if the computation is cancelled because nobody waits for it any more.
 pub fn degenerate(
     doubted: Doubted<'_>,
     fits: &Fits,
@@ -36,7 +38,7 @@ pub fn degenerate(
         surface.flag_uncertain(uncertain, &mut degenerate).map_err(refused)?;
     }
     let learned = fits.learned_beside(values, observer);
-    // Deviations of a kernel that was learned say all of it.
+    // `Ok(None)` means that the kernel was learned, so its deviations already express what the values say.
     if !matches!(learned, Ok(None)) || deviations.is_none() {
         let judge =
             |learned: &Option<_>| Judged { learned: learned.as_ref(), ..judged }.judge(operator, observer);

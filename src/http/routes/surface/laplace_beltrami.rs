@@ -1,4 +1,5 @@
-//! `POST /v1/laplace-beltrami` and `POST /v1/laplace-beltrami/matrix`.
+//! `POST /v1/laplace-beltrami`: the operator on values, as a dense matrix (`/matrix`) and as a sparse one
+//! (`/sparse-matrix`).
 
 use std::sync::Arc;
 
@@ -33,31 +34,31 @@ use gramian_numerics::surface::operators::Operator;
 const OPERATOR: Operator = Operator::LaplaceBeltrami;
 
 request! {
-    /// Values on a surface, and where their Laplace–Beltrami operator is wanted.
+    /// Values on a surface, and queries at which to compute their Laplace–Beltrami operator.
     pub struct LaplaceBeltramiRequest {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
-        /// The mean of the function; a constant if absent with the kernel, else 0.
+        /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the surface's cloud if absent.
+        /// The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where its fit differs from that of the values.
+        /// The surface, if its fit differs from that of the values.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// What is wanted beside; nothing if absent.
+        /// Optional parts of the answer. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
     }
 }
 
-/// How a matrix is written.
+/// The layout of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatrixFormat {
@@ -67,21 +68,25 @@ pub enum MatrixFormat {
 }
 
 request! {
-    /// A cloud of nodes on a surface, and where rows of its Laplace–Beltrami matrix are wanted.
+    /// A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
     pub struct LaplaceBeltramiMatrixRequest {
-        /// Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        /// The points to compute rows for, one row of the matrix each. Default: the points of the surface's
+        /// cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where its fit differs from that of the values.
+        /// The surface, if its fit differs from that of the values.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        /// The mean of the functions through the values. Default: 0.
+        ///
+        /// With a constant mean, the matrix maps constants to exactly 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Retired: a matrix of this path is dense. Sparse ones are answered by `/v1/laplace-beltrami/sparse-matrix`.
+        /// Deprecated: matrices of this path are dense. For sparse ones, use
+        /// `/v1/laplace-beltrami/sparse-matrix`.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false, deprecated)]
         pub format: Option<MatrixFormat>,
@@ -91,16 +96,18 @@ request! {
 answer! {
     /// The Laplace–Beltrami operator of the values at the queries.
     pub struct LaplaceBeltramiResponse {
-        /// Δu at each query, unit of the values per length squared; null where there is no normal.
+        /// Δu at each query, unit of the values per length squared. Null where there is no normal.
         #[schema(value_type = Vec<Option<f64>>)]
         values: Array,
-        /// Standard deviation of Δu given the values and, as far as its deviations are known, the surface; null where there is no
-        /// answer or no deviation; with `deviations`.
+        /// Standard deviation of Δu at each query. Present if `include` has `deviations`.
+        ///
+        /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+        /// the surface. Null where there is no answer or no deviation.
         #[schema(nullable = false, value_type = Option<Vec<Option<f64>>>)]
         value_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
@@ -108,21 +115,22 @@ answer! {
 answer! {
     /// The Laplace–Beltrami operator as a matrix.
     pub struct LaplaceBeltramiMatrixResponse {
-        /// Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
-        /// in general.
+        /// The matrix, unit 1/length². Rows are queries, and columns are the points of `cloud`.
+        ///
+        /// A row is null where there is no normal. The matrix is not symmetric in general.
         #[schema(value_type = Vec<Option<Vec<f64>>>)]
         matrix: Array,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Compute the Laplace–Beltrami operator
 ///
-/// Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the signature function. On
-/// the unit circle Δ cos θ = −cos θ.
+/// Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level surface of
+/// the signature function. On the unit circle Δ cos θ = −cos θ.
 #[utoipa::path(
     post,
     path = "/v1/laplace-beltrami",
@@ -142,7 +150,8 @@ pub async fn compute_laplace_beltrami(
 
 /// Assemble the Laplace–Beltrami matrix
 ///
-/// The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square, or not.
+/// Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries. The
+/// matrix need not be square.
 #[utoipa::path(
     post,
     path = "/v1/laplace-beltrami/matrix",
@@ -225,19 +234,20 @@ impl Operation for LaplaceBeltramiMatrixRequest {
 }
 
 request! {
-    /// Nodes and queries of the operator as a sparse matrix.
+    /// A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
     pub struct LaplaceBeltramiSparseMatrixRequest {
-        /// Where rows are wanted; the points of the surface if absent.
+        /// The points to compute rows for, one row of the matrix each. Default: the points of the surface.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where it is not that of the request.
+        /// The surface, if it differs from that of the request.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-        /// 191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-        /// learn the same.
+        /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+        ///
+        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+        /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
@@ -247,31 +257,36 @@ request! {
 answer! {
     /// The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
     pub struct LaplaceBeltramiSparseMatrixResponse {
-        /// Queries, nodes.
+        /// The number of queries and the number of nodes.
         #[schema(value_type = Vec<i64>)]
         shape: Integers,
-        /// Where each row begins among the entries, and how many there are, from 0.
+        /// The position of the first entry of each row, from 0, and the number of all entries at the end.
         #[schema(value_type = Vec<i64>)]
         indptr: Integers,
         /// The column of each entry, from 0, ascending within a row.
         #[schema(value_type = Vec<i64>)]
         indices: Integers,
-        /// The entries row by row, 1/length²: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
+        /// The entries row by row, 1/length².
+        ///
+        /// In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
         #[schema(value_type = Vec<f64>)]
         data: Array,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the surface came about.
+        /// The numbers used for the surface, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Assemble the sparse matrix of the Laplace–Beltrami operator
 ///
-/// Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4 over the tangent plane: exact
-/// for these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes. Over the nodes
-/// themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows at a rim are those of a
-/// boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each kind.
+/// Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed polyharmonic
+/// splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of
+/// third order for second derivatives. The matrix needs no kernel for values and takes any number of nodes.
+///
+/// If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for time
+/// steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are flagged.
+/// `diagnostics.stencils` counts rows of each kind.
 #[utoipa::path(
     post,
     path = "/v1/laplace-beltrami/sparse-matrix",

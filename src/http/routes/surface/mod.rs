@@ -1,4 +1,4 @@
-//! Resources of a surface: normals, curvatures, and operators on values over it.
+//! Routes about surfaces: normals, curvatures, and operators on values over a surface.
 
 mod common;
 pub mod curvatures;

@@ -1,4 +1,4 @@
-//! Operators over a surface, the same for each of them: checked work, its price, its answers and their diagnostics.
+//! Code shared by all operators over a surface: planning, price, answers and diagnostics.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub struct AppliedWork {
     request: GeometryRequest,
 }
 
-/// What a request to apply an operator has beside its fit.
+/// The parts of a request to apply an operator that are not its fit.
 pub struct Applied {
     pub geometry: Option<Geometry>,
     pub values: Vec<f64>,
@@ -58,30 +58,30 @@ pub struct StencilWork {
     request: GeometryRequest,
 }
 
-/// An operator on values at queries.
+/// An operator applied to values, at queries.
 pub struct AppliedAnswer {
-    /// `[m]` or `[m, d]`.
+    /// The operator at each query: `[m]` for Laplace–Beltrami, `[m, d]` for the surface gradient.
     pub values: Array,
-    /// Standard deviations of the same shape, if they are asked for.
+    /// Standard deviations in the shape of `values`, if they are asked for.
     pub deviations: Option<Array>,
     pub degenerate: Vec<Degenerate>,
     pub diagnostics: Diagnostics,
 }
 
-/// An operator as a matrix: `[m, n]`, or `[d, m, n]` with a matrix for each component.
+/// An operator as a matrix: `[m, n]`, or `[d, m, n]` with a matrix per component.
 pub struct MatrixAnswer {
     pub matrix: Array,
     pub degenerate: Vec<Degenerate>,
     pub diagnostics: Diagnostics,
 }
 
-/// An operator as compressed sparse rows; components share the places of their entries.
+/// An operator as compressed sparse rows. All components have their entries at the same places.
 pub struct SparseAnswer {
     /// `[m, n]` or `[d, m, n]`.
     pub shape: Integers,
     pub indptr: Integers,
     pub indices: Integers,
-    /// A number for each entry, or a row of them for each component.
+    /// A number per entry. For several components, a row of such numbers per component.
     pub data: Array,
     pub degenerate: Vec<Degenerate>,
     pub diagnostics: Diagnostics,
@@ -91,7 +91,7 @@ impl AppliedWork {
     /// Plans an operator applied to values.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn plan(
         planner: &Planner<'_>,
         operator: Operator,
@@ -118,7 +118,7 @@ impl AppliedWork {
         let sizes = Sizes { n_points: n, n_queries: m, dimension: d };
         let mut work =
             operator_price(main.solver, surface.solver(), asked, sizes).and(learning_price(n, d, 1));
-        // Where the kernel stretches the cloud or duplicates are merged, another cloud is sampled.
+        // A cloud that the kernel stretches, or whose duplicates are merged, has to be sampled for itself.
         work.n_bytes = work.n_bytes.saturating_add(sampling_price(n, d).n_bytes);
         let n_lists = if has_deviations { 2 } else { 1 };
         let n_numbers = planner.check_answer(of_operator.and_then(|n| n.checked_mul(n_lists)))?;
@@ -127,10 +127,11 @@ impl AppliedWork {
         Ok(Plan { main: main.into(), surface: Some(surface.into()), work, cost })
     }
 
-    /// Applies the operator: to the function through all values, or to functions that are kriged around each query.
+    /// Applies the operator to the function through all values, or to functions that are kriged around each
+    /// query.
     ///
     /// # Errors
-    /// Those of the numerics as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub fn apply(
         &self,
         operator: Operator,
@@ -144,7 +145,7 @@ impl AppliedWork {
         }
     }
 
-    /// The surface at the queries, of which those are flagged that are far from the nodes of the values.
+    /// Computes the surface at the queries. Flags queries that are far from the nodes of the values.
     fn surface(&self, fits: &Fits, observer: &JobObserver) -> Result<SurfaceGeometry, Problem> {
         let mut surface = fits.geometry(&self.queries, &self.request, observer)?;
         let nodes = &fits.main.plan.stored;
@@ -161,7 +162,7 @@ impl AppliedWork {
     }
 }
 
-/// An operator on its way to an answer.
+/// An operator that is being applied to the values of a request.
 struct Applying<'a> {
     work: &'a AppliedWork,
     operator: Operator,
@@ -169,7 +170,7 @@ struct Applying<'a> {
     surface: SurfaceGeometry,
 }
 
-/// Numbers of an operator at queries, with what is said of them.
+/// Results of an operator at the queries, with deviations, flags and a report.
 struct Found {
     values: Vec<f64>,
     deviations: Option<Vec<f64>>,
@@ -244,7 +245,7 @@ impl MatrixWork {
     /// Plans an operator as a matrix.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn plan(
         planner: &Planner<'_>,
         operator: Operator,
@@ -274,7 +275,7 @@ impl MatrixWork {
     /// Computes the matrix, with a column for each point of the client's cloud.
     ///
     /// # Errors
-    /// Those of the numerics as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub fn matrix(
         &self,
         operator: Operator,
@@ -299,7 +300,8 @@ impl MatrixWork {
         })
     }
 
-    /// Without values, the quality of the main fit is that of Y = 1.
+    /// Returns the diagnostics of the main fit and of the surface. Without values, the quality of the main
+    /// fit is that of Y = 1.
     fn diagnostics(
         &self,
         fits: &Fits,
@@ -321,7 +323,7 @@ impl StencilWork {
     /// Plans an operator as a sparse matrix.
     ///
     /// # Errors
-    /// Those of the planner.
+    /// Returns the errors of the planner.
     pub fn plan(
         planner: &Planner<'_>,
         operator: Operator,
@@ -334,7 +336,7 @@ impl StencilWork {
         check_is_surface(&main.on.stored.cloud)?;
         let queries = planner.queries(queries, &mut main.on)?;
         let (m, d) = (queries.n_points(), queries.dimension());
-        // A column for each entry, which all components share, and a number for each of these.
+        // Each entry has a column index, which all components share, and a number per component.
         let per_entry = 1 + operator.n_components(d);
         let n_numbers = m.checked_mul(n_entries_per_row(d)).and_then(|n| n.checked_mul(per_entry));
         let cost = Cost {
@@ -346,10 +348,10 @@ impl StencilWork {
         Ok(Plan { main: main.into(), surface: None, work, cost })
     }
 
-    /// Assembles the matrix; queries that its nodes do not resolve are flagged.
+    /// Assembles the matrix. Flags queries around which its nodes do not resolve the surface.
     ///
     /// # Errors
-    /// Those of the numerics as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub fn matrix(
         &self,
         operator: Operator,
@@ -387,7 +389,10 @@ impl StencilWork {
     }
 }
 
-/// Operators see second derivatives of the surface, and do not depend on the side that normals point to.
+/// Returns the request for the surface of an operator.
+///
+/// Operators use second derivatives of the surface, so curvatures are checked. They do not depend on the side
+/// that normals point to, so normals just follow the gradient.
 fn operator_request(geometry: &Option<Geometry>) -> GeometryRequest {
     let surface = geometry.as_ref().and_then(|geometry| geometry.surface);
     geometry_request(surface, Some(OrientationChoice::Gradient), true, None)

@@ -1,4 +1,5 @@
-//! `POST /v1/surface-gradient` and `POST /v1/surface-gradient/matrix`.
+//! `POST /v1/surface-gradient`: the operator on values, as dense matrices (`/matrix`) and as sparse ones
+//! (`/sparse-matrix`).
 
 use std::sync::Arc;
 
@@ -31,24 +32,24 @@ use gramian_numerics::surface::operators::Operator;
 const OPERATOR: Operator = Operator::SurfaceGradient;
 
 request! {
-    /// Values on a surface, and where their surface gradient is wanted.
+    /// Values on a surface, and queries at which to compute their surface gradient.
     pub struct SurfaceGradientRequest {
         /// The values at the points of `cloud`, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
-        /// The mean of the function; a constant if absent with the kernel, else 0.
+        /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the surface's cloud if absent.
+        /// The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where its fit differs from that of the values.
+        /// The surface, if its fit differs from that of the values.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// What is wanted beside; nothing if absent.
+        /// Optional parts of the answer. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
@@ -56,17 +57,20 @@ request! {
 }
 
 request! {
-    /// A cloud of nodes on a surface, and where rows of its surface gradient matrices are wanted.
+    /// A cloud of nodes on a surface, and queries for the rows of its surface gradient matrices.
     pub struct SurfaceGradientMatrixRequest {
-        /// Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        /// The points to compute rows for, one row of each matrix. Default: the points of the surface's
+        /// cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where its fit differs from that of the values.
+        /// The surface, if its fit differs from that of the values.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        /// The mean of the functions through the values. Default: 0.
+        ///
+        /// With a constant mean, the matrix maps constants to exactly 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
@@ -76,16 +80,18 @@ request! {
 answer! {
     /// Surface gradients at the queries.
     pub struct SurfaceGradientResponse {
-        /// ∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
+        /// ∇u − (∇u·ν)ν at each query, unit of the values per length. Null where there is no normal.
         #[schema(value_type = Vec<Option<Vec<f64>>>)]
         gradients: Array,
-        /// Standard deviation of each component given the values and, as far as its deviations are known, the surface; null where there is no
-        /// answer or no deviation; with `deviations`.
+        /// Standard deviation of each component at each query. Present if `include` has `deviations`.
+        ///
+        /// It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+        /// the surface. Null where there is no answer or no deviation.
         #[schema(nullable = false, value_type = Option<Vec<Option<Vec<f64>>>>)]
         gradient_deviations: Option<Array>,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
@@ -93,20 +99,22 @@ answer! {
 answer! {
     /// The surface gradient as matrices.
     pub struct SurfaceGradientMatrixResponse {
-        /// One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
-        /// is no normal.
+        /// A matrix per coordinate, unit 1/length. Rows are queries, and columns are the points of `cloud`.
+        ///
+        /// A row is null where there is no normal.
         #[schema(value_type = Vec<Vec<Option<Vec<f64>>>>)]
         matrices: Array,
         /// The queries where geometry has no meaning (null), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Compute surface gradients
 ///
-/// The tangential part of the gradient of the function through the values, on the level surface of the signature function.
+/// Returns the tangential part of the gradient of the function through the values, on the level surface of
+/// the signature function.
 #[utoipa::path(
     post,
     path = "/v1/surface-gradient",
@@ -126,7 +134,8 @@ pub async fn compute_surface_gradient(
 
 /// Assemble surface gradient matrices
 ///
-/// One matrix per coordinate that turns values at the nodes into that component of the surface gradient at the queries.
+/// Returns a matrix per coordinate. It maps values at the nodes to that component of the surface gradient at
+/// the queries.
 #[utoipa::path(
     post,
     path = "/v1/surface-gradient/matrix",
@@ -208,19 +217,20 @@ impl Operation for SurfaceGradientMatrixRequest {
 }
 
 request! {
-    /// Nodes and queries of the operator as a sparse matrix.
+    /// A cloud of nodes on a surface, and queries for the rows of its sparse surface gradient matrices.
     pub struct SurfaceGradientSparseMatrixRequest {
-        /// Where rows are wanted; the points of the surface if absent.
+        /// The points to compute rows for, one row of each matrix. Default: the points of the surface.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// The surface, where it is not that of the request.
+        /// The surface, if it differs from that of the request.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub geometry: Option<Geometry>,
-        /// Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-        /// 191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-        /// learn the same.
+        /// At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+        ///
+        /// Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+        /// the same sites and the points around them.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, max_items = 192)]
         pub sites: Option<Points>,
@@ -228,31 +238,32 @@ request! {
 }
 
 answer! {
-    /// The components of the surface gradient as sparse matrices with rows for the queries and columns for the nodes.
+    /// The components of the surface gradient as sparse matrices. Rows are queries, and columns are nodes.
     pub struct SurfaceGradientSparseMatrixResponse {
-        /// Components, queries, nodes.
+        /// The number of components, of queries and of nodes.
         #[schema(value_type = Vec<i64>)]
         shape: Integers,
-        /// Where each row begins among the entries, and how many there are, from 0.
+        /// The position of the first entry of each row, from 0, and the number of all entries at the end.
         #[schema(value_type = Vec<i64>)]
         indptr: Integers,
         /// The column of each entry, from 0, ascending within a row.
         #[schema(value_type = Vec<i64>)]
         indices: Integers,
-        /// The entries row by row, 1/length, one list per component.
+        /// The entries row by row, 1/length, as a list per component.
         #[schema(value_type = Vec<Vec<f64>>)]
         data: Array,
         /// The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         degenerate: Vec<Degenerate>,
-        /// How the surface came about.
+        /// The numbers used for the surface, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Assemble the sparse matrix of the surface gradient
 ///
-/// Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
-/// these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+/// Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines with
+/// polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third order
+/// for second derivatives. The matrices need no kernel for values and take any number of nodes.
 #[utoipa::path(
     post,
     path = "/v1/surface-gradient/sparse-matrix",

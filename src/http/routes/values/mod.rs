@@ -1,4 +1,5 @@
-//! Resources of values at points: interpolation, the process they are taken to be, and its hyperparameters.
+//! Routes about values at points: interpolation, Gaussian process posteriors, and selection of
+//! hyperparameters.
 
 pub mod interpolation;
 pub mod model_selection;

@@ -1,4 +1,4 @@
-//! `POST /v1/model-selection`.
+//! `POST /v1/model-selection`: the kernel and the noise that explain values best.
 
 mod search;
 
@@ -27,34 +27,34 @@ use crate::http::wire::write::json::Nullable;
 use crate::store::Owner;
 use search::{Search, Work};
 
-/// What is made as great as possible.
+/// The score that a selection maximizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionCriterion {
     /// The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
     #[default]
     MarginalLikelihood,
-    /// The sum of the log predictive densities of each value given all others.
+    /// The sum over all values of the log predictive density of the value given all others.
     LeaveOneOut,
-    /// Minus n|Y − Ŷ|²/tr(I − H)², Ŷ = HY: variance and alpha only count by their ratio.
+    /// −n|Y − Ŷ|²/tr(I − H)², Ŷ = HY. It depends only on the ratio of variance and alpha.
     GeneralizedCrossValidation,
 }
 
-/// What may be free.
+/// A parameter that may be free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionParameter {
     /// The length scale of the kernel.
     LengthScale,
-    /// The length scale of one axis, or of every axis its own.
+    /// A length scale per axis: that of one axis, or those of all axes.
     LengthScales,
     /// The variance of the kernel.
     Variance,
     /// The variance of the noise.
     Alpha,
-    /// epsilon of the Laplace family.
+    /// The parameter epsilon of the Laplace family.
     Epsilon,
-    /// ν of the Matérn family: each half-integer within the bounds is tried.
+    /// The smoothness ν of the Matérn family. Each half-integer within the bounds is tried.
     Nu,
 }
 
@@ -62,73 +62,81 @@ pub enum SelectionParameter {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FreeParameter {
-    /// Which.
+    /// The parameter.
     #[serde(deserialize_with = "word")]
     pub parameter: SelectionParameter,
-    /// length_scales: the axis, from 0; every axis if absent, each within these bounds.
+    /// The axis, from 0, for `length_scales` only. Default: every axis, each within these bounds.
     #[serde(default, deserialize_with = "present")]
     #[schema(nullable = false, minimum = 0)]
     pub axis: Option<usize>,
-    /// The least that it may be.
+    /// The lower bound.
     #[schema(exclusive_minimum = 0.0)]
     pub min: f64,
-    /// The greatest that it may be.
+    /// The upper bound.
     #[schema(exclusive_minimum = 0.0)]
     pub max: f64,
 }
 
 request! {
-    /// Values at the points of a cloud, and what may be chosen to explain them. The search begins with `kernel` and `alpha`.
+    /// Values at the points of a cloud, and the parameters that may vary to explain them.
+    ///
+    /// The search begins with `kernel` and `alpha`.
     pub struct ModelSelectionRequest {
         /// The values at the points, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
-        /// The mean of the function; a constant if absent with the kernel, else 0.
+        /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// What is made as great as possible; the marginal likelihood if absent.
+        /// The score to maximize. Default: the marginal likelihood.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub criterion: Option<SelectionCriterion>,
-        /// What is free, and its bounds; 64 entries at most. Absent: length scale, or that of each axis where `kernel` has them, and variance, from a
-        /// hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a millionth of where it begins, or
-        /// of a millionth of the variance if that is more, to a hundred times the variance.
+        /// The free parameters and their bounds, at most 64 entries. Default: length scale, variance, alpha.
+        ///
+        /// By default, length scale and variance may become up to a hundred times smaller or larger than at
+        /// the start. If `kernel` has a length scale per axis, each of them varies. Alpha varies unless noise
+        /// is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
+        /// variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
+        /// variance if that is more.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false)]
         pub vary: Option<Vec<FreeParameter>>,
-        /// Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent, and matern where nu varies.
+        /// Kernel families to try. Default: that of the start, and `matern` if `nu` varies.
+        ///
+        /// A family takes the parameters of `kernel` if `kernel` is of that family.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub families: Option<Vec<KernelFamily>>,
-        /// Further starts for each family, spread over the bounds; 2 if absent.
+        /// Number of further starts for each family, spread over the bounds. Default: 2.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, minimum = 0, maximum = 100)]
         pub restarts: Option<u8>,
-        /// Where the further starts are; 0 if absent.
+        /// The seed that determines the further starts. Default: 0.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, minimum = 0, maximum = 9007199254740991u64)]
         pub seed: Option<u64>,
     }
 }
 
-/// The criterion at one alpha, all else being as it was selected.
+/// The score at one alpha, with everything else as selected.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 pub struct PathEntry {
-    /// α.
+    /// The variance of the noise, α.
     pub alpha: f64,
-    /// The score; null where the matrix is not positive definite.
+    /// The score. Null where the matrix is not positive definite.
     #[schema(value_type = Option<f64>, nullable = true)]
     pub score: Nullable,
 }
 
-/// What each value is predicted to be from all others.
+/// Predictions of each value from all others.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct LeftOut {
-    /// The predictions, in the order of the points; null where the mean is not determined without the point.
+    /// The predictions, in the order of the points. Null where the mean is not determined without the point.
     #[schema(value_type = Vec<Option<f64>>)]
     pub means: Vec<Nullable>,
-    /// The variances of the values predicted, their noise included.
+    /// The variances of the predicted values, noise included.
     #[schema(value_type = Vec<Option<f64>>)]
     pub variances: Vec<Nullable>,
     /// The logarithms of the densities of the values under their predictions.
@@ -145,55 +153,64 @@ impl Member for LeftOut {
 /// The best score of a family.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct FamilyScore {
-    /// The kernel family, with ν where it is Matérn.
+    /// The kernel family.
     pub family: KernelFamily,
-    /// matern: the smoothness ν.
+    /// The smoothness ν of the Matérn family. Absent for other families.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub nu: Option<f64>,
-    /// Its best score; null where the matrix was not positive definite from any start.
+    /// The best score of the family. Null if the matrix was not positive definite from any start.
     #[schema(value_type = Option<f64>, nullable = true)]
     pub score: Nullable,
 }
 
 answer! {
-    /// What explains the values best.
+    /// The selected kernel and noise, with scores and predictions.
     pub struct ModelSelectionResponse {
-        /// The kernel that was selected: sent as `kernel` it is used.
+        /// The selected kernel. Sent as `kernel` of a request, it is used as it is.
         kernel: KernelUsed,
-        /// The variance of the noise that was selected; absent with `noise_variances`.
+        /// The selected variance of the noise. Absent with `noise_variances`.
         #[schema(nullable = false)]
         alpha: Option<f64>,
-        /// The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /// The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
+        /// mean is 0.
         #[schema(nullable = false, value_type = Option<Vec<f64>>)]
         mean_coefficients: Option<Array>,
-        /// The criterion there; greater is better.
+        /// The score of the selection. Greater is better.
         score: f64,
-        /// Derivatives of the score in the logarithms of what is free, in the order of `vary`; for `length_scales` without an axis, in that of a factor
-        /// of all; null for nu, which takes steps.
+        /// Derivatives of the score in the logarithms of the free parameters, in the order of `vary`.
+        ///
+        /// For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
+        /// length scales. Null for `nu`, which takes steps.
         #[schema(value_type = Vec<Option<f64>>)]
         gradient: Vec<Nullable>,
-        /// Whether no slope is left to follow within the bounds.
+        /// True if no slope is left to follow within the bounds.
         converged: bool,
-        /// How often the criterion was evaluated.
+        /// Number of evaluations of the score.
         evaluations: usize,
         /// The families that were tried.
         families: Vec<FamilyScore>,
-        /// The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`, and beyond 3,000 points.
+        /// The score over ascending alpha, with everything else as selected.
+        ///
+        /// Empty with `noise_variances`, and for more than 3,000 points.
         path: Vec<PathEntry>,
-        /// Each value predicted from all others, in closed form.
+        /// Predictions of each value from all others, in closed form.
         leave_one_out: LeftOut,
-        /// Of the fit that the search began with.
+        /// Diagnostics of the fit that the search began with.
         diagnostics: Diagnostics,
     }
 }
 
 /// Select a model
 ///
-/// Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving one out or by generalized cross-validation: from the
-/// kernel of the request, or the one that is learned if there is none, and from further starts, by sequential quadratic programming with exact slopes within
-/// bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value predicted from all others. Every evaluation costs a
-/// few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent with all of them.
+/// Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-out or
+/// generalized cross-validation. The search starts from the kernel of the request, or from a learned one if
+/// the request has none, and from further starts. It uses sequential quadratic programming with exact slopes
+/// within bounds.
+///
+/// The answer has the selection, the score over alpha, and predictions of each value from all others. Every
+/// evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds, select
+/// on a sample of the points, and send the result with all of them.
 #[utoipa::path(
     post,
     path = "/v1/model-selection",
@@ -211,13 +228,17 @@ pub async fn select_model(
     serve::<ModelSelectionRequest>(app, owner, request).await
 }
 
-/// α of a path.
+/// Number of α on a path.
 const N_ALPHAS: usize = 61;
 
-/// Points of a path at most: nothing looks whether anybody waits while its eigendecomposition is made, some seconds here.
+/// Largest number of points with a path.
+///
+/// A path takes too long beyond it.
 const MAX_PATH_POINTS: usize = 3000;
 
-/// Points of a selection at most: the same of its factorizations, and a hundred of these take minutes.
+/// Largest number of points of a selection.
+///
+/// A hundred factorizations take minutes at this size.
 const MAX_POINTS: usize = 5000;
 
 impl Operation for ModelSelectionRequest {

@@ -1,4 +1,6 @@
-//! Factors that outlive the process, where there is a store: written behind the answers, and read where that takes less time than making them.
+//! Factors in the store, which outlive the process.
+//!
+//! They are written after the answers. They are read where that takes less time than making them.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -15,20 +17,20 @@ use crate::store::prepared::PreparedFit;
 use gramian_numerics::model::Model;
 use gramian_numerics::solver::{FactorBuilder, Solver, System};
 
-/// Points from which on a factor is kept: 4 n² bytes are read in less time than n³/3 flops take.
+/// Number of points from which a factor is stored: reading 4 n² bytes takes less time than n³/3 flops.
 const WORTH_IT: usize = 4000;
 
-/// Bytes that are read, and taken up by one small job.
+/// Bytes that are read at once and consumed by one small job.
 const PIECE: u64 = 8 << 20;
 
 /// Bytes that are written at once.
 const WRITTEN: usize = 1 << 20;
 
-/// Why a factor was not found.
+/// Reason why a factor could not be read.
 enum Lost {
     Damaged(Damaged),
     Unavailable(Unavailable),
-    /// It has gone meanwhile, there is no memory, or a job ended in a panic.
+    /// The factor was deleted meanwhile, there is no memory, or a job ended in a panic.
     Gone,
 }
 
@@ -38,13 +40,15 @@ impl From<Unavailable> for Lost {
     }
 }
 
-/// The model of a fit from the store, if that has its factor. It never fails: what cannot be read is made again.
+/// Returns the model of a fit from the store, if the store has its factor.
+///
+/// This never fails: a factor that cannot be read is made again.
 pub async fn restore(app: &Arc<App>, admission: &Admission, plan: &FitPlan) -> Option<Model> {
     let durable = app.durable.as_ref()?;
     if plan.fitted.n_points() < WORTH_IT || app.config.store_factor_bytes == 0 {
         return None;
     }
-    // What is wrong with a system is found again where it is made.
+    // An invalid system is refused again where the model is made.
     let system = plan.recipe.factorized_system(&plan.fitted).ok()??;
     let name = name_of(app, plan);
     match read(app, admission, &name, &system).await {
@@ -100,7 +104,7 @@ async fn read(
     restored.map(Some).ok_or(Lost::Damaged(Damaged("it is no factor of its system")))
 }
 
-/// A factor as far as it was read.
+/// A factor that has been read in part.
 struct Reading {
     builder: FactorBuilder,
     hasher: blake3::Hasher,
@@ -109,7 +113,7 @@ struct Reading {
 }
 
 impl Reading {
-    /// Takes the next bytes: whole numbers, since pieces and lines in front of them are.
+    /// Consumes the next bytes. They are whole numbers, because pieces and the line before them are.
     fn with(mut self, piece: &Bytes) -> Self {
         self.hasher.update(piece);
         self.at += piece.len() as u64;
@@ -122,8 +126,9 @@ impl Reading {
     }
 }
 
-/// Writes a factor to the store, behind the answer, unless it is there, or another one is being written: what is held for that is memory that others
-/// may want.
+/// Writes a factor to the store after the answer, unless the store has it or another factor is being written.
+///
+/// A factor holds memory while it is written, and others may need that memory.
 pub fn keep(app: &Arc<App>, plan: &FitPlan, stored: &Arc<PreparedFit>) {
     let Ok(solver) = stored.model().solver() else { return };
     let is_worth_it = cfg!(target_endian = "little")
@@ -155,7 +160,7 @@ async fn write(app: &App, name: &FactorName, stored: Arc<PreparedFit>) -> Result
         (0..all.len()).step_by(WRITTEN).map(move |at| all.slice(at..all.len().min(at + WRITTEN)))
     });
     let n_bytes = durable.objects.put_factor(name, &head, pieces).await?;
-    // Deleted while it was written: it must not come back.
+    // The cloud was deleted during the write, so its factor must go too.
     if durable.objects.cloud_bytes(&name.owner, name.cloud).await?.is_none() {
         durable.objects.delete_factors(&name.owner, name.cloud).await?;
     } else if durable.n_factor_bytes.fetch_add(n_bytes, Ordering::Relaxed) + n_bytes > most {
@@ -164,7 +169,7 @@ async fn write(app: &App, name: &FactorName, stored: Arc<PreparedFit>) -> Result
     Ok(())
 }
 
-/// A factor as bytes, which are those in memory, not copies.
+/// Returns a factor as bytes that share its memory, without a copy.
 fn parts(stored: &Arc<PreparedFit>) -> (Option<FactorHead>, Bytes, Bytes) {
     let factor = stored.model().solver().ok().and_then(|solver| Some((solver.n_points(), solver.factor()?)));
     let head = factor.map(|(n, factor)| FactorHead::new(n, factor.norm1, factor.reciprocal_condition));

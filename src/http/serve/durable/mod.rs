@@ -1,5 +1,5 @@
-//! Requests and clouds that outlive the process: memory and compute threads for what store/clouds/ does, and
-//! what clients are told of it.
+//! Requests and clouds that outlive the process: memory and threads for the work of store/clouds/, and its
+//! answers to clients.
 
 pub mod factors;
 
@@ -22,28 +22,29 @@ use crate::store::key::CloudId;
 use crate::store::objects::cloud_object::{decode, encode, object_bytes};
 use crate::store::objects::{ListWindow, OwnerName, Swept, Unavailable};
 
-/// When to come back to a store that does not answer, and how often clouds that it has not taken are offered to it again.
+/// Seconds after which a client should retry if the store does not answer. Refused clouds are offered to the
+/// store again at the same interval.
 pub const SECONDS_UNTIL_BACK: u64 = 5;
 
-/// How often it is looked what of the store is to go, unless more comes than may be there.
+/// Interval between sweeps of the store, unless it grows beyond its limit earlier.
 const SWEEPING: Duration = Duration::from_secs(600);
 
-/// The least time between two looks at all of it: once it is full, every new cloud makes it fuller than it may be.
+/// Least time between two sweeps. Once the store is full, every new cloud takes it over its limit.
 const BETWEEN_SWEEPS: Duration = Duration::from_secs(1);
 
-/// Memory that reading a cloud takes, of the bytes of its object: as they come, in one piece, and as numbers.
+/// Memory for reading a cloud, in sizes of its object: the pieces as they come, one whole, and the numbers.
 const READING: usize = 3;
 
-/// How long a cloud in memory is taken to be in the store as well: another process may have deleted it there.
+/// Time for which a cloud in memory is assumed to be still stored. Another process may have deleted it there.
 pub const TRUST: Duration = Duration::from_secs(10);
 
-/// How long an object waits for memory before the request is refused.
+/// Time for which an object waits for memory before the request is refused.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Work of hashing and copying a byte.
+/// Flops for hashing and copying one byte.
 const FLOPS_PER_BYTE: f64 = 8.0;
 
-/// 503 where the store does not answer.
+/// Returns 503 for a store that does not answer.
 pub fn unavailable(error: &Unavailable) -> Problem {
     tracing::error!(%error, "the store does not answer");
     Problem::unavailable("the store of clouds does not answer", SECONDS_UNTIL_BACK)
@@ -53,15 +54,14 @@ fn holder_of(app: &App, owner: Owner) -> Holder {
     Holder { owner, name: app.keys.name_of(owner) }
 }
 
-/// Runs a change of a cloud to its end, also if the client leaves meanwhile: half of a change is none that
-/// anybody asked for.
+/// Runs a change of a cloud to its end, even if the client leaves meanwhile. Nobody asked for half a change.
 async fn to_its_end<T: Send + 'static>(
     change: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {
     tokio::spawn(change.in_current_span()).await.unwrap_or_else(|_| Err(Problem::internal()))
 }
 
-/// A cloud of the owner who was admitted, from memory or from the store.
+/// Returns a cloud of the admitted owner, from memory or from the store.
 ///
 /// # Errors
 /// 503 if the store does not answer, or there is no memory for the cloud.
@@ -102,7 +102,7 @@ async fn read_cloud(
     app.clouds.take_in(objects, &holder, id, read).await.map_err(refused)
 }
 
-/// Takes the memory that reading an object of so many bytes needs.
+/// Reserves the memory for reading an object of `n_bytes` bytes.
 async fn reserve_for_reading(
     app: &App,
     owner: Owner,
@@ -111,7 +111,7 @@ async fn reserve_for_reading(
 ) -> Result<Reservation, Problem> {
     let n_reserved = usize::try_from(n_bytes).map_or(usize::MAX, |n| n.saturating_mul(READING));
     if n_reserved > app.intake.largest() {
-        // Nothing that is kept today: there was more memory when it was written, or it is damaged.
+        // Such an object is damaged, or was written when the service had more memory.
         tracing::error!(cloud = %id, n_bytes, "a cloud of the store takes more memory than there may be for one");
         return Err(Problem::internal());
     }
@@ -122,7 +122,9 @@ async fn reserve_for_reading(
     }
 }
 
-/// Writes clouds that are in memory alone. A store that does not take them is reported, and offered them again: they are served from memory
+/// Writes clouds that only memory holds.
+///
+/// A store that does not take them is reported, and they are offered to it again. Memory serves them
 /// meanwhile. A cloud that neither store nor memory can hold is dropped once its request is answered.
 pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredCloud>]) {
     for cloud in clouds {
@@ -132,11 +134,13 @@ pub async fn keep_all(app: &Arc<App>, owner: Owner, clouds: &[Arc<RegisteredClou
     }
 }
 
-/// Writes a cloud unless the store has it; says whether it is new to the store. Without a store every cloud
-/// is.
+/// Writes a cloud unless the store has it. Returns whether it is new to the store.
+///
+/// Without a store, every cloud is new.
 ///
 /// # Errors
-/// 413 if there would never be the memory to read it again; 503 if neither the store nor memory keeps it.
+/// 413 if there would never be enough memory to read it again. 503 if neither the store nor memory can hold
+/// it.
 pub async fn keep(app: &Arc<App>, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Result<bool, Problem> {
     if app.durable.is_none() {
         return Ok(true);
@@ -178,7 +182,7 @@ async fn encoded(app: &App, owner: Owner, cloud: &Arc<RegisteredCloud>) -> Resul
     encoded.map_err(|_| "a cloud is not encoded".to_owned())
 }
 
-/// Whether what is written of a cloud could be read again.
+/// Checks that the stored object of a cloud could be read again.
 fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
     let (n_bytes, most) = (object_bytes(&cloud.head()), app.intake.largest() / READING);
     if n_bytes.is_some_and(|n_bytes| n_bytes <= most) {
@@ -189,7 +193,7 @@ fn check_readable(app: &App, cloud: &RegisteredCloud) -> Result<(), Problem> {
     Err(Problem::too_large(Slug::ProblemTooLarge, what, most, n_bytes).with_remedy(remedy))
 }
 
-/// The first clouds within a window of the list of the owner who was admitted.
+/// Returns the first clouds within a window of the admitted owner's list.
 ///
 /// # Errors
 /// 503 if the store does not answer.
@@ -199,7 +203,7 @@ pub async fn list_clouds(
     window: ListWindow,
 ) -> Result<CloudPage, Problem> {
     let (owner, shared) = (admission.owner, app.clone());
-    // Nothing is computed: it only takes longer than an async worker may be held.
+    // This computes nothing, but takes longer than an async worker may be held.
     let job = move |_: &JobObserver| shared.clouds.unstored_places(owner);
     let unstored = app.compute.run(admission, 0.0, job).await?.0;
     let objects = app.durable.as_ref().map(|durable| &*durable.objects);
@@ -207,10 +211,10 @@ pub async fn list_clouds(
     page.map_err(|error| unavailable(&error))
 }
 
-/// Forgets a cloud wherever it is; says whether it was anywhere.
+/// Deletes a cloud from memory and from the store. Returns whether it was in either.
 ///
 /// # Errors
-/// 503 if the store does not answer: nothing is forgotten then.
+/// 503 if the store does not answer. Nothing is deleted then.
 pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<bool, Problem> {
     let app = app.clone();
     to_its_end(async move {
@@ -223,13 +227,13 @@ pub async fn forget_cloud(app: &Arc<App>, owner: Owner, id: CloudId) -> Result<b
     .await
 }
 
-/// Forgets what was computed from a cloud.
+/// Drops all results computed from a cloud.
 fn forget_results(app: &App, owner: Owner, id: CloudId) {
     app.prepared.forget_cloud(owner, id);
     app.learned.forget_cloud(owner, id);
 }
 
-/// Lets go of what the store is not to keep, for as long as the process lives.
+/// Sweeps objects out of the store that it should not keep, for as long as the process lives.
 pub async fn retain(app: Arc<App>) {
     let Some(durable) = &app.durable else { return };
     let mut ticks = tokio::time::interval(SWEEPING);
@@ -264,7 +268,7 @@ pub async fn retain(app: Arc<App>) {
     }
 }
 
-/// Offers what the store has not taken to it again, for as long as the process lives.
+/// Offers clouds to the store that it has not taken, for as long as the process lives.
 pub async fn catch_up(app: Arc<App>) {
     let Some(durable) = &app.durable else { return };
     let mut ticks = tokio::time::interval(Duration::from_secs(SECONDS_UNTIL_BACK));
@@ -277,7 +281,7 @@ pub async fn catch_up(app: Arc<App>) {
         for owner in app.keys.owners() {
             offer_again(&app, durable, owner).await;
         }
-        // What was refused meanwhile has its turn next time.
+        // Clouds refused meanwhile are offered in the next round.
         durable.n_made_up.store(n_refused, Ordering::Release);
         if durable.is_up_to_date() {
             tracing::info!("the store has taken all clouds");

@@ -1,4 +1,4 @@
-//! The fits of a request as far as the request says, before anything is computed.
+//! Fits of a request, as far as the request defines them, before anything is computed.
 
 mod resolved;
 mod surface;
@@ -17,7 +17,7 @@ pub use resolved::FitPlan;
 pub use surface::{PlannedSurface, SurfaceChoice};
 pub use values::{PlannedValues, Values};
 
-/// A cloud that is fitted for somebody, and where it stands in the request.
+/// A cloud that is fitted for an owner, with the pointers to it in the request.
 pub struct FittedCloud {
     pub owner: Owner,
     pub stored: Arc<RegisteredCloud>,
@@ -25,18 +25,19 @@ pub struct FittedCloud {
     pub duplicates: DuplicatePolicy,
 }
 
-/// A fit that is checked as far as the request goes; what is left out follows from the cloud or from the values.
+/// A fit that is checked as far as the request goes. What the request leaves out follows from the cloud or
+/// the values.
 pub enum PlannedFit {
     Values(PlannedValues),
     Surface(PlannedSurface),
 }
 
-/// What a fit needs to know before it can be resolved, and nobody knows yet.
+/// Knowledge that a fit still needs before it can be resolved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lack {
-    /// The lengths of the cloud.
+    /// Length scales of the cloud.
     Scales,
-    /// The noise of its points.
+    /// Noise of the points of the cloud.
     Noise,
     /// Kernel, noise or mean of the values.
     Learned,
@@ -57,10 +58,10 @@ impl PlannedFit {
         }
     }
 
-    /// Fills in what is left out, once nothing is lacking.
+    /// Completes the fit, once nothing is lacking.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn resolve(self) -> Result<FitPlan, Problem> {
         match self {
             Self::Values(fit) => fit.resolve(),
@@ -82,18 +83,18 @@ impl From<PlannedSurface> for PlannedFit {
 }
 
 impl FittedCloud {
-    /// Points that are factorized at most: without the duplicates that may be merged.
+    /// Largest number of points that are factorized. Merging duplicates may leave fewer.
     pub fn n_points(&self) -> usize {
         self.stored.cloud.n_points()
     }
 
-    /// The lengths of the cloud; a fit is resolved once it lacks nothing.
+    /// Length scales of the cloud. A fit is resolved only once they are known.
     fn scales(&self) -> Result<&Scales, Problem> {
         self.stored.scales().ok_or_else(Problem::internal)
     }
 }
 
-/// Why a solver is local that was not asked for; as the diagnostics say it.
+/// Returns the reason for an automatic choice of the local solver, as worded in diagnostics.
 pub fn words(reason: AutoLocal) -> &'static str {
     match reason {
         AutoLocal::BeyondDense => "the cloud has more points than are factorized densely",
@@ -104,19 +105,19 @@ pub fn words(reason: AutoLocal) -> &'static str {
     }
 }
 
-/// What answering takes beside what the fits take.
+/// Cost of an answer, besides the cost of its fits.
 #[derive(Debug, Clone, Copy)]
 pub struct Cost {
-    /// The work, and what lies on the way to the answer.
+    /// Price of the work, including intermediate results.
     pub work: Price,
-    /// Numbers of the answer.
+    /// Count of numbers in the answer.
     pub n_numbers: usize,
-    /// Numbers of the request beside its clouds: values and queries.
+    /// Count of numbers in the request besides its clouds: values and queries.
     pub n_held: usize,
 }
 
 impl Cost {
-    /// Bytes of the answer as numbers, once more while it is put together, and of what leads to it.
+    /// Bytes of the answer as numbers, of a second copy during assembly, and of intermediate results.
     pub fn n_bytes(&self) -> usize {
         self.n_numbers.saturating_mul(2 * size_of::<f64>()).saturating_add(self.work.n_bytes)
     }

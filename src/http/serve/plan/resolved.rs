@@ -1,4 +1,4 @@
-//! A fit with everything that its preparation depends on.
+//! A complete fit, with everything that its preparation depends on.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -25,27 +25,28 @@ use gramian_numerics::sums::regularization::Regularization;
 #[derive(Clone)]
 pub struct FitPlan {
     pub stored: Arc<RegisteredCloud>,
-    /// The cloud that is factorized: without the merged duplicates.
+    /// Cloud that is factorized, without merged duplicates.
     pub fitted: Arc<Cloud>,
     pub merge: Option<Arc<Merge>>,
     pub recipe: Recipe,
-    /// Why the solver is local, where that was not asked for.
+    /// Reason why the solver is local, where `auto` chose it.
     pub reason: Option<AutoLocal>,
     pub key: FitKey,
     pub pointers: Pointers,
     pub process: Process,
 }
 
-/// The process that values are taken to come from, beside the recipe.
+/// Assumed process of the values, besides the recipe.
 #[derive(Clone)]
 pub struct Process {
-    /// Kernel and noise are so many times those of the recipe, unit V².
+    /// Ratio of kernel and noise to those of the recipe, unit V².
     pub scale: f64,
     /// Whether the values decided kernel and noise.
     pub is_learned: bool,
     pub mean: Mean,
     pub values: Option<Arc<Values>>,
-    /// Kernel, noise and mean as learned from the values; their mean alone where kernel and noise are given.
+    /// Kernel, noise and mean learned from the values. If kernel and noise are given, only the mean was
+    /// learned.
     pub(super) learned: Option<Arc<Learned>>,
 }
 
@@ -56,7 +57,7 @@ impl Default for Process {
 }
 
 impl FitPlan {
-    /// Merges duplicates where that is asked for, and names the fit.
+    /// Merges duplicates if the request wants that, and derives the key of the fit.
     pub(super) fn of(
         on: FittedCloud,
         recipe: Recipe,
@@ -82,30 +83,31 @@ impl FitPlan {
         Ok(Self { stored, fitted, merge, recipe, reason, key, pointers, process })
     }
 
-    /// Kernel, noise and mean as learned from values that are never seen all at once.
+    /// Returns what was learned from the values, for a solver that never sees all of them at once.
     fn learned_of_local(&self) -> Option<&Learned> {
         self.process.learned.as_deref().filter(|_| self.recipe.is_kriged_locally())
     }
 
-    /// The mean of such values.
+    /// Returns the learned mean, for a solver that never sees all values at once.
     pub fn trend(&self) -> Option<&Trend> {
         self.learned_of_local()?.trend.as_ref()
     }
 
-    /// How values contradict kernel and noise, as far as that was seen when they were learned from: of values
-    /// that a solver sees all at once, it says the rest.
+    /// Returns the contradiction between the values and kernel and noise that was found while learning.
+    ///
+    /// A solver that sees all values at once reports the rest itself.
     pub fn disagreement(&self) -> Option<Disagreement> {
         let found = self.process.learned.as_ref()?.disagreement?;
         (self.learned_of_local().is_some() || found.place.is_some()).then_some(found)
     }
 
-    /// Whether the values are so small that their variance is taken to be greater than it is.
+    /// Returns whether the values are so small that a greater variance than theirs is assumed.
     pub fn has_least_variance(&self) -> bool {
         let Process { is_learned, learned, .. } = &self.process;
         *is_learned && learned.as_ref().is_some_and(|learned| learned.has_least_variance())
     }
 
-    /// The client's normals at the points that are factorized: means over merged duplicates.
+    /// Returns the client's normals at the factorized points: means over merged duplicates.
     pub fn fitted_normals(&self) -> Option<Cow<'_, Cloud>> {
         let normals = self.stored.normals.as_ref()?;
         let Some(merge) = &self.merge else { return Some(Cow::Borrowed(normals)) };
@@ -116,7 +118,7 @@ impl FitPlan {
         Cloud::new(interleaved.collect(), d).ok().map(Cow::Owned)
     }
 
-    /// Values at the points that are factorized: means over merged duplicates, list by list.
+    /// Returns the values at the factorized points: means over merged duplicates, list by list.
     pub fn merged<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
         match &self.merge {
             None => Cow::Borrowed(values),
@@ -133,7 +135,8 @@ impl FitPlan {
         self.recipe.price(CloudSize { n_points, dimension, is_merged: self.merge.is_some() })
     }
 
-    /// A refusal of the numerics, with pointers into this fit and points as the client numbers them.
+    /// Converts a refusal of the numerics. It gets pointers into this fit, and points as the client numbers
+    /// them.
     pub fn refused(&self, mut error: NumericsError) -> Problem {
         use NumericsError::{KernelNotSmooth, NotPositiveDefinite};
         if let Some(merge) = &self.merge
@@ -148,12 +151,12 @@ impl FitPlan {
         Problem::from_numerics(error, self.pointers)
     }
 
-    /// Why there is no factorization, with pointers into this request.
+    /// Converts the failure of a fit, with pointers into this request.
     pub fn failed(&self, failure: FitFailure) -> Problem {
         match failure {
             FitFailure::Refused(error) => self.refused(error),
             FitFailure::Broken(problem) => problem,
-            // Whoever is told so tries again with all of the memory.
+            // A caller that gets this failure retries with all of the memory.
             FitFailure::NeedsAll => Problem::internal(),
         }
     }

@@ -1,4 +1,4 @@
-//! The fit of the surface that a cloud samples.
+//! Fit of the surface that a cloud samples.
 
 use std::sync::Arc;
 
@@ -19,11 +19,11 @@ pub struct PlannedSurface {
     pub(in crate::http::serve) choice: SurfaceChoice,
 }
 
-/// By what a surface is known.
+/// Definition of a surface.
 pub enum SurfaceChoice {
-    /// The level of a signature function.
+    /// A level of a signature function.
     Signature { kernel: Option<PlannedKernel>, regularization: Option<Regularization>, purpose: Purpose },
-    /// Local regressions, which learn at sites, if these are given; `reason` says why, where they were not asked for.
+    /// Local regressions. They learn at `sites`, if given. `reason` is set where `auto` chose them.
     Regressions { reason: Option<AutoLocal>, sites: Option<Arc<Cloud>> },
 }
 
@@ -60,7 +60,7 @@ impl PlannedSurface {
                 ScaledProcess::of(kernel, regularization).map_err(refuse)?
             }
             None => {
-                // With a regularization given, nothing follows from the noise.
+                // The noise matters only if no regularization is given.
                 let noise = || on.stored.noise().unwrap_or_default();
                 let (kernel, alpha) = default_fit(on.scales()?, purpose, noise).map_err(refuse)?;
                 ScaledProcess::by_rule(kernel, alpha, regularization).map_err(refuse)?

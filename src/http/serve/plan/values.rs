@@ -1,4 +1,4 @@
-//! The fit of values at the points of a cloud.
+//! Fit of values at the points of a cloud.
 
 use std::sync::Arc;
 
@@ -22,30 +22,30 @@ use gramian_numerics::sums::regularization::Regularization;
 
 /// Values at the points of the client's cloud, with the key of their weights.
 pub struct Values {
-    /// `[n]`, or `[k, n]` where each of k lists has a function of its own.
+    /// Shape `[n]`. With k lists, each with a function of its own, shape `[k, n]`.
     pub list: Vec<f64>,
-    /// k, 1 for one list.
+    /// Number k of lists, 1 for a single one.
     pub n_lists: usize,
-    /// Names the values and the mean of their function.
+    /// Key of the values and of the mean of their function.
     pub key: ValuesKey,
-    /// Names what is learned from them, with what the request gives.
+    /// Key of the results learned from the values and from the parameters that the request gives.
     pub(in crate::http::serve) learned_key: LearnedKey,
 }
 
-/// A fit of values, or of the operators that values could be given to.
+/// A fit of values, or of the operators that act on values.
 pub struct PlannedValues {
     pub on: FittedCloud,
     pub(in crate::http::serve) kernel: Option<PlannedKernel>,
     pub(in crate::http::serve) regularization: Option<Regularization>,
     pub solver: SolverKind,
-    /// Why the solver is local, where that was not asked for.
+    /// Reason why the solver is local, where `auto` chose it.
     pub(in crate::http::serve) reason: Option<AutoLocal>,
     pub(in crate::http::serve) mean: Mean,
     pub(in crate::http::serve) values: Option<Arc<Values>>,
     pub(in crate::http::serve) learned: Option<Arc<Learned>>,
 }
 
-/// Values to learn from, with what is known beforehand.
+/// Values to learn from, with the parameters that are given.
 pub struct Learning {
     cloud: Arc<Cloud>,
     sampling: Arc<Sampling>,
@@ -56,7 +56,7 @@ pub struct Learning {
 }
 
 impl PlannedValues {
-    /// Length scales of the kernel: 1, or one for each axis.
+    /// Number of length scales of the kernel: 1, or one for each axis.
     pub fn n_length_scales(&self) -> usize {
         match &self.kernel {
             Some(PlannedKernel::Given(kernel)) => kernel.length_scales().map_or(1, <[f64]>::len),
@@ -77,18 +77,20 @@ impl PlannedValues {
         (!is_given && self.on.stored.scales().is_none()).then_some(Lack::Scales)
     }
 
-    /// The values, if they decide and were not looked at yet: a kernel that is not given follows from them, and so does a mean for a solver
-    /// that never sees all of them at once.
+    /// Returns the values, if the fit depends on them and nothing was learned from them yet.
+    ///
+    /// A kernel that is not given follows from the values. So does a mean, for a solver that never sees all
+    /// of them at once.
     pub(in crate::http::serve) fn unlearned(&self) -> Option<&Arc<Values>> {
         let has_local_mean = self.mean != Mean::Zero && self.solver == SolverKind::Local;
         let decides = self.learned.is_none() && (self.kernel.is_none() || has_local_mean);
         self.values.as_ref().filter(|_| decides)
     }
 
-    /// What is to be learned from values of this fit.
+    /// Returns the inputs for learning from values of this fit.
     ///
     /// # Errors
-    /// Those of the kernel that is given.
+    /// Returns the errors of the given kernel.
     pub(in crate::http::serve) fn learning(
         &self,
         values: Arc<Values>,

@@ -1,4 +1,4 @@
-//! What a request chose of kernel, regularization and solver, where it said so, and what does not go together.
+//! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
 use crate::http::fields::{Fit, Geometry, Kernel, SolverChoice};
@@ -9,7 +9,7 @@ use crate::http::wire::read::points::Points;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
 
-/// What is asked that only a dense factorization has: its word, and where it stands.
+/// A requested quantity that only the dense solver provides: its name, and the pointer to it.
 #[derive(Debug, Clone, Copy)]
 pub struct DenseOnly {
     pub name: &'static str,
@@ -17,7 +17,7 @@ pub struct DenseOnly {
 }
 
 impl DenseOnly {
-    /// 422 where the local solver is asked for it.
+    /// Returns 422 where the request asks the local solver for this quantity.
     pub(super) fn refused_by_local(self) -> Problem {
         let detail = format!(
             "the local solver knows each query by itself and has no {}; leave it out, or take \"solver\": \"dense\"",
@@ -34,20 +34,20 @@ impl DenseOnly {
 pub(super) const TRY_LOCAL: &str =
     "set \"solver\" to \"local\", which takes time in proportion to the points, or thin the cloud";
 
-/// 422 for operators on values, which are those of one function.
+/// Returns 422 for matrices of operators with the local solver. They need one function for all queries.
 pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
     let detail = "operators take values of one function, which the local solver does not have: take \"solver\": \"dense\", and \
                   {\"geometry\": {\"surface\": \"local\"}} for the surface under an operator";
     Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
 }
 
-/// 422 for sites of a surface that is not regressed locally.
+/// Returns 422 for sites of a surface that is not regressed locally.
 pub(super) fn only_local_has_sites() -> Problem {
     let detail = "only local regressions learn at sites: leave them out, or take \"solver\": \"local\"";
     Problem::of_field(Slug::UnsupportedBySolver, "/sites", detail)
 }
 
-/// Where the fit of a request stands.
+/// Returns the pointers to the fit of a request.
 pub(super) fn pointers_of(fit: &Fit) -> Pointers {
     Pointers {
         points: if fit.cloud.id.is_some() { "/cloud/id" } else { "/cloud/points" },
@@ -56,7 +56,8 @@ pub(super) fn pointers_of(fit: &Fit) -> Pointers {
     }
 }
 
-/// Where the fit of the surface stands: what `geometry` leaves out, in the request.
+/// Returns the pointers to the fit of the surface. Fields that `geometry` leaves out are those of the
+/// request.
 pub(super) fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Pointers {
     Pointers {
         points: match &geometry.cloud {
@@ -74,7 +75,7 @@ pub(super) fn pointers_of_surface(geometry: &Geometry, request: Pointers) -> Poi
     }
 }
 
-/// What the client chose of kernel, regularization, mean and solver.
+/// Options of a fit that the client chose: kernel, regularization, mean and solver.
 #[derive(Default, Clone)]
 pub(super) struct FitOptions {
     pub(super) kernel: Option<Kernel>,
@@ -97,7 +98,7 @@ impl FitOptions {
         }
     }
 
-    /// Where kernel or noise stand, if one of them is given.
+    /// Returns the pointer to kernel or noise, if one of them is given.
     pub(super) fn given_process(&self, pointers: Pointers) -> Option<&'static str> {
         if self.kernel.is_some() {
             return Some(pointers.kernel);
@@ -106,7 +107,7 @@ impl FitOptions {
         has_noise.then_some(pointers.regularization)
     }
 
-    /// What is given; `None` leaves it to the service.
+    /// Returns the given regularization. `None` leaves the choice to the service.
     pub(super) fn regularization(self, on: &FittedCloud) -> Result<Option<Regularization>, Problem> {
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         match (self.alpha, self.noise_variances) {

@@ -1,4 +1,4 @@
-//! Clouds, queries, values and normals of a request: what they are to be, and what is said where they are not.
+//! Clouds, queries, values and normals of a request: their checks and refusals.
 
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -16,13 +16,16 @@ use crate::store::key::CloudId;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::points::cloud::Cloud;
 
-/// Bytes that a number takes in JSON at most, with its comma.
+/// Largest number of bytes of a number in JSON, with its comma.
 const BYTES_PER_NUMBER: usize = 25;
 impl Planner<'_> {
-    /// Queries of the dimension of a fit's cloud; absent, its points. The fit is told where its queries stand.
+    /// Returns the queries, which have the dimension of the fit's cloud. Without queries, these are its
+    /// points.
+    ///
+    /// The pointer of the fit to its queries is set.
     ///
     /// # Errors
-    /// 413 beyond the limit, 422 for what is no list of points of this dimension.
+    /// 413 beyond the limit. 422 for queries that are no list of points of this dimension.
     pub fn queries(&self, queries: Option<Points>, of: &mut FittedCloud) -> Result<Arc<Cloud>, Problem> {
         let Some(points) = queries else {
             of.pointers.queries = of.pointers.points;
@@ -40,10 +43,10 @@ impl Planner<'_> {
         Ok(Arc::new(queries))
     }
 
-    /// Points of a cloud at which its surface is learned: nothing is learned where it is not.
+    /// Returns the sites, which are points of the cloud. Its surface is learned at these points alone.
     ///
     /// # Errors
-    /// 422 for what is no list of points of the cloud.
+    /// 422 for sites that are no list of points of the cloud.
     pub(super) fn sites(&self, sites: Points, cloud: &Cloud) -> Result<Arc<Cloud>, Problem> {
         let sites = rectangular(sites, "/sites", Slug::InvalidRequest)?;
         if cloud.dimension() != sites.dimension() {
@@ -56,7 +59,7 @@ impl Planner<'_> {
         Ok(Arc::new(sites))
     }
 
-    /// Checks one entry per point of a cloud.
+    /// Checks that there is one value per point of a cloud.
     ///
     /// # Errors
     /// 422 `length-mismatch`.
@@ -65,10 +68,10 @@ impl Planner<'_> {
         if cloud.n_points() == found { Ok(()) } else { Err(length_mismatch("/values", cloud, found)) }
     }
 
-    /// Admits an answer of so many numbers, and says how many they are.
+    /// Admits an answer of `n_numbers` numbers, and returns that count.
     ///
     /// # Errors
-    /// 413 `problem-too-large` if it would be over the limit, or not countable.
+    /// 413 `problem-too-large` if the answer would exceed the limit, or cannot be counted.
     pub fn check_answer(&self, n_numbers: Option<usize>) -> Result<usize, Problem> {
         let limit = self.app.config.max_response_bytes;
         let required = n_numbers.and_then(|n| n.checked_mul(BYTES_PER_NUMBER)).unwrap_or(usize::MAX);
@@ -84,7 +87,7 @@ impl Planner<'_> {
     /// Finds a registered cloud, or registers the points given.
     ///
     /// # Errors
-    /// 404 `unknown-cloud`, 413 beyond the limits, 422 for what is no cloud.
+    /// 404 `unknown-cloud`, 413 beyond the limits, 422 for an invalid cloud.
     pub fn cloud(&self, cloud: CloudRef, pointer: &str) -> Result<Arc<RegisteredCloud>, Problem> {
         match (cloud.id, cloud.points) {
             (Some(id), None) => {
@@ -102,10 +105,10 @@ impl Planner<'_> {
         }
     }
 
-    /// Validates and registers points; says whether they are new.
+    /// Validates and registers points. Returns whether they are new.
     ///
     /// # Errors
-    /// 413 beyond the limits, 422 for what is no cloud.
+    /// 413 beyond the limits, 422 for an invalid cloud.
     pub fn register(
         &self,
         points: Points,
@@ -135,7 +138,7 @@ impl Planner<'_> {
     }
 }
 
-/// The first of some sites that is at none of the points of a cloud.
+/// Finds the first site that is not a point of the cloud.
 fn first_elsewhere(sites: &Cloud, cloud: &Cloud) -> Option<usize> {
     let mut order: Vec<usize> = (0..sites.n_points()).collect();
     // All coordinates are finite.
@@ -150,17 +153,19 @@ fn first_elsewhere(sites: &Cloud, cloud: &Cloud) -> Option<usize> {
     is_there.iter().position(|is_there| !is_there)
 }
 
-/// 404 for an id that names no cloud of this owner.
+/// Returns 404 for an id that names no cloud of this owner.
 pub fn unknown_cloud(id: &str) -> Problem {
     let shown: String = id.chars().take(64).collect();
     Problem::new(Slug::UnknownCloud, format!("no cloud {shown:?} is registered; post its points again"))
 }
 
-/// The greatest seed: every client has the whole numbers up to it.
+/// Largest seed. JSON clients represent all whole numbers up to it.
 const MAX_SEED: u64 = (1 << 53) - 1;
 
+/// Checks that a seed is at most `MAX_SEED`.
+///
 /// # Errors
-/// 422 for a seed that some clients cannot say.
+/// 422 for a seed that some clients cannot represent.
 pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
     match seed <= MAX_SEED {
         true => Ok(()),
@@ -173,7 +178,7 @@ pub fn check_seed(seed: u64, pointer: &str) -> Result<(), Problem> {
 /// Values of a request, one for each point of its cloud.
 pub struct GivenValues {
     pub list: Vec<f64>,
-    /// k, where there are k lists.
+    /// Number k of lists, or `None` for values without lists.
     pub n_lists: Option<usize>,
 }
 
@@ -183,10 +188,10 @@ impl GivenValues {
     }
 }
 
-/// Lists of values of one length.
+/// Returns the lists of values, which have the same length.
 ///
 /// # Errors
-/// 422 for no list, and for one of another length than the first.
+/// 422 without any list, and for a list of another length than the first.
 pub fn value_lists(ValueLists(lists): ValueLists) -> Result<GivenValues, Problem> {
     if let Some((row, found)) = lists.ragged {
         return Err(Problem::length_mismatch(format!("/values/{row}"), lists.dimension, found));
@@ -197,7 +202,7 @@ pub fn value_lists(ValueLists(lists): ValueLists) -> Result<GivenValues, Problem
     }
 }
 
-/// Points with rows of one length.
+/// Returns the cloud of points whose rows have the same length.
 fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Problem> {
     if let Some((row, found)) = points.ragged {
         let detail =
@@ -219,7 +224,7 @@ fn rectangular(points: Points, pointer: &str, slug: Slug) -> Result<Cloud, Probl
     })
 }
 
-/// 422 for rows of another dimension than the cloud, with a hint if their columns would have it.
+/// Returns 422 for rows of another dimension than the cloud, with a hint if the transpose would fit.
 fn dimension_mismatch(pointer: &str, expected: usize, found: &Cloud) -> Problem {
     let problem = Problem::dimension_mismatch(pointer, expected, found.dimension());
     if found.n_points() != expected {
@@ -228,7 +233,7 @@ fn dimension_mismatch(pointer: &str, expected: usize, found: &Cloud) -> Problem 
     problem.with_remedy(&transposed(expected, found.dimension()))
 }
 
-/// 422 for entries that are not one per point of the cloud, with a hint if they are one per column.
+/// Returns 422 for entries that are not one per point of the cloud, with a hint if they are one per column.
 pub(super) fn length_mismatch(pointer: &str, cloud: &Cloud, found: usize) -> Problem {
     let (n_points, dimension) = (cloud.n_points(), cloud.dimension());
     let problem = Problem::length_mismatch(pointer, n_points, found);
@@ -238,7 +243,7 @@ pub(super) fn length_mismatch(pointer: &str, cloud: &Cloud, found: usize) -> Pro
     problem.with_remedy(&format!("of the cloud, {}", transposed(n_points, dimension)))
 }
 
-/// One normal per point, of its dimension and not zero.
+/// Checks that there is one normal per point, of its dimension and not zero.
 fn check_normals(normals: Points, cloud: &Cloud, pointer: &str) -> Result<Cloud, Problem> {
     let normals = rectangular(normals, pointer, Slug::InvalidCloud)?;
     let is_transposed = normals.n_points() == cloud.dimension() && normals.dimension() == cloud.n_points();

@@ -1,4 +1,4 @@
-//! From the shared objects of a request to validated inputs of the numerics.
+//! Checks of a request, which turn its shared objects into validated inputs of the numerics.
 
 mod choice;
 mod inputs;
@@ -29,13 +29,13 @@ use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
 use inputs::length_mismatch;
 pub use inputs::{GivenValues, check_seed, unknown_cloud, value_lists};
 
-/// Validates the parts of a request against the limits and the stored clouds.
+/// Planner of one request. It validates the parts of the request against the limits and the stored clouds.
 pub struct Planner<'a> {
     pub app: &'a App,
     pub owner: Owner,
-    /// Clouds that were found elsewhere than in memory.
+    /// Clouds that were read from the store.
     found: Vec<Arc<RegisteredCloud>>,
-    /// Clouds that came with the request, and are in memory alone, or were not seen in the store lately.
+    /// Clouds of the request that are only in memory, or were not seen in the store lately.
     fresh: RefCell<Vec<Arc<RegisteredCloud>>>,
 }
 
@@ -44,12 +44,12 @@ impl<'a> Planner<'a> {
         Self::with_clouds(app, owner, Vec::new())
     }
 
-    /// One that knows clouds which memory may have let go again.
+    /// Creates a planner that holds clouds from the store, which memory may have dropped again.
     pub fn with_clouds(app: &'a App, owner: Owner, found: Vec<Arc<RegisteredCloud>>) -> Self {
         Self { app, owner, found, fresh: RefCell::default() }
     }
 
-    /// Clouds that came with the request, and are in memory alone.
+    /// Returns the clouds of the request that are only in memory.
     pub fn into_fresh(self) -> Vec<Arc<RegisteredCloud>> {
         self.fresh.into_inner()
     }
@@ -59,10 +59,10 @@ impl<'a> Planner<'a> {
         found.or_else(|| self.app.clouds.get(self.owner, id))
     }
 
-    /// Checks the fit of values. `dense_only` is what is asked that only a dense factorization has, if anything.
+    /// Checks the fit of values. `dense_only` is a requested quantity that only the dense solver has, if any.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn values_fit(
         &self,
         mut fit: Fit,
@@ -80,10 +80,10 @@ impl<'a> Planner<'a> {
         self.plan_given_values(on, FitOptions::of(fit), solver, given)
     }
 
-    /// Checks the fit of a surface: of a signature function, or local regressions.
+    /// Checks the fit of a surface, by a signature function or by local regressions.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn surface_fit(
         &self,
         mut fit: Fit,
@@ -94,7 +94,7 @@ impl<'a> Planner<'a> {
         self.plan_surface(on, FitOptions::of(fit), purpose, request)
     }
 
-    /// The cloud of a request, taken out of its fit.
+    /// Takes the cloud of a request out of its fit.
     fn fitted_cloud(&self, fit: &mut Fit) -> Result<FittedCloud, Problem> {
         let pointers = pointers_of(fit);
         let stored = self.cloud(std::mem::take(&mut fit.cloud), "/cloud")?;
@@ -125,7 +125,7 @@ impl<'a> Planner<'a> {
         Ok(PlannedSurface { on, choice })
     }
 
-    /// Whether a surface is regressed locally, and why where that was not asked for.
+    /// Decides whether a surface is regressed locally, with the reason where `auto` chose that.
     fn choice_of_surface(
         &self,
         on: &FittedCloud,
@@ -159,10 +159,10 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The nodes of stencils and the fit of the surface under them.
+    /// Checks the nodes of stencils and the fit of the surface under them.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn stencils(
         &self,
         mut fit: Fit,
@@ -171,16 +171,17 @@ impl<'a> Planner<'a> {
     ) -> Result<(Arc<RegisteredCloud>, PlannedSurface), Problem> {
         let on = self.fitted_cloud(&mut fit)?;
         let nodes = on.stored.clone();
-        // The nodes need no solver: what is said of them is said of the surface.
+        // Nodes need no solver, so the options of the request are those of the surface.
         let SurfaceUnder { on, options, .. } = self.surface_under(&on, FitOptions::of(fit), geometry)?;
         Ok((nodes, self.plan_surface(on, options, Purpose::Curvatures, request)?))
     }
 
-    /// The fits of values and of the surface under them, for an operator on the values: kriged around each query where they are more than are
-    /// factorized, or where that is asked for.
+    /// Checks the fits of values and of the surface under them, for an operator on the values.
+    ///
+    /// Values are kriged around each query if they exceed the dense limit, or if the client wants that.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn operator_fits(
         &self,
         mut fit: Fit,
@@ -195,7 +196,8 @@ impl<'a> Planner<'a> {
         Ok(OperatorFits { main, values, surface: self.plan_surface_under(under, request)? })
     }
 
-    /// The solver of values where either has what is asked, and why it is the local one where that was not asked for.
+    /// Chooses the solver of values where both solvers would do, with the reason where `auto` chose the local
+    /// one.
     fn solver_of_values(&self, fit: &Fit, stored: &RegisteredCloud) -> ValuesSolver {
         match fit.solver {
             SolverChoice::Local => ValuesSolver::asked(SolverKind::Local),
@@ -206,11 +208,13 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Checks the fits of values, which are not given, and of the surface that they live on; what `geometry` leaves out is as in the
-    /// request.
+    /// Checks the fits for a matrix on values that are not given: of these values, and of the surface under
+    /// them.
+    ///
+    /// Fields that `geometry` leaves out are those of the request.
     ///
     /// # Errors
-    /// A [`Problem`] with a pointer to the field.
+    /// Returns a [`Problem`] with a pointer to the field.
     pub fn matrix_fits(
         &self,
         mut fit: Fit,
@@ -227,7 +231,7 @@ impl<'a> Planner<'a> {
         Ok((main, self.plan_surface_under(under, request)?))
     }
 
-    /// The surface under values or nodes; what `geometry` leaves out is as in the request.
+    /// Checks the surface under values or nodes. Fields that `geometry` leaves out are those of the request.
     fn surface_under(
         &self,
         values: &FittedCloud,
@@ -267,7 +271,7 @@ impl<'a> Planner<'a> {
         Ok(SurfaceUnder { on, options, has_own_process })
     }
 
-    /// Plans the surface under values. Local regressions take no kernel: that of the values is not meant for them.
+    /// Plans the surface under values. Local regressions do not inherit the kernel of the values.
     fn plan_surface_under(
         &self,
         SurfaceUnder { on, options, has_own_process }: SurfaceUnder,
@@ -285,8 +289,10 @@ impl<'a> Planner<'a> {
         self.plan_surface(on, options, Purpose::Curvatures, request)
     }
 
-    /// Admits a cloud to the dense solver. This is the one place that holds it to its limit: for solvers that never factorize all
-    /// points at once, it is [`Planner::register`] that has.
+    /// Admits a cloud to the dense solver.
+    ///
+    /// No other code checks the dense limit. Solvers that never factorize all points at once have only the
+    /// limit of [`Planner::register`].
     fn check_max_dense_points(&self, on: &FittedCloud) -> Result<(), Problem> {
         if on.n_points() <= self.app.config.max_dense_points {
             return Ok(());
@@ -294,7 +300,7 @@ impl<'a> Planner<'a> {
         Err(self.beyond_dense(on).with_remedy(TRY_LOCAL))
     }
 
-    /// 413 for a cloud of too many points to be factorized at once.
+    /// Returns 413 for a cloud with too many points for one factorization.
     fn beyond_dense(&self, on: &FittedCloud) -> Problem {
         too_many_dense_points(self.app.config.max_dense_points, on.n_points()).at(on.pointers.points)
     }
@@ -317,7 +323,7 @@ impl<'a> Planner<'a> {
         Ok(PlannedValues { on, kernel, regularization, solver: kind, reason, mean, values, learned })
     }
 
-    /// Plans the fit of values, with what was learned from them if that is known.
+    /// Plans the fit of values, with the results learned from them, if they are known.
     fn plan_given_values(
         &self,
         on: FittedCloud,
@@ -338,7 +344,8 @@ impl<'a> Planner<'a> {
             Some(_) => {}
         }
         let key = ValuesKey::with_mean(&list, plan.mean);
-        // A length scale that the cloud gives is the same whenever it is asked for.
+        // A length scale that follows from the cloud is always the same, so the key has only family and
+        // variance.
         let kernel = plan.kernel.as_ref().map(|kernel| match kernel {
             PlannedKernel::Given(kernel) => GivenKernel::Whole(kernel),
             &PlannedKernel::OfCloud { family, variance } => GivenKernel::OfCloud(family, variance),
@@ -351,21 +358,21 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The fits of an operator on values.
+/// Fits of an operator on values.
 pub struct OperatorFits {
     pub main: PlannedValues,
     pub values: Arc<Values>,
     pub surface: PlannedSurface,
 }
 
-/// Whether local regressions know a surface.
+/// Decision for or against local regressions of a surface.
 enum Regressed {
     No,
-    /// With the reason, where that was not asked for.
+    /// Local regressions, with the reason where `auto` chose them.
     Locally(Option<AutoLocal>),
 }
 
-/// The solver of values, and why it is the local one where that was not asked for.
+/// Solver of values, with the reason where `auto` chose the local one.
 #[derive(Clone, Copy)]
 struct ValuesSolver {
     kind: SolverKind,
@@ -382,6 +389,6 @@ impl ValuesSolver {
 struct SurfaceUnder {
     on: FittedCloud,
     options: FitOptions,
-    /// Whether kernel or noise are those of `geometry`, not of the values.
+    /// Whether `geometry` gives kernel or noise, so that they are not those of the values.
     has_own_process: bool,
 }

@@ -1,4 +1,4 @@
-//! `POST /v1/interpolation/batch`.
+//! `POST /v1/interpolation/batch`: functions through many lists of values, with one factorization.
 
 use std::sync::Arc;
 
@@ -28,24 +28,27 @@ use gramian_numerics::model::EachAt;
 use gramian_numerics::model::price::function_price;
 
 request! {
-    /// Many lists of values at the points of a cloud, and where the functions through them are wanted.
+    /// Many lists of values at the points of a cloud, and queries at which to evaluate the functions through
+    /// them.
     pub struct InterpolationBatchRequest {
-        /// Lists of values, one per point each, in their order. They have kernel and noise in common.
+        /// Lists of values. Each has a value per point, in the order of the points.
+        ///
+        /// All lists have kernel and noise in common.
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
-        /// The mean of each function; a constant if absent with the kernel, else 0.
+        /// The mean of each function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the cloud if absent.
+        /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// 0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        /// The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
-        /// What is wanted beside what was asked for; nothing if absent.
+        /// Optional parts of the answer. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
@@ -53,39 +56,53 @@ request! {
 }
 
 answer! {
-    /// The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+    /// The interpolants (regression functions, if alpha > 0) at the queries. All have the same deviations.
     pub struct InterpolationBatchResponse {
-        /// For each list u at each query.
+        /// Values u at each query, a row per list.
         #[schema(value_type = Vec<Vec<f64>>)]
         values: Array,
-        /// For each list ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        /// Gradients ∇u at each query for each list, unit of the values per length.
+        ///
+        /// Present if `derivatives` is 1 or 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         gradients: Option<Array>,
-        /// For each list D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        /// Hessians D²u at each query for each list, unit of the values per length squared.
+        ///
+        /// Present if `derivatives` is 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<Vec<f64>>>>>)]
         hessians: Option<Array>,
-        /// Standard deviation of any of the functions at each query given its values, under the kernel as covariance and alpha as variance of the
-        /// noise; with `deviations`.
+        /// Standard deviation of each function at each query, given its values. Present if `include` has
+        /// `deviations`.
+        ///
+        /// The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
+        /// deviations.
         #[schema(nullable = false, value_type = Option<Vec<f64>>)]
         value_deviations: Option<Array>,
-        /// The same for the components of ∇u.
+        /// Standard deviation of each component of ∇u at each query.
+        ///
+        /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         gradient_deviations: Option<Array>,
-        /// The same for the entries of D²u.
+        /// Standard deviation of each entry of D²u at each query.
+        ///
+        /// Present if `include` has `deviations` and `derivatives` is 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         hessian_deviations: Option<Array>,
-        /// For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /// The mean of each function, a row per list. Absent if the mean is 0.
+        ///
+        /// A row is the constant, followed by a slope per coordinate if the mean is linear.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         mean_coefficients: Option<Array>,
-        /// How the answer came about; `relative_residual` is the greatest of all lists.
+        /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
+        /// all lists.
         diagnostics: Diagnostics,
     }
 }
 
 /// Interpolate many lists of values
 ///
-/// As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
-/// solver.
+/// Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel that is
+/// not given is learned from all lists together. Batches need the dense solver.
 #[utoipa::path(
     post,
     path = "/v1/interpolation/batch",

@@ -1,4 +1,4 @@
-//! `POST /v1/interpolation`.
+//! `POST /v1/interpolation`: the function through values at the points of a cloud.
 
 mod batch;
 
@@ -31,24 +31,24 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::sums::jets::JetOrder;
 
 request! {
-    /// Values at the points of a cloud, and where the function through them is wanted.
+    /// Values at the points of a cloud, and queries at which to evaluate the function through them.
     pub struct InterpolationRequest {
         /// The values at the points, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
-        /// The mean of the function; a constant if absent with the kernel, else 0.
+        /// The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the cloud if absent.
+        /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// 0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        /// The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, minimum = 0, maximum = 2)]
         pub derivatives: Option<u8>,
-        /// What is wanted beside what was asked for; nothing if absent.
+        /// Optional parts of the answer. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<ValuesInclude>>,
@@ -61,32 +61,37 @@ answer! {
         /// u at each query.
         #[schema(value_type = Vec<f64>)]
         values: Array,
-        /// ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        /// ∇u at each query, unit of the values per length. Present if `derivatives` is 1 or 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         gradients: Option<Array>,
-        /// D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        /// D²u at each query, unit of the values per length squared. Present if `derivatives` is 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         hessians: Option<Array>,
-        /// Standard deviation of u at each query given the values, under the kernel as covariance and alpha as variance of the noise; with
-        /// `deviations`.
+        /// Standard deviation of u at each query, given the values. Present if `include` has `deviations`.
+        ///
+        /// The kernel is taken as covariance, and alpha as variance of the noise.
         #[schema(nullable = false, value_type = Option<Vec<f64>>)]
         value_deviations: Option<Array>,
-        /// The same for the components of ∇u.
+        /// Standard deviation of each component of ∇u at each query.
+        ///
+        /// Present if `include` has `deviations` and `derivatives` is 1 or 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         gradient_deviations: Option<Array>,
-        /// The same for the entries of D²u.
+        /// Standard deviation of each entry of D²u at each query.
+        ///
+        /// Present if `include` has `deviations` and `derivatives` is 2.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         hessian_deviations: Option<Array>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Interpolate values
 ///
-/// Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at the queries. At
-/// alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points that are factorized, each query is
-/// answered from the points nearest to it.
+/// Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at the
+/// queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for clouds
+/// that are too large to be factorized, each query is answered from the points nearest to it.
 #[utoipa::path(
     post,
     path = "/v1/interpolation",
@@ -104,7 +109,7 @@ pub async fn compute_interpolation(
     serve::<InterpolationRequest>(app, owner, request).await
 }
 
-/// A checked request.
+/// A checked request for one list of values or many.
 pub struct Work {
     values: Arc<Values>,
     queries: Arc<Cloud>,
@@ -183,17 +188,17 @@ fn has_deviations(include: Option<Vec<ValuesInclude>>) -> bool {
     include.is_some_and(|include| include.contains(&ValuesInclude::Deviations))
 }
 
-/// Value, gradient and Hessian, as far as they are asked for.
+/// Returns how many numbers a query has: value, gradient and Hessian, up to the order of `derivatives`.
 fn numbers_per_query(d: usize, derivatives: u8) -> usize {
     [1, 1 + d, 1 + d + d * d][usize::from(derivatives)]
 }
 
-/// Entries of a Hessian that are equal are counted once.
+/// Returns how many deviations a query needs. Equal entries of a Hessian are counted once.
 fn deviations_per_query(d: usize, derivatives: u8) -> usize {
     [1, 1 + d, 1 + d + d * (d + 1) / 2][usize::from(derivatives)]
 }
 
-/// Deviations of values, gradients and Hessians, those that are asked for.
+/// Returns the deviations of values, gradients and Hessians as arrays, up to the order of `derivatives`.
 fn arrays(deviations: Option<JetDeviations>, (m, d): (usize, usize), derivatives: u8) -> [Option<Array>; 3] {
     let Some(JetDeviations { values, gradients, hessians, .. }) = deviations else {
         return [None, None, None];

@@ -1,4 +1,5 @@
-//! From what a request leaves free to the search of the numerics, and its outcome.
+//! The search of a model selection: from the free parameters of a request to the numerics, and back to an
+//! answer.
 
 use std::sync::Arc;
 
@@ -30,37 +31,41 @@ use gramian_numerics::sums::regularization::Regularization;
 const BEYOND_KERNELS: &str =
     "the variance of the values is beyond what kernels take, 1e-140 to 1e140; scale the values";
 
-/// Further starts where nothing is said of them.
+/// Default number of further starts.
 const RESTARTS: u8 = 2;
 const MAX_RESTARTS: u8 = 100;
 
-/// Without `vary`: how far from the start length scale and variance may go, and alpha downwards.
+/// Factor from the start to the default bounds of length scale and variance, and to the upper bound of alpha.
 const RANGE: f64 = 100.0;
+
+/// Factor from the start down to the default lower bound of alpha.
 const RANGE_OF_ALPHA: f64 = 1e6;
 
-/// Entries of `vary` at most: more than there are parameters, an axis each included.
+/// Largest number of entries of `vary`. There are fewer parameters, even with an entry per axis.
 const MAX_VARY: usize = 64;
 
-/// What is searched, as far as the request says.
+/// The checked options of a search.
 pub struct Search {
     criterion: Criterion,
     vary: Option<Vec<FreeParameter>>,
-    /// ν at most and at least, as orders.
+    /// The smallest and the largest order ν − ½, if ν varies.
     orders: Option<(u8, u8)>,
     families: Vec<KernelFamily>,
     restarts: usize,
     seed: u64,
 }
 
-/// A checked request.
+/// A checked request for a model selection.
 pub struct Work {
     pub(super) values: Arc<Values>,
     pub(super) search: Search,
 }
 
 impl Search {
+    /// Checks the options of a request.
+    ///
     /// # Errors
-    /// 422 for bounds and restarts that are none.
+    /// 422 for invalid restarts, seed, families or entries of `vary`.
     pub(super) fn of(request: &ModelSelectionRequest) -> Result<Self, Problem> {
         let restarts = request.restarts.unwrap_or(RESTARTS);
         if restarts > MAX_RESTARTS {
@@ -98,6 +103,8 @@ impl Search {
         })
     }
 
+    /// Checks the axes of `vary` against the dimension of the points.
+    ///
     /// # Errors
     /// 422 for an axis that the points do not have.
     pub(super) fn check_axes_of(&self, dimension: usize) -> Result<(), Problem> {
@@ -111,7 +118,7 @@ impl Search {
         }
     }
 
-    /// What the search takes, where it takes as long as it mostly does.
+    /// Returns the expected price of the search, from the number of evaluations that descents usually take.
     pub(super) fn price(&self, (n, d): (usize, usize), n_length_scales: usize) -> Price {
         let is_of_axes =
             |free: &FreeParameter| free.parameter == SelectionParameter::LengthScales && free.axis.is_none();
@@ -131,7 +138,8 @@ impl Search {
         }
     }
 
-    /// The families that are tried, from that of the start.
+    /// Returns the families to try. A family that is also that of the start keeps the parameters of the
+    /// start.
     fn families(&self, start: Family) -> Vec<Family> {
         let given = |family: &KernelFamily| match (family, start) {
             (KernelFamily::Gauss, _) => vec![Family::Gauss],
@@ -160,7 +168,7 @@ impl Search {
         }
     }
 
-    /// What is free, with the place that each has in the request.
+    /// Returns the free parameters other than ν, each with its position in `vary`.
     fn variations(&self, start: &Hyperparameters) -> Vec<(usize, Variation)> {
         let Some(vary) = &self.vary else { return default_variations(start) };
         let variation = |(at, free): (usize, &FreeParameter)| {
@@ -180,7 +188,7 @@ impl Search {
     }
 }
 
-/// Length scale, variance and noise about the start.
+/// Returns the default variations: length scale, variance and noise around the start.
 fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
     let between = |parameter: Parameter, min: f64, max: f64| {
         let (least, greatest) = parameter.range();
@@ -196,15 +204,17 @@ fn default_variations(start: &Hyperparameters) -> Vec<(usize, Variation)> {
     };
     variations.push(about(Parameter::Variance, start.variance));
     if let Regularization::Uniform(alpha) = start.noise {
-        // A start without noise says nothing of how much there may be.
+        // A start without noise does not say how much noise there may be, so the variance sets the scale.
         let least = alpha.max(start.variance / RANGE_OF_ALPHA) / RANGE_OF_ALPHA;
         variations.push(between(Parameter::Alpha, least, RANGE * alpha.max(start.variance)));
     }
     variations.into_iter().enumerate().collect()
 }
 
+/// Checks that only `length_scales` have an axis.
+///
 /// # Errors
-/// 422 for the axis of what has none.
+/// 422 for another parameter with an axis.
 fn check_axes(vary: &[FreeParameter]) -> Result<(), Problem> {
     let is_wrong =
         |free: &FreeParameter| free.axis.is_some() && free.parameter != SelectionParameter::LengthScales;
@@ -221,7 +231,7 @@ fn is_nu(free: &FreeParameter) -> bool {
     free.parameter == SelectionParameter::Nu
 }
 
-/// The orders ν − ½ within bounds on ν.
+/// Returns the smallest and the largest order ν − ½ within the bounds on ν, or `None` if ν does not vary.
 fn orders(vary: &[FreeParameter]) -> Result<Option<(u8, u8)>, Problem> {
     let Some(at) = vary.iter().position(is_nu) else { return Ok(None) };
     let FreeParameter { min, max, .. } = vary[at];
@@ -235,8 +245,10 @@ fn orders(vary: &[FreeParameter]) -> Result<Option<(u8, u8)>, Problem> {
 }
 
 impl Work {
+    /// Searches, and computes the path and the leave-one-out predictions of the selection.
+    ///
     /// # Errors
-    /// What the numerics refuses as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub(super) fn run(self, fits: &Fits, observer: &JobObserver) -> Result<ModelSelectionResponse, Problem> {
         let Self { values, search } = self;
         let plan = &fits.main.plan;
@@ -265,13 +277,13 @@ impl Work {
             seed: search.seed,
             max_evaluations: MAX_EVALUATIONS,
         };
-        // The numerics counts what it was given; the request may have nu in between.
+        // The numerics counts entries without `nu`, which the request may have in between.
         let refused = |error| match error {
             NumericsError::InvalidVariation { entry, requirement } => {
                 let entry = variations.get(entry).map_or(entry, |(at, _)| *at);
                 Problem::from_numerics(NumericsError::InvalidVariation { entry, requirement }, plan.pointers)
             }
-            // In the unit of the values, as what is searched.
+            // The search runs in the unit of the values, so its errors are not scaled.
             other => Problem::from_numerics(other, plan.pointers),
         };
         let selected = select(&selection, observer).map_err(refused)?;
@@ -308,7 +320,7 @@ impl Work {
     }
 }
 
-/// Where the search begins: kernel and noise in the unit of the values.
+/// Returns the start of the search: kernel and noise in the unit of the values.
 fn scaled(
     kernel: &Kernel,
     regularization: &Regularization,
@@ -323,7 +335,9 @@ fn scaled(
     Ok(Hyperparameters::of(&kernel, noise))
 }
 
-/// The criterion over α at what was selected; none with noise per point.
+/// Computes the score over α at the selection.
+///
+/// The path is empty with noise per point, and for more than [`MAX_PATH_POINTS`] points.
 fn path(
     selection: &Selection<'_>,
     at: &Hyperparameters,
@@ -360,7 +374,7 @@ fn family_scores(selected: &Selected) -> Vec<FamilyScore> {
 
 impl From<LeaveOneOut> for LeftOut {
     fn from(found: LeaveOneOut) -> Self {
-        // Whatever else has no number is beyond float64, and no null.
+        // Only points without a determined mean are null. Other numbers that are not finite left float64.
         let is_determined: Vec<bool> = found.observation_variances.iter().map(|x| !x.is_nan()).collect();
         let or_null = |list: Vec<f64>| {
             let entries = list.into_iter().zip(&is_determined);

@@ -1,4 +1,4 @@
-//! `POST /v1/posterior/batch`.
+//! `POST /v1/posterior/batch`: Gaussian process posteriors of many lists of values, with one factorization.
 
 use std::sync::Arc;
 
@@ -25,32 +25,36 @@ use crate::http::wire::write::array::Array;
 use crate::store::Owner;
 
 request! {
-    /// Many lists of noisy values at the points of a cloud, and where their posteriors are wanted.
+    /// Many lists of noisy values at the points of a cloud, and queries for their posteriors.
     pub struct PosteriorBatchRequest {
-        /// Lists of observed values, one per point each, in their order. They have kernel and noise in common.
+        /// Lists of observed values. Each has a value per point, in the order of the points.
+        ///
+        /// All lists have kernel and noise in common.
         #[schema(value_type = Vec<Vec<f64>>, min_items = 1)]
         pub values: ValueLists,
-        /// The mean of each process; a constant if absent with the kernel, else 0.
+        /// The mean of each process. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the cloud if absent.
+        /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// What is wanted beside the means; nothing if absent.
+        /// Optional parts of the answer beside the means. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
-        /// Draws of each latent function at all queries together; none if absent.
+        /// Joint draws of each latent function at all queries. Default: none.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub samples: Option<Samples>,
-        /// Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted; none if absent. An empty list counts as absent.
+        /// Probabilities between 0 and 1 for quantiles of the latent functions. Default: none.
+        ///
+        /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(nullable = false, max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
-        /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false)]
         pub threshold: Option<f64>,
@@ -58,9 +62,11 @@ request! {
 }
 
 answer! {
-    /// The Gaussian processes given the values. Lists of values have their own rows in what depends on values; the rest they share.
+    /// The Gaussian processes given the values.
+    ///
+    /// Each list has its own rows in everything that depends on its values. The lists share the rest.
     pub struct PosteriorBatchResponse {
-        /// For each list the posterior mean at each query.
+        /// The posterior mean at each query, a row per list.
         #[schema(value_type = Vec<Vec<f64>>)]
         means: Array,
         /// The variance of the latent functions at each query.
@@ -72,36 +78,39 @@ answer! {
         /// The covariance of the latent functions between queries.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         covariance: Option<Array>,
-        /// For each list the gradient of the mean at each query.
+        /// The gradient of the mean at each query, for each list.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         gradients: Option<Array>,
         /// The variances of the components of the latent functions' gradients at each query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         gradient_variances: Option<Array>,
-        /// For each list draws of the latent function, one row each, a number per query.
+        /// Draws of the latent function for each list. A draw is a row, with a number per query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         samples: Option<Array>,
-        /// For each list quantiles of the latent function, one row for each probability, a number per query.
+        /// Quantiles of the latent function for each list. A probability is a row, with a number per query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<Vec<f64>>>>)]
         quantiles: Option<Array>,
-        /// For each list the probability that a new observation exceeds `threshold`, at each query.
+        /// The probability that a new observation exceeds `threshold` at each query, a row per list.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         exceedance_probabilities: Option<Array>,
-        /// For each list −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        /// The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         #[schema(nullable = false)]
         log_marginal_likelihoods: Option<Vec<f64>>,
-        /// For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /// The mean of each function, a row per list. Absent if the mean is 0.
+        ///
+        /// A row is the constant, followed by a slope per coordinate if the mean is linear.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         mean_coefficients: Option<Array>,
-        /// How the answer came about; `relative_residual` is the greatest of all lists.
+        /// The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
+        /// all lists.
         diagnostics: Diagnostics,
     }
 }
 
 /// Compute Gaussian process posteriors of many lists of values
 ///
-/// As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
-/// solver.
+/// Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+/// kernel that is not given is learned from all lists together. Batches need the dense solver.
 #[utoipa::path(
     post,
     path = "/v1/posterior/batch",

@@ -1,4 +1,4 @@
-//! `POST /v1/posterior`.
+//! `POST /v1/posterior`: the Gaussian process posterior of values at the points of a cloud.
 
 mod batch;
 mod work;
@@ -29,13 +29,13 @@ use crate::store::Owner;
 pub use batch::*;
 use work::{Asked, Found, Work};
 
-/// What may be asked of a posterior beside its mean.
+/// Optional parts of a posterior, beside its mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PosteriorQuantity {
     /// The variance of the latent function at each query.
     Variance,
-    /// The variance of a new observation at each query: the latent one plus alpha.
+    /// The variance of a new observation at each query: the variance of the latent function plus alpha.
     ObservationVariance,
     /// The covariance of the latent function between queries.
     Covariance,
@@ -47,46 +47,51 @@ pub enum PosteriorQuantity {
     LogMarginalLikelihood,
 }
 
-/// How many functions to draw from the posterior, and which.
+/// Functions to draw from the posterior: their number and a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Samples {
-    /// Functions to draw.
+    /// Number of functions to draw.
     #[schema(minimum = 1)]
     pub count: usize,
-    /// Equal seeds give equal draws on processors of one kind, and more of them begin with the same ones; 0 if absent.
+    /// The seed of the draws. Default: 0.
+    ///
+    /// Equal seeds give equal draws on processors of one kind. A larger `count` begins with the draws of a
+    /// smaller one.
     #[serde(default)]
     #[schema(minimum = 0, maximum = 9007199254740991u64)]
     pub seed: u64,
 }
 
 request! {
-    /// Noisy values at the points of a cloud, and where the posterior is wanted.
+    /// Noisy values at the points of a cloud, and queries for the posterior.
     pub struct PosteriorRequest {
         /// The observed values at the points, in their order.
         #[schema(min_items = 1)]
         pub values: Vec<f64>,
-        /// The mean of the process; a constant if absent with the kernel, else 0.
+        /// The mean of the process. Default: a constant if `kernel` is absent too, else 0.
         #[serde(default, deserialize_with = "present_word")]
         #[schema(nullable = false)]
         pub mean: Option<MeanChoice>,
-        /// Where answers are wanted; the points of the cloud if absent.
+        /// The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>, min_items = 1)]
         pub queries: Option<Points>,
-        /// What is wanted beside the mean; nothing if absent.
+        /// Optional parts of the answer beside the mean. Default: none.
         #[serde(default, deserialize_with = "present_words")]
         #[schema(nullable = false)]
         pub include: Option<Vec<PosteriorQuantity>>,
-        /// Draws of the latent function at all queries together; none if absent.
+        /// Joint draws of the latent function at all queries. Default: none.
         #[serde(default, deserialize_with = "present_object")]
         #[schema(nullable = false)]
         pub samples: Option<Samples>,
-        /// Probabilities between 0 and 1 of which the quantiles of the latent function are wanted; none if absent. An empty list counts as absent.
+        /// Probabilities between 0 and 1 for quantiles of the latent function. Default: none.
+        ///
+        /// An empty list counts as absent.
         #[serde(default, deserialize_with = "present_unless_empty")]
         #[schema(nullable = false, max_items = 1000)]
         pub quantiles: Option<Vec<f64>>,
-        /// What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        /// The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(default, deserialize_with = "present")]
         #[schema(nullable = false)]
         pub threshold: Option<f64>,
@@ -114,29 +119,33 @@ answer! {
         /// The variances of the components of the latent function's gradient at each query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         gradient_variances: Option<Array>,
-        /// Draws of the latent function, one row each, a number per query.
+        /// Draws of the latent function. A draw is a row, with a number per query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         samples: Option<Array>,
-        /// Quantiles of the latent function, one row for each probability, a number per query.
+        /// Quantiles of the latent function. A probability is a row, with a number per query.
         #[schema(nullable = false, value_type = Option<Vec<Vec<f64>>>)]
         quantiles: Option<Array>,
         /// The probability that a new observation exceeds `threshold`, at each query.
         #[schema(nullable = false, value_type = Option<Vec<f64>>)]
         exceedance_probabilities: Option<Array>,
-        /// −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        /// The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         #[schema(nullable = false)]
         log_marginal_likelihood: Option<f64>,
-        /// How the answer came about.
+        /// The numbers used, the method, its accuracy, and warnings.
         diagnostics: Diagnostics,
     }
 }
 
 /// Compute the Gaussian process posterior
 ///
-/// With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
-/// queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
-/// log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
-/// it, without what takes all points or queries together: covariance, samples and likelihood.
+/// Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+/// noise_variances) is the variance of the noise. On request, the answer also has variances, covariance,
+/// gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log marginal
+/// likelihood.
+///
+/// With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered from
+/// the points nearest to it. Covariance, samples and likelihood need all points or queries together, so they
+/// are then not available.
 #[utoipa::path(
     post,
     path = "/v1/posterior",

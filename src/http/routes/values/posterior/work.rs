@@ -1,4 +1,4 @@
-//! What posteriors of one list of values and of many have in common.
+//! Code shared by posteriors of one list of values and of many: checks, price and computation.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ use gramian_numerics::model::{EachAt, JetRequest, ValuesAt};
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::sums::jets::JetOrder;
 
-/// What is wanted beside the means.
+/// Optional parts of an answer, beside the means.
 pub struct Asked {
     pub include: Vec<Q>,
     pub samples: Option<Samples>,
@@ -41,7 +41,7 @@ impl Asked {
         self.include.contains(&quantity)
     }
 
-    /// Whether the variance at each query is needed.
+    /// Returns whether the variance at each query is needed.
     fn needs_variances(&self) -> bool {
         let has_bands = self.quantiles.is_some() || self.threshold.is_some();
         has_bands || self.wants(Q::Variance) || self.wants(Q::ObservationVariance)
@@ -59,7 +59,7 @@ impl Asked {
         self.samples.map_or(0, |samples| samples.count)
     }
 
-    /// What only a dense factorization has.
+    /// Returns a part of the answer that needs the dense solver, if one is asked for.
     fn dense_only(&self) -> Option<DenseOnly> {
         let name = self.include.iter().find_map(|quantity| match quantity {
             Q::Covariance => Some("covariance"),
@@ -90,12 +90,13 @@ impl Asked {
         }
     }
 
-    /// Deviations at each query.
+    /// Returns how many deviations per query are needed for the variances of gradients.
     fn n_deviations(&self, d: usize) -> usize {
         if self.wants(Q::GradientVariances) { 1 + d } else { 0 }
     }
 
-    /// A new observation's noise is only known if it is the same everywhere.
+    /// Checks that the noise of a new observation is known if it is needed. It is known only if it is the
+    /// same everywhere.
     fn check_noise(&self, plan: &PlannedValues) -> Result<(), Problem> {
         let asked = if self.wants(Q::ObservationVariance) {
             ("observation_variance", "/include")
@@ -112,7 +113,7 @@ impl Asked {
         Err(Problem::invalid_request(pointer, detail))
     }
 
-    /// Numbers of the answer for k lists of values and m queries in d dimensions.
+    /// Returns the size of the answer in numbers, for k lists of values and m queries in d dimensions.
     fn n_numbers(&self, k: usize, m: usize, d: usize) -> Option<usize> {
         let per_list = 2 + self.n_quantiles() + if self.wants(Q::Gradients) { d } else { 0 };
         let of_lists = m.checked_mul(per_list.checked_add(self.n_samples())?)?.checked_mul(k)?;
@@ -120,7 +121,7 @@ impl Asked {
         of_lists.checked_add(m.checked_mul(of_pairs + 2 + d)?)?.checked_add(k * (2 + d))
     }
 
-    /// What is asked of the process, for k lists of values in d dimensions.
+    /// Returns the parts of the answer that its price depends on, for k lists of values in d dimensions.
     fn of_process(&self, d: usize, n_lists: usize) -> PosteriorAsked {
         PosteriorAsked {
             has_variances: self.needs_variances(),
@@ -133,7 +134,7 @@ impl Asked {
     }
 }
 
-/// A checked request.
+/// A checked request for posteriors.
 pub struct Work {
     /// `[k, n]`
     values: Arc<Values>,
@@ -142,10 +143,10 @@ pub struct Work {
 }
 
 impl Work {
-    /// Checks a request for posteriors of the values of a fit.
+    /// Plans posteriors of the values of a fit.
     ///
     /// # Errors
-    /// The [`Problem`] that the client is told.
+    /// Returns the [`Problem`] to answer with.
     pub fn plan(
         planner: &Planner<'_>,
         fit: Fit,
@@ -179,7 +180,7 @@ impl Work {
     }
 }
 
-/// What was found, as it is answered.
+/// The computed parts of an answer.
 pub struct Found {
     pub means: Array,
     pub variances: Option<Array>,
@@ -190,30 +191,30 @@ pub struct Found {
     pub samples: Option<Array>,
     pub quantiles: Option<Array>,
     pub exceedance_probabilities: Option<Array>,
-    /// One per list of values, if they are asked for.
+    /// Log marginal likelihoods, an entry per list of values. Empty if not asked for.
     pub log_marginal_likelihoods: Vec<f64>,
     pub mean_coefficients: Option<Array>,
     pub diagnostics: Diagnostics,
 }
 
-/// Means of k lists, with what else is known of them.
+/// Means of k lists at the queries, with variances, deviations and functions.
 struct Means {
     jets: BatchJets,
     variances: Option<Variances>,
     deviations: Option<JetDeviations>,
     diagnostics: Diagnostics,
-    /// The functions themselves; none where each query has its own.
+    /// The functions, an entry per list. Empty if each query has a function of its own.
     functions: Vec<Interpolant>,
     mean_coefficients: Option<Array>,
-    /// The dimensions that answers for k lists have before their own.
+    /// The leading dimensions of arrays with a part per list: `[k]` for a batch, none for one list.
     leading: Vec<usize>,
 }
 
 impl Found {
-    /// Of one list of values.
+    /// Computes the posterior of one list of values.
     ///
     /// # Errors
-    /// What the numerics refuses as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub fn one(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
         let request = work.request();
         let (found, diagnostics) = fits.values_at(&work.values, request, observer)?;
@@ -226,10 +227,10 @@ impl Found {
         Self::of(&work, means, fits, observer)
     }
 
-    /// Of each of many lists of values.
+    /// Computes the posterior of each of many lists of values.
     ///
     /// # Errors
-    /// What the numerics refuses as a [`Problem`].
+    /// Returns errors of the numerics as a [`Problem`].
     pub fn each(work: Work, fits: &Fits, observer: &JobObserver) -> Result<Self, Problem> {
         let (found, diagnostics) = fits.each_at(&work.values, work.request(), observer)?;
         let EachAt { jets, variances, deviations, batch, .. } = found;
@@ -278,8 +279,8 @@ impl Found {
                     .push(log_marginal_likelihood(solver, solution, scale).map_err(refused)?);
             }
         }
-        // With noise per point it is not asked for.
         let bands = Bands { asked, means: &jets.values, variances: variances.as_ref(), m };
+        // Alpha is absent with noise per point, and `check_noise` then refuses everything that needs it.
         let alpha = diagnostics.alpha.unwrap_or_default();
         Ok(Self {
             variances: bands.variances(Q::Variance, 0.0),
@@ -300,7 +301,7 @@ impl Found {
     }
 }
 
-/// Draws `[k, count, m]`, each list with numbers of its own.
+/// Draws functions for each list, `[k, count, m]`. Each list has random numbers of its own.
 fn draws(
     root: &Root,
     means: &[f64],
@@ -315,7 +316,7 @@ fn draws(
     Ok(all)
 }
 
-/// What follows from means `[k, m]` and variances `[m]` of normal distributions.
+/// Normal distributions at the queries: means `[k, m]` and variances `[m]`.
 struct Bands<'a> {
     asked: &'a Asked,
     means: &'a [f64],
@@ -329,7 +330,7 @@ impl Bands<'_> {
         Some(Array::new(variances.latent.iter().map(|v| v + noise).collect(), &[self.m]))
     }
 
-    /// `μ + Φ⁻¹(p)σ`, `[k, q, m]`.
+    /// Returns the quantiles `μ + Φ⁻¹(p)σ`, `[k, q, m]` for q probabilities.
     fn quantiles(&self) -> Option<Vec<f64>> {
         let (variances, levels) = (self.variances?, self.asked.quantiles.as_ref()?);
         let deviations: Vec<f64> = variances.latent.iter().map(|v| v.sqrt()).collect();
@@ -342,7 +343,9 @@ impl Bands<'_> {
         Some(self.means.chunks_exact(self.m).flat_map(of_list).collect())
     }
 
-    /// `Φ((μ − t)/√(σ² + α))`, `[k, m]`; where nothing varies, 1 above the threshold and else 0.
+    /// Returns the probabilities `Φ((μ − t)/√(σ² + α))` of exceeding the threshold t, `[k, m]`.
+    ///
+    /// Where σ² + α is 0, the probability is 1 for means above the threshold, else 0.
     fn exceedances(&self, alpha: f64) -> Option<Vec<f64>> {
         let (variances, threshold) = (self.variances?, self.asked.threshold?);
         let of_one = |(mean, variance): (&f64, &f64)| {

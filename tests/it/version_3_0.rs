@@ -114,42 +114,33 @@ fn wrap_reference(object: &mut Object) {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+#[test]
+fn what_3_0_cannot_say_is_said_its_way() {
+    let derived = |schema: Value| derive(&json!({"schema": schema}))["schema"].clone();
+    assert_eq!(derived(json!({"type": ["array", "null"]})), json!({"type": "array", "nullable": true}));
+    assert_eq!(derived(json!({"exclusiveMinimum": 0.0})), json!({"minimum": 0.0, "exclusiveMinimum": true}));
+    let reference = "#/components/schemas/A";
+    let described = json!({"$ref": reference, "description": "An A."});
+    assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
+    assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
+    let named_as_keywords =
+        json!({"properties": {"links": {"type": "object"}, "content": {"type": "object"}}});
+    assert_eq!(derived(named_as_keywords.clone()), named_as_keywords);
+    let example = json!({"example": {"type": ["x", "null"]}});
+    assert_eq!(derived(example.clone()), example);
+}
 
-    #[test]
-    fn what_3_0_cannot_say_is_said_its_way() {
-        let derived = |schema: Value| derive(&json!({"schema": schema}))["schema"].clone();
-        assert_eq!(derived(json!({"type": ["array", "null"]})), json!({"type": "array", "nullable": true}));
-        assert_eq!(
-            derived(json!({"exclusiveMinimum": 0.0})),
-            json!({"minimum": 0.0, "exclusiveMinimum": true})
-        );
-        let reference = "#/components/schemas/A";
-        let described = json!({"$ref": reference, "description": "An A."});
-        assert_eq!(derived(described), json!({"description": "An A.", "allOf": [{"$ref": reference}]}));
-        assert_eq!(derived(json!({"$ref": reference})), json!({"$ref": reference}));
-        let named_as_keywords =
-            json!({"properties": {"links": {"type": "object"}, "content": {"type": "object"}}});
-        assert_eq!(derived(named_as_keywords.clone()), named_as_keywords);
-        let example = json!({"example": {"type": ["x", "null"]}});
-        assert_eq!(derived(example.clone()), example);
-    }
-
-    #[test]
-    fn bodies_are_json_and_pages_are_left_out() {
-        let answers = |media_type: &str| {
-            json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}},
-                                        "links": {"next": {}}},
-                                 "404": {"content": {"application/problem+json": {}}}}})
-        };
-        let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});
-        let derived =
-            derive(&json!({"paths": paths, "info": {"license": {"name": "MIT", "identifier": "MIT"}}}));
-        let json = json!({"content": {"application/json": {}}});
-        assert_eq!(derived["paths"], json!({"/a": {"get": {"responses": {"200": json, "404": json}}}}));
-        assert_eq!(derived["info"], json!({"license": {"name": "MIT"}}));
-        assert_eq!(derived["openapi"], "3.0.3");
-    }
+#[test]
+fn bodies_are_json_and_pages_are_left_out() {
+    let answers = |media_type: &str| {
+        json!({"responses": {"200": {"content": {media_type: {}, "application/x-npy": {}},
+                                    "links": {"next": {}}},
+                             "404": {"content": {"application/problem+json": {}}}}})
+    };
+    let paths = json!({"/a": {"get": answers("application/json"), "post": answers("text/html")}, "/b": {"get": answers("text/html")}});
+    let derived = derive(&json!({"paths": paths, "info": {"license": {"name": "MIT", "identifier": "MIT"}}}));
+    let json = json!({"content": {"application/json": {}}});
+    assert_eq!(derived["paths"], json!({"/a": {"get": {"responses": {"200": json, "404": json}}}}));
+    assert_eq!(derived["info"], json!({"license": {"name": "MIT"}}));
+    assert_eq!(derived["openapi"], "3.0.3");
 }

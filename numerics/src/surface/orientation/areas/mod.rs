@@ -1,13 +1,15 @@
 //! The area of the surface that each point stands for.
 
+mod cell;
+
 use rayon::prelude::*;
 
-use super::cell::Cell;
 use super::edges::{Edge, across, edges_of};
 use super::winding::ball_volume;
 use super::{Sampled, n_neighbours};
 use crate::machine::vector::{dot, tangent_basis};
 use crate::points::cloud::squared_distance;
+use cell::Cell;
 
 /// Reach of the sum over the distance to the last of the neighbours. It exceeds 1 so that the last ones
 /// count.
