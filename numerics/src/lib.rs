@@ -1,8 +1,8 @@
 //! Geometric kernel interpolation and regression on point clouds, after Guidotti: f64 in, f64 out.
 //!
 //! A cloud of n points, a [`kernel::Kernel`] and a [`sums::regularization::Regularization`] α make a
-//! [`solver::System`], K + αI. A [`solver::Solver`] factorizes it once. Functions through values, their variances,
-//! and the surface that the points sample are then solves and sums:
+//! [`solver::System`], K + αI. A [`solver::Solver`] factorizes it once. Functions through values, their
+//! variances, and the surface that the points sample are then solves and sums:
 //!
 //! ```
 //! use std::sync::Arc;
@@ -43,12 +43,12 @@
 //! # Ok::<(), gramian_numerics::error::NumericsError>(())
 //! ```
 //!
-//! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool of the
-//! calling thread. An [`observer::Observer`] is told of stages, and may cancel. Errors name their cause and the
-//! offending point ([`error::NumericsError`]).
+//! Pure by rule: no JSON, HTTP, async, environment, clock or global state. Heavy loops run on the rayon pool
+//! of the calling thread. An [`observer::Observer`] is told of stages, and may cancel. Errors name their
+//! cause and the offending point ([`error::NumericsError`]).
 //!
-//! The rooms, each of which knows those before it: [`machine`], [`points`], [`kernel`], [`patches`], [`sums`],
-//! [`solver`], [`selection`], [`function`], [`surface`], [`model`].
+//! The rooms, each of which knows those before it: [`machine`], [`points`], [`kernel`], [`patches`],
+//! [`sums`], [`solver`], [`selection`], [`function`], [`surface`], [`model`].
 
 // A request must never bring a thread down; tests may.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]

@@ -38,9 +38,9 @@ pub trait Observer: Sync {
 }
 
 /// An observer for work beside that of a request. It passes cancellation on, but reports no stages.
-pub struct Beside<'a>(pub &'a dyn Observer);
+pub struct WithoutStages<'a>(pub &'a dyn Observer);
 
-impl Observer for Beside<'_> {
+impl Observer for WithoutStages<'_> {
     fn enter(&self, _stage: Stage) {}
 
     fn is_cancelled(&self) -> bool {

@@ -38,7 +38,7 @@ fn over_tls(stream: TcpStream) -> io::Result<StreamOwned<ClientConnection, TcpSt
     let provider = tls::provider();
     let config = ClientConfig::builder_with_provider(provider.clone()).with_safe_default_protocol_versions();
     let config = config.map_err(io::Error::other)?.dangerous();
-    let config = config.with_custom_certificate_verifier(Arc::new(Whoever(provider)));
+    let config = config.with_custom_certificate_verifier(Arc::new(AnyCertificate(provider)));
     let name = ServerName::from(Ipv4Addr::LOCALHOST);
     let connection = ClientConnection::new(Arc::new(config.with_no_client_auth()), name);
     Ok(StreamOwned::new(connection.map_err(io::Error::other)?, stream))
@@ -48,9 +48,9 @@ fn over_tls(stream: TcpStream) -> io::Result<StreamOwned<ClientConnection, TcpSt
 /// whether the server is ready. The certificate file is not checked, because a server whose new certificate
 /// is wrong keeps the old one.
 #[derive(Debug)]
-struct Whoever(Arc<CryptoProvider>);
+struct AnyCertificate(Arc<CryptoProvider>);
 
-impl ServerCertVerifier for Whoever {
+impl ServerCertVerifier for AnyCertificate {
     fn verify_server_cert(
         &self,
         _shown: &CertificateDer<'_>,

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
+use super::COLUMNS_AT_ONCE;
 use super::functionals::{JetFunctional, deviations, has_variance};
 use super::interpolant::Interpolant;
-use super::price::COLUMNS_AT_ONCE;
 use crate::error::NumericsError;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;

@@ -8,8 +8,8 @@ use faer::{ColRef, MatMut};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use super::price::COLUMNS_AT_ONCE;
 use crate::error::NumericsError;
 use crate::kernel::{Kernel, Pairs};
 use crate::machine::registers::{BLOCK, Block, Pack};

@@ -7,8 +7,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, ColRef, MatMut, MatRef};
 use rayon::prelude::*;
 
+use super::COLUMNS_AT_ONCE;
 use super::mean_variance::MeanVariance;
-use super::price::COLUMNS_AT_ONCE;
 use crate::error::{NotDefinite, NumericsError};
 use crate::machine::parallelism::parallelism;
 use crate::observer::{Observer, Stage};

@@ -1,16 +1,12 @@
 //! Prices of functions through values, and of their uncertainty.
 
+use super::COLUMNS_AT_ONCE;
 use super::errors::JUDGED_AT_ONCE;
 use crate::machine::price::{Price, Sizes};
 use crate::points::sampling::sampling_price;
 use crate::solver::price::{numbers_at_point, whitening_flops};
 use crate::sums::many::QUERIES_PER_BLOCK;
 use crate::sums::price::pair_flops;
-
-/// Columns `L⁻¹k(X, ·)` that are held at once, one for each query or functional.
-///
-/// They bound the memory to 512 numbers a point, and are wide enough for solves to run as matrix products.
-pub(crate) const COLUMNS_AT_ONCE: usize = 512;
 
 /// The price of a function through new values, with derivatives up to `order`.
 pub(crate) fn function_price(order: usize, sizes: Sizes) -> Price {

@@ -6,9 +6,9 @@ const SLICE: usize = 64 << 10;
 
 /// Returns the bytes of memory that a heap block of `n_bytes` takes, on average.
 ///
-/// mimalloc has four size classes to a doubling, so that a block of any size wastes an eighth on average, the rest of
-/// its page included. Larger blocks take whole slices, and leave about one unused. Counts of caches are within 5 % of
-/// the resident set (tests/footprint.rs).
+/// mimalloc has four size classes to a doubling, so that a block of any size wastes an eighth on average, the
+/// rest of its page included. Larger blocks take whole slices, and leave about one unused. Counts of caches
+/// are within 5 % of the resident set (tests/footprint.rs).
 pub fn block_bytes(n_bytes: usize) -> usize {
     match n_bytes {
         0..=LARGEST_CLASS => n_bytes + n_bytes / 8,

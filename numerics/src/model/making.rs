@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Model, Recipe};
 use crate::error::NumericsError;
-use crate::function::moving::Moving;
+use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
@@ -50,7 +50,7 @@ impl Recipe {
                     None => Arc::new(Sampling::of(&cloud, observer)?),
                 };
                 let system = System::new(cloud, kernel, regularization)?;
-                Ok(Model::LocalKriging(Arc::new(Moving::new(system, sampling, observer)?)))
+                Ok(Model::LocalKriging(Arc::new(LocalKriging::new(system, sampling, observer)?)))
             }
             Self::LocalSurface { .. } => Ok(Model::LocalSurface),
         }

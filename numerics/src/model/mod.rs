@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use crate::error::{NumericsError, Quantity, SolverKind};
 use crate::function::interpolant::Interpolant;
-use crate::function::moving::Moving;
+use crate::function::local_kriging::LocalKriging;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::sampling::Sampling;
@@ -37,7 +37,7 @@ pub enum Model {
     /// Weights for values from one system over all points.
     System(Arc<Solver>),
     /// A small system, solved around each query.
-    LocalKriging(Arc<Moving>),
+    LocalKriging(Arc<LocalKriging>),
     /// Nothing to prepare: local regressions are made with their surface.
     LocalSurface,
 }
@@ -93,7 +93,7 @@ impl Model {
     }
 
     /// Returns the local kriging of this model, which solves a system around each query.
-    pub fn kriging(&self) -> Option<&Arc<Moving>> {
+    pub fn kriging(&self) -> Option<&Arc<LocalKriging>> {
         match self {
             Self::LocalKriging(moving) => Some(moving),
             Self::System(_) | Self::LocalSurface => None,

@@ -2,7 +2,7 @@
 
 use super::Recipe;
 use crate::error::SolverKind;
-use crate::function::moving::price::{kriged_operator_price, kriging_price, making_price};
+use crate::function::local_kriging::price::{kriged_operator_price, kriging_price, making_price};
 use crate::function::price::{self as functions, deviations_price, judging_price, many_price, samples_price};
 use crate::machine::price::{Price, Sizes};
 use crate::solver::price::FactorPrice;

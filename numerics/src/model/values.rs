@@ -7,7 +7,7 @@ use crate::error::{NumericsError, Quantity};
 use crate::function::batch::{Batch, BatchJets};
 use crate::function::deviations::JetDeviations;
 use crate::function::interpolant::Interpolant;
-use crate::function::moving::{Moving, MovingRequest};
+use crate::function::local_kriging::{KrigingRequest, LocalKriging};
 use crate::function::posterior::{Variances, variances_with_mean};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
@@ -68,9 +68,9 @@ impl Model {
     /// before.
     ///
     /// # Errors
-    /// Returns the errors of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of [`Moving::at`],
-    /// and those of the requested variances and deviations. Returns [`NumericsError::Unsupported`] for local
-    /// regressions.
+    /// Returns the errors of [`Interpolant::fit_with_mean`] and [`Interpolant::at`], or of
+    /// [`LocalKriging::at`], and those of the requested variances and deviations. Returns
+    /// [`NumericsError::Unsupported`] for local regressions.
     pub fn values_at(
         &self,
         fitted: FittedValues<'_>,
@@ -154,7 +154,7 @@ fn uncertainty(
 }
 
 fn around_queries(
-    moving: &Moving,
+    moving: &LocalKriging,
     fitted: FittedValues<'_>,
     asked: JetRequest<'_>,
     observer: &dyn Observer,
@@ -162,7 +162,7 @@ fn around_queries(
     let FittedValues { values, trend, scale, .. } = fitted;
     // Only computed derivatives have deviations, so the order is raised to that of the deviations.
     let order = asked.deviations.filter(|of| of.degree() > asked.order.degree()).unwrap_or(asked.order);
-    let request = MovingRequest {
+    let request = KrigingRequest {
         order,
         has_variances: asked.has_variances,
         has_deviations: asked.deviations.is_some(),

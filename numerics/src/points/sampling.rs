@@ -164,7 +164,8 @@ pub fn sampling_flops(n_points: usize, dimension: usize) -> f64 {
     n * visited * (3.0 * dimension as f64 + 10.0)
 }
 
-/// The price of [`Sampling::of`] at its peak: the tree with the points in its order, and four numbers a point.
+/// The price of [`Sampling::of`] at its peak: the tree with the points in its order, and four numbers a
+/// point.
 pub fn sampling_price(n_points: usize, dimension: usize) -> Price {
     let n_bytes = n_points.saturating_mul((dimension + 6) * size_of::<f64>());
     Price { n_bytes, flops: sampling_flops(n_points, dimension) }

@@ -108,13 +108,13 @@ struct NearNormals<'a> {
     normals: &'a [f64],
 }
 
-/// Squared distance, in spacings, at which a point has half of the greatest weight. Near a thin sheet the point on the
-/// side of the query decides.
+/// Squared distance, in spacings, at which a point has half of the greatest weight. Near a thin sheet the
+/// point on the side of the query decides.
 const SOFTENING: f64 = 1e-3;
 
 impl NearNormals<'_> {
-    /// Returns how much a direction at x goes along the normals of the nearest points, each weighted by the inverse
-    /// of its squared distance. `found` is a buffer.
+    /// Returns how much a direction at x goes along the normals of the nearest points, each weighted by the
+    /// inverse of its squared distance. `found` is a buffer.
     fn along(&self, x: &[f64], direction: &[f64], found: &mut Vec<Neighbour>) -> f64 {
         let d = direction.len();
         self.sampling.neighbours().nearest_into(x, SPACING_NEIGHBOURS, found);

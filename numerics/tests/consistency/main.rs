@@ -6,12 +6,12 @@
 //! another order, so that no two numbers come from the same operations.
 //!
 //! The local solver is not listed, because it has no single function to evaluate here. On a cloud of its
-//! neighbours alone it gives the dense answers for every kernel (src/function/moving/tests.rs). Its error on
-//! larger clouds is tested in moving.rs.
+//! neighbours alone it gives the dense answers for every kernel (src/function/local_kriging/tests.rs). Its
+//! error on larger clouds is tested in moving.rs.
 
 #[path = "../common/mod.rs"]
 mod common;
-mod moving;
+mod local_kriging;
 mod verbs;
 
 use std::sync::Arc;

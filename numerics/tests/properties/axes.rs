@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gramian_numerics::function::deviations::JetDeviations;
-use gramian_numerics::function::moving::{Moving, MovingRequest};
+use gramian_numerics::function::local_kriging::{KrigingRequest, LocalKriging};
 use gramian_numerics::function::posterior::{covariance, variances};
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
@@ -100,11 +100,11 @@ fn kriging_looks_at_the_points_of_the_greatest_covariances() {
     for family in families_without_kink() {
         let has_deviations = of_one(family).has_second_derivatives();
         let request =
-            MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations, trend: None };
+            KrigingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations, trend: None };
         let at = |kernel: Kernel, cloud: &Cloud, queries: &Cloud| {
             let sampling = Arc::new(Sampling::of(cloud, &Unobserved).unwrap());
             let system = System::new(Arc::new(cloud.clone()), kernel, Regularization::Uniform(1e-3)).unwrap();
-            Moving::new(system, sampling, &Unobserved)
+            LocalKriging::new(system, sampling, &Unobserved)
                 .unwrap()
                 .at(&values, queries, request, &Unobserved)
                 .unwrap()

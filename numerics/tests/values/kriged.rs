@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use gramian_numerics::function::moving::Moving;
+use gramian_numerics::function::local_kriging::LocalKriging;
 use gramian_numerics::kernel::Kernel;
 use gramian_numerics::observer::Unobserved;
 use gramian_numerics::points::cloud::Cloud;
@@ -73,7 +73,7 @@ impl Case {
         let kernel = Kernel::new(learned.family, learned.length_scale, 1.0).unwrap();
         let alpha = Regularization::uniform(learned.ratio).unwrap();
         let system = System::new(cloud.clone(), kernel, alpha).unwrap();
-        let moving = Moving::new(system, sampling.clone(), &Unobserved).unwrap();
+        let moving = LocalKriging::new(system, sampling.clone(), &Unobserved).unwrap();
         let surface =
             Surface::from(LocalSurface::of(cloud, sampling, Given::default(), &Unobserved).unwrap());
         let request = GeometryRequest {

@@ -10,13 +10,13 @@ use tokio::sync::oneshot;
 use super::observer::{JobObserver, StageTimes};
 use super::progress::Progress;
 use super::pulse::Pulse;
-use super::turns::{Turn, Turns};
+use super::turns::{FairSemaphore, Turn};
 use crate::store::Owner;
 
 /// A thread pool with turns.
 pub(super) struct Lane {
     pool: Arc<rayon::ThreadPool>,
-    turns: Arc<Turns>,
+    turns: Arc<FairSemaphore>,
     pulse: Arc<Pulse>,
 }
 
@@ -29,7 +29,7 @@ impl Lane {
     pub(super) fn new(
         name: &'static str,
         n_threads: usize,
-        turns: Arc<Turns>,
+        turns: Arc<FairSemaphore>,
         niceness: i32,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -123,7 +123,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_lane_whose_threads_wait_for_each_other_is_not_moving() {
-        let lane = Lane::new("lane", 2, Turns::new(2), 0).unwrap();
+        let lane = Lane::new("lane", 2, FairSemaphore::new(2), 0).unwrap();
         assert!(lane.is_moving(Duration::ZERO).await);
         let (release, released) = std::sync::mpsc::channel::<()>();
         let released = std::sync::Mutex::new(released);
@@ -140,7 +140,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_lane_that_works_is_moving_however_long_the_work() {
-        let lane = Lane::new("lane", 1, Turns::new(1), 0).unwrap();
+        let lane = Lane::new("lane", 1, FairSemaphore::new(1), 0).unwrap();
         let (done, is_done) = std::sync::mpsc::channel::<()>();
         let work = move |observer: &JobObserver| {
             use gramian_numerics::observer::Observer;

@@ -42,7 +42,7 @@ pub use observer::{JobObserver, StageTimes};
 pub use places::Admission;
 use places::Places;
 pub use progress::{Progress, Snapshot};
-pub use turns::Turns;
+pub use turns::FairSemaphore;
 
 /// Most flops of a job on the light lane: some 2 ms of one core.
 const LIGHT_FLOPS: f64 = 3e7;
@@ -94,10 +94,10 @@ impl Compute {
         deadline: Duration,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         Ok(Self {
-            light: Lane::new("gramian-light", n_threads, Turns::new(n_threads), 0)?,
-            shared: Lane::new("gramian-shared", n_threads, Turns::new(n_threads), 2)?,
-            exclusive: Lane::new("gramian-exclusive", n_threads, Turns::new(1), 5)?,
-            jobs: Lane::new("gramian-jobs", n_threads, Turns::of_owners(1, n_owners), 10)?,
+            light: Lane::new("gramian-light", n_threads, FairSemaphore::new(n_threads), 0)?,
+            shared: Lane::new("gramian-shared", n_threads, FairSemaphore::new(n_threads), 2)?,
+            exclusive: Lane::new("gramian-exclusive", n_threads, FairSemaphore::new(1), 5)?,
+            jobs: Lane::new("gramian-jobs", n_threads, FairSemaphore::of_owners(1, n_owners), 10)?,
             places: Places::new(n_threads.saturating_add(max_queue), n_owners, deadline),
             n_threads,
         })

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use crate::store::Owner;
 
 /// A fixed number of turns, with a queue per owner.
-pub struct Turns {
+pub struct FairSemaphore {
     n: usize,
     /// Most turns that one owner may hold.
     most: usize,
@@ -29,10 +29,10 @@ struct State {
 
 /// A turn. When dropped, it passes to the next waiting request.
 pub struct Turn {
-    of: Option<(Arc<Turns>, Owner)>,
+    of: Option<(Arc<FairSemaphore>, Owner)>,
 }
 
-impl Turns {
+impl FairSemaphore {
     /// Creates `n` turns, all of which one owner may hold.
     pub fn new(n: usize) -> Arc<Self> {
         Self::with_most(n, n)
@@ -164,7 +164,7 @@ mod tests {
 
     #[tokio::test]
     async fn owners_take_turns_and_those_who_left_are_passed_over() {
-        let turns = Turns::new(1);
+        let turns = FairSemaphore::new(1);
         let first = turns.take(A).await;
         let mut of_a: Vec<_> = (0..3).map(|_| Box::pin(turns.take(A))).collect();
         let mut of_b = Box::pin(turns.take(B));
@@ -186,7 +186,7 @@ mod tests {
 
     #[tokio::test]
     async fn no_owner_of_several_has_more_than_half() {
-        let turns = Turns::of_owners(1, 2);
+        let turns = FairSemaphore::of_owners(1, 2);
         let first = turns.take(A).await;
         let mut second = Box::pin(turns.take(A));
         let mut third = Box::pin(turns.take(A));
@@ -210,7 +210,7 @@ mod tests {
 
     #[tokio::test]
     async fn one_owner_alone_has_all() {
-        let turns = Turns::of_owners(3, 1);
+        let turns = FairSemaphore::of_owners(3, 1);
         let taken = [turns.take(A).await, turns.take(A).await, turns.take(A).await];
         assert_eq!((turns.load(), turns.has_one_for(A)), ((3, 0), false));
         drop(taken);
@@ -219,7 +219,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_turn_that_all_who_waited_left_is_free() {
-        let turns = Turns::new(1);
+        let turns = FairSemaphore::new(1);
         let first = turns.take(A).await;
         let mut leaving = [Box::pin(turns.take(A)), Box::pin(turns.take(B)), Box::pin(turns.take(B))];
         for waiting in &mut leaving {
@@ -233,7 +233,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_turn_that_was_handed_to_somebody_who_leaves_goes_on() {
-        let turns = Turns::new(1);
+        let turns = FairSemaphore::new(1);
         let first = turns.take(A).await;
         let mut leaving = Box::pin(turns.take(A));
         assert!(futures_util::poll!(&mut leaving).is_pending());

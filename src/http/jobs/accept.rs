@@ -16,7 +16,7 @@ use crate::http::around::trace::TraceParent;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::serve::intake::read_bytes;
-use crate::http::state::jobs::Here;
+use crate::http::state::jobs::LocalJob;
 use crate::http::state::kept::SECONDS_UNTIL_COUNTED;
 use crate::http::wire::write::json::Json;
 use crate::store::Owner;
@@ -144,7 +144,7 @@ impl Asked {
 /// A guard that takes a job out of this process, unless it is begun.
 struct Entered<'a> {
     runner: &'a Runner,
-    here: Option<Arc<Here>>,
+    here: Option<Arc<LocalJob>>,
 }
 
 impl Entered<'_> {

@@ -16,7 +16,7 @@ use crate::http::around::middleware::{CLOUD_HEADER, with_problem_document};
 use crate::http::around::span::RequestSpan;
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
-use crate::http::state::jobs::Here;
+use crate::http::state::jobs::LocalJob;
 use crate::store::objects::jobs::{Answer, FoundRequest, JobResult, Outcome};
 use crate::store::objects::pieces::BrokenOff;
 use crate::store::objects::room::Room;
@@ -46,7 +46,7 @@ impl Runner {
     /// Computes the answer of a job and writes it as the result.
     pub(super) async fn answer(
         &self,
-        here: &Here,
+        here: &LocalJob,
         name: &OwnerName,
         attempt: &Attempt,
     ) -> Result<(), Unavailable> {
@@ -81,7 +81,7 @@ impl Runner {
     ///
     /// Nothing is held between two attempts. The route reserves the memory that it needs, and the body is
     /// read from the store as the route reads it.
-    async fn response(&self, here: &Here, name: &OwnerName) -> Result<Response, Unavailable> {
+    async fn response(&self, here: &LocalJob, name: &OwnerName) -> Result<Response, Unavailable> {
         loop {
             here.progress.restart();
             let Some(found) = self.app.jobs.objects.open_job(name, here.id).await? else {
@@ -124,7 +124,7 @@ impl Runner {
     /// Writes the answer as the result of the job.
     async fn write(
         &self,
-        here: &Here,
+        here: &LocalJob,
         name: &OwnerName,
         attempt: &Attempt,
         response: Response,
@@ -148,7 +148,7 @@ impl Runner {
     /// counted.
     async fn write_refusal(
         &self,
-        here: &Here,
+        here: &LocalJob,
         name: &OwnerName,
         attempt: &Attempt,
     ) -> Result<(), Unavailable> {
@@ -165,7 +165,7 @@ impl Runner {
     async fn write_in(
         &self,
         room: &mut Room,
-        here: &Here,
+        here: &LocalJob,
         (name, attempt): (&OwnerName, &Attempt),
         response: Response,
     ) -> Result<Option<Outcome>, Unavailable> {
@@ -189,7 +189,7 @@ fn head_of(response: &Response) -> JobResult {
 
 /// Rebuilds the request as its client sent it, with its owner. If reading the body fails, `fault` receives
 /// the reason.
-fn rebuilt(found: FoundRequest, here: &Here, fault: &Arc<OnceLock<BrokenOff>>) -> Request {
+fn rebuilt(found: FoundRequest, here: &LocalJob, fault: &Arc<OnceLock<BrokenOff>>) -> Request {
     let FoundRequest { request, n_body_bytes, body } = found;
     let fault = fault.clone();
     let body = body.inspect_err(move |error| _ = fault.set(error.clone()));

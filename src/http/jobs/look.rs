@@ -13,7 +13,7 @@ use crate::http::compute::Snapshot;
 use crate::http::problem::Problem;
 use crate::http::serve::durable::unavailable;
 use crate::http::state::app::App;
-use crate::http::state::jobs::Here;
+use crate::http::state::jobs::LocalJob;
 use crate::http::state::kept::is_older;
 use crate::store::Owner;
 use crate::store::objects::OwnerName;
@@ -90,7 +90,7 @@ pub struct JobView {
 }
 
 /// Describes a job of this process from what the process knows.
-pub fn view_of_here(here: &Here) -> JobView {
+pub fn view_of_here(here: &LocalJob) -> JobView {
     let (status, progress) = match here.has_lease() {
         true => (Status::Running, of_snapshot(here.progress.now())),
         false => (Status::Queued, at("queued", 0.0)),
@@ -139,7 +139,7 @@ pub async fn find_known(app: &App, owner: &OwnerName, id: JobId) -> Result<JobOb
 }
 
 /// Finds a job of this process, if it belongs to the owner.
-pub fn here_of(app: &App, owner: Owner, id: JobId) -> Option<Arc<Here>> {
+pub fn here_of(app: &App, owner: Owner, id: JobId) -> Option<Arc<LocalJob>> {
     app.jobs.find(id).filter(|here| here.owner == owner)
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::Runner;
 use super::look::name_of;
-use crate::http::state::jobs::{Here, Jobs};
+use crate::http::state::jobs::{Jobs, LocalJob};
 use crate::store::objects::jobs::{JobObjects, Lease};
 use crate::store::objects::{OwnerName, Unavailable};
 
@@ -31,7 +31,7 @@ pub(super) struct Attempt {
 /// A guard that removes the job from this process when dropped, also if its work panics.
 struct Present<'a> {
     jobs: &'a Jobs,
-    here: Arc<Here>,
+    here: Arc<LocalJob>,
 }
 
 impl Drop for Present<'_> {
@@ -42,7 +42,7 @@ impl Drop for Present<'_> {
 
 impl Runner {
     /// Works on a job of this process once its turn has come.
-    pub(super) async fn run(self, here: Arc<Here>) {
+    pub(super) async fn run(self, here: Arc<LocalJob>) {
         let jobs = &self.app.jobs;
         let present = Present { jobs, here };
         let here = &*present.here;
@@ -79,7 +79,7 @@ impl Runner {
 
     /// Claims the next attempt for this process. Returns `None` if the job is not open, or another process
     /// has begun it.
-    async fn claim(&self, here: &Here, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
+    async fn claim(&self, here: &LocalJob, name: &OwnerName) -> Result<Option<Attempt>, Unavailable> {
         let objects = &self.app.jobs.objects;
         let found = objects.find_job(name, here.id).await?;
         // Another process may have begun the job while it waited here. If that process abandons it, the
@@ -100,7 +100,7 @@ impl Runner {
 
     /// Releases the lease, so that any process may continue at once. Retries until the store accepts, or the
     /// process drains.
-    async fn release(&self, here: &Here, name: &OwnerName, attempt: Attempt) {
+    async fn release(&self, here: &LocalJob, name: &OwnerName, attempt: Attempt) {
         let lease = Lease { is_released: true, ..attempt.lease };
         while let Err(error) = self.app.jobs.objects.renew_lease(name, here.id, attempt.number, &lease).await
         {
@@ -115,7 +115,7 @@ impl Runner {
 
     /// Renews the lease until that is pointless: the job has a result, another process has begun it, or it is
     /// forgotten.
-    async fn hold_lease(&self, here: &Here, name: &OwnerName, attempt: &Attempt) {
+    async fn hold_lease(&self, here: &LocalJob, name: &OwnerName, attempt: &Attempt) {
         let objects = &self.app.jobs.objects;
         let mut ticks = tokio::time::interval(RENEWING);
         loop {

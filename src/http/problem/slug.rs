@@ -15,7 +15,8 @@ struct Entry {
 /// Declares the problem types: variant, name, status, title, and explanation of each.
 macro_rules! catalogue {
     ($($variant:ident $name:literal $status:ident $title:literal $explanation:literal;)*) => {
-        /// Every type of problem that the service answers with. Part of the contract: types are added, never renamed.
+        /// Every type of problem that the service answers with. Part of the contract: types are added, never
+        /// renamed.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Slug {
             $($variant,)*

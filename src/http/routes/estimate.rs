@@ -26,7 +26,7 @@ use crate::http::fields::SolverUsed;
 use crate::http::openapi::responses::ComputeProblems;
 use crate::http::problem::Problem;
 use crate::http::routes::clouds::CloudRequest;
-use crate::http::serve::intake::{Intake, read_body};
+use crate::http::serve::intake::{ReceivedBody, read_body};
 use crate::http::serve::operation::{self, Operation, REQUEST_FORMATS};
 use crate::http::state::app::App;
 use crate::http::wire::read::body::UnpackedBody;
@@ -127,12 +127,16 @@ pub async fn estimate(
 }
 
 /// Returns the name of the operation, and the body to be read again as a request of that operation.
-fn name_of(intake: Intake, app: &App, observer: &JobObserver) -> Result<(String, Intake), Problem> {
+fn name_of(
+    intake: ReceivedBody,
+    app: &App,
+    observer: &JobObserver,
+) -> Result<(String, ReceivedBody), Problem> {
     let (body, memory) = intake.unpack(app, observer)?;
     let named: WithOperation<IgnoredAny> = body.parse(&ParseContext::new(&app.config, observer))?;
     let missing = || Problem::invalid_request("/operation", "name the operation whose request this is");
     let operation = named.operation.ok_or_else(missing)?;
-    Ok((operation, Intake { body: body.into_request(app.memory.body), memory }))
+    Ok((operation, ReceivedBody { body: body.into_request(app.memory.body), memory }))
 }
 
 macro_rules! operations {
@@ -144,7 +148,7 @@ macro_rules! operations {
             operation: &str,
             app: &Arc<App>,
             admission: &Arc<Admission>,
-            intake: Intake,
+            intake: ReceivedBody,
         ) -> Result<Json<EstimateResponse>, Problem> {
             $(if operation == <$request as Operation>::NAME {
                 let estimate = operation::estimate::<$request>(app, admission, intake).await?;

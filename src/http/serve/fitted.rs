@@ -11,7 +11,7 @@ use crate::store::prepared::PreparedFit;
 use gramian_numerics::error::NumericsError;
 use gramian_numerics::function::interpolant::Interpolant;
 use gramian_numerics::model::{FittedValues, Model};
-use gramian_numerics::observer::Beside;
+use gramian_numerics::observer::WithoutStages;
 use gramian_numerics::points::sampling::Sampling;
 use gramian_numerics::selection::{Learned, Noise, Observed, learn};
 use gramian_numerics::solver::Solution;
@@ -98,7 +98,7 @@ impl Fits {
         if process.is_learned {
             return Ok(None);
         }
-        let observer = Beside(observer);
+        let observer = WithoutStages(observer);
         // Learning uses the coordinates of a kernel that stretches them, so the ratios between axes are not
         // judged.
         let stretched = recipe.process().and_then(|(kernel, _)| kernel.stretched_cloud(fitted));

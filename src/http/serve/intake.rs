@@ -30,18 +30,18 @@ const LEAST_BYTES_PER_SECOND: f64 = 16384.0;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A body with its reserved memory.
-pub struct Intake {
+pub struct ReceivedBody {
     pub body: RequestBody,
     pub memory: Reservation,
 }
 
-impl Intake {
+impl ReceivedBody {
     /// Parses the body. Returns the result with the memory that it holds.
     ///
     /// A body that unpacks to more than usual takes the rest of its memory here, where it cannot wait for it.
     ///
     /// # Errors
-    /// Returns the errors of [`Intake::unpack`] and [`UnpackedBody::parse`].
+    /// Returns the errors of [`ReceivedBody::unpack`] and [`UnpackedBody::parse`].
     pub fn parse<T: DeserializeOwned>(
         self,
         app: &App,
@@ -86,7 +86,7 @@ pub async fn read_body(
     headers: &HeaderMap,
     body: Body,
     formats: &[Format],
-) -> Result<Intake, Problem> {
+) -> Result<ReceivedBody, Problem> {
     let (format, coding) = announced(headers, formats)?;
     let (bytes, mut memory) = read_bytes(app, owner, headers, body).await?;
     let body = RequestBody::new(format, coding, bytes, app.memory.body);
@@ -95,7 +95,7 @@ pub async fn read_body(
     if !app.intake.grow(&mut memory, n_to_parse, PATIENCE).await {
         return Err(app.compute.out_of_memory());
     }
-    Ok(Intake { body, memory })
+    Ok(ReceivedBody { body, memory })
 }
 
 /// Reads a body of any content.

@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 use super::durable::{TRUST, find_cloud, keep_all};
 use super::fitted::Fits;
 use super::fitting::{Fitting, Outlook};
-use super::intake::{Intake, read_body};
+use super::intake::{ReceivedBody, read_body};
 use super::plan::{Cost, FitPlan, PlannedFit};
 use super::planner::Planner;
 use super::report::Report;
@@ -103,7 +103,7 @@ pub async fn serve<O: Operation>(app: Arc<App>, owner: Owner, request: Request) 
     let admission = app.compute.admit(owner)?;
 
     let began = Instant::now();
-    let parsed = |intake: Intake, app: &App, observer: &JobObserver| intake.parse::<O>(app, observer);
+    let parsed = |intake: ReceivedBody, app: &App, observer: &JobObserver| intake.parse::<O>(app, observer);
     let plan = match prepare::<O>(&app, &admission, intake, parsed, Some(wanted), began).await? {
         Prepared::Answered(answered, fresh) => {
             keep_all(&app, owner, &fresh).await;
@@ -174,9 +174,9 @@ pub struct Estimate {
 pub async fn estimate<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    intake: Intake,
+    intake: ReceivedBody,
 ) -> Result<Estimate, Problem> {
-    let parsed = |intake: Intake, app: &App, observer: &JobObserver| {
+    let parsed = |intake: ReceivedBody, app: &App, observer: &JobObserver| {
         let (named, memory) = intake.parse::<WithOperation<O>>(app, observer)?;
         Ok((named.request, memory))
     };
@@ -242,8 +242,8 @@ enum Prepared<W> {
 async fn prepare<O: Operation>(
     app: &Arc<App>,
     admission: &Arc<Admission>,
-    intake: Intake,
-    parsed: impl FnOnce(Intake, &App, &JobObserver) -> Result<(O, Reservation), Problem> + Send + 'static,
+    intake: ReceivedBody,
+    parsed: impl FnOnce(ReceivedBody, &App, &JobObserver) -> Result<(O, Reservation), Problem> + Send + 'static,
     wanted: Option<Wanted>,
     began: Instant,
 ) -> Result<Prepared<O::Work>, Problem> {
@@ -251,7 +251,7 @@ async fn prepare<O: Operation>(
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
         let (request, memory) = parsed(intake, &shared, observer)?;
-        let elsewhere = elsewhere(&shared, admitted.owner, &request);
+        let elsewhere = ids_not_in_memory(&shared, admitted.owner, &request);
         if !elsewhere.is_empty() {
             return Ok(Parsed::Elsewhere(Box::new(request), memory, elsewhere));
         }

@@ -12,7 +12,7 @@ pub struct Durable {
     pub objects: Arc<Objects>,
     /// Number of clouds that the store refused, and how many of these have been offered again since.
     pub n_refused: AtomicU64,
-    pub n_made_up: AtomicU64,
+    pub n_offered_again: AtomicU64,
     /// Size of the store: the result of the last sweep, plus what was written since.
     pub n_clouds: AtomicU64,
     pub n_bytes: AtomicU64,
@@ -36,7 +36,7 @@ impl Durable {
         Ok(Self {
             objects: Arc::new(objects),
             n_refused: AtomicU64::new(0),
-            n_made_up: AtomicU64::new(0),
+            n_offered_again: AtomicU64::new(0),
             n_clouds: AtomicU64::new(0),
             n_bytes: AtomicU64::new(0),
             n_factor_bytes: AtomicU64::new(0),
@@ -47,7 +47,7 @@ impl Durable {
 
     /// Whether everything acknowledged outlives the process.
     pub fn is_up_to_date(&self) -> bool {
-        self.n_made_up.load(Ordering::Acquire) == self.n_refused.load(Ordering::Acquire)
+        self.n_offered_again.load(Ordering::Acquire) == self.n_refused.load(Ordering::Acquire)
     }
 
     /// Approximate bytes of factors in the store.

@@ -8,7 +8,7 @@ use std::time::SystemTime;
 use tokio_util::sync::CancellationToken;
 
 use super::kept::Kept;
-use crate::http::compute::{Progress, Turns};
+use crate::http::compute::{FairSemaphore, Progress};
 use crate::http::problem::Problem;
 use crate::http::problem::slug::Slug;
 use crate::store::Owner;
@@ -20,11 +20,11 @@ use crate::store::objects::{Objects, OwnerName, Unavailable};
 /// The jobs of this process, and the objects of all jobs.
 pub struct Jobs {
     pub objects: Arc<Objects>,
-    here: Mutex<HashMap<JobId, Arc<Here>>>,
+    here: Mutex<HashMap<JobId, Arc<LocalJob>>>,
     /// Bytes of kept requests and results. Without a store these are bytes of memory.
     pub bytes: Budget,
     pub kept: Kept,
-    pub turns: Arc<Turns>,
+    pub turns: Arc<FairSemaphore>,
     /// Most jobs that may wait or run in this process, of all owners and of one.
     most: usize,
     most_of_owner: usize,
@@ -33,7 +33,7 @@ pub struct Jobs {
 }
 
 /// A job of this process, waiting or running.
-pub struct Here {
+pub struct LocalJob {
     pub id: JobId,
     pub owner: Owner,
     /// The last attempt at the job when it was added here. A newer attempt belongs to another process.
@@ -76,7 +76,7 @@ impl Jobs {
             here: Mutex::default(),
             bytes: Budget::new(limits.n_bytes, n_owners),
             kept: Kept::new(limits.max_kept, n_owners),
-            turns: Turns::of_owners(n_threads, n_owners),
+            turns: FairSemaphore::of_owners(n_threads, n_owners),
             most,
             most_of_owner: if n_owners > 1 { most.div_ceil(2) } else { most },
             followers: Budget::new(limits.max_followers, n_owners),
@@ -115,19 +115,19 @@ impl Jobs {
         }
     }
 
-    pub fn find(&self, id: JobId) -> Option<Arc<Here>> {
+    pub fn find(&self, id: JobId) -> Option<Arc<LocalJob>> {
         self.here().get(&id).cloned()
     }
 
     /// Adds a job to this process. `None` if it is already here, or there are too many, of all owners or of
     /// this one.
-    pub fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<Here>> {
+    pub fn add(&self, id: JobId, owner: Owner, last: Option<(u32, SystemTime)>) -> Option<Arc<LocalJob>> {
         let mut here = self.here();
         let n_of_owner = here.values().filter(|job| job.owner == owner).count();
         if here.len() >= self.most || n_of_owner >= self.most_of_owner || here.contains_key(&id) {
             return None;
         }
-        let job = Arc::new(Here {
+        let job = Arc::new(LocalJob {
             id,
             owner,
             last,
@@ -149,7 +149,7 @@ impl Jobs {
     }
 
     /// Removes a job from this process.
-    pub fn remove(&self, job: &Here) {
+    pub fn remove(&self, job: &LocalJob) {
         self.here().remove(&job.id);
         job.over.cancel();
     }
@@ -210,12 +210,12 @@ impl Jobs {
     }
 
     #[expect(clippy::disallowed_methods, reason = "a table, for as long as it takes to look into it")]
-    fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<Here>>> {
+    fn here(&self) -> MutexGuard<'_, HashMap<JobId, Arc<LocalJob>>> {
         self.here.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Here {
+impl LocalJob {
     pub fn is_running(&self) -> bool {
         self.is_running.load(Ordering::Relaxed)
     }

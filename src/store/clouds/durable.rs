@@ -53,7 +53,7 @@ pub enum Kept {
 
 /// Outcome of a look-up in memory, after a check with the store if one was due.
 pub enum Recalled {
-    Here(Arc<RegisteredCloud>),
+    LocalJob(Arc<RegisteredCloud>),
     /// The cloud was in memory but is no longer in the store.
     Gone,
     Unknown,
@@ -121,13 +121,13 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
     pub async fn recall(&self, objects: &Objects, holder: &Holder, id: CloudId, trust: Duration) -> Recalled {
         let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
         if cloud.is_trusted(trust) {
-            return Recalled::Here(cloud);
+            return Recalled::LocalJob(cloud);
         }
         let _turn = self.turns.take((holder.owner, id)).await;
         // Other tasks may have asked about it, or changed it, before this turn.
         let Some(cloud) = self.get(holder.owner, id) else { return Recalled::Unknown };
         if cloud.is_trusted(trust) || is_still_stored(objects, holder, &cloud).await {
-            return Recalled::Here(cloud);
+            return Recalled::LocalJob(cloud);
         }
         self.clouds.remove(holder.owner, &id);
         Recalled::Gone

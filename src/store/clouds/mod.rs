@@ -19,7 +19,7 @@ use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling;
 pub use page::{CloudPage, ListedCloud};
 pub use registered::RegisteredCloud;
-use turns::Turns;
+use turns::FairSemaphore;
 
 /// The clouds of all owners within one byte budget. `E` is the error of a computation.
 pub struct CloudStore<E> {
@@ -27,7 +27,7 @@ pub struct CloudStore<E> {
     samplings: SingleFlight<(Owner, CloudId), Arc<Sampling>, E>,
     noise: SingleFlight<(Owner, CloudId), f64, E>,
     reads: SingleFlight<(Owner, CloudId), Option<Arc<RegisteredCloud>>, E>,
-    turns: Turns<(Owner, CloudId)>,
+    turns: FairSemaphore<(Owner, CloudId)>,
 }
 
 impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
@@ -37,7 +37,7 @@ impl<E: Clone + Send + Sync + 'static> CloudStore<E> {
             samplings: SingleFlight::new(),
             noise: SingleFlight::new(),
             reads: SingleFlight::new(),
-            turns: Turns::default(),
+            turns: FairSemaphore::default(),
         }
     }
 

@@ -9,17 +9,17 @@ use tokio::sync::OwnedMutexGuard;
 /// Locks by key. A lock exists for as long as a task holds or awaits it.
 ///
 /// A turn is held across calls of the store. Only async tasks await turns, never threads of the compute pool.
-pub(super) struct Turns<K> {
+pub(super) struct FairSemaphore<K> {
     locks: Mutex<HashMap<K, Weak<tokio::sync::Mutex<()>>>>,
 }
 
-impl<K> Default for Turns<K> {
+impl<K> Default for FairSemaphore<K> {
     fn default() -> Self {
         Self { locks: Mutex::default() }
     }
 }
 
-impl<K: Hash + Eq> Turns<K> {
+impl<K: Hash + Eq> FairSemaphore<K> {
     /// Waits for the turn of this key. Waiting tasks get it in order of arrival.
     pub(super) async fn take(&self, key: K) -> OwnedMutexGuard<()> {
         let lock = self.lock_of(key);
@@ -52,7 +52,7 @@ mod tests {
 
     #[tokio::test]
     async fn one_key_has_one_turn_at_a_time_and_keeps_nothing_of_it() {
-        let turns = Turns::default();
+        let turns = FairSemaphore::default();
         let first = turns.take(1).await;
         let mut second = Box::pin(turns.take(1));
         assert!(poll!(&mut second).is_pending());

@@ -41,7 +41,7 @@ use uuid::Uuid;
 
 use super::key::CloudId;
 pub use clouds::{ListWindow, Listed, Written};
-use patience::Patient;
+use patience::WithTimeouts;
 pub use place::Place;
 pub use retention::{Retention, Swept};
 pub use tally::{Tally, Verb};
@@ -115,7 +115,7 @@ impl Objects {
 
     /// Creates a store over any backend, with the prefix of all names.
     pub fn over(store: Arc<dyn ObjectStore>, root: Path) -> Self {
-        let store = Arc::new(Patient::new(store));
+        let store = Arc::new(WithTimeouts::new(store));
         let (tally, n_damaged) = (Tally::default(), AtomicU64::new(0));
         Self { store, root, directory: None, in_memory: false, tally, n_damaged }
     }

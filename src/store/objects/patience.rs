@@ -24,7 +24,7 @@ const BYTES_PER_SECOND: f64 = (4 << 20) as f64;
 
 /// A store whose slow calls fail.
 #[derive(Debug, Clone)]
-pub(super) struct Patient {
+pub(super) struct WithTimeouts {
     inner: Arc<dyn ObjectStore>,
     patience: Patience,
 }
@@ -60,13 +60,13 @@ fn late(most: Duration) -> Error {
     Error::Generic { store: "store", source: reason.into() }
 }
 
-impl Patient {
+impl WithTimeouts {
     pub(super) fn new(inner: Arc<dyn ObjectStore>) -> Self {
         Self { inner, patience: Patience { answering: ANSWERING } }
     }
 }
 
-impl fmt::Display for Patient {
+impl fmt::Display for WithTimeouts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.inner.fmt(f)
     }
@@ -76,7 +76,7 @@ impl fmt::Display for Patient {
 // of rename.
 #[async_trait]
 #[deny(clippy::missing_trait_methods)]
-impl ObjectStore for Patient {
+impl ObjectStore for WithTimeouts {
     async fn put_opts(&self, name: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
         self.patience.wait(payload.content_length(), self.inner.put_opts(name, payload, options)).await
     }
@@ -87,7 +87,7 @@ impl ObjectStore for Patient {
         options: PutMultipartOptions,
     ) -> Result<Box<dyn MultipartUpload>> {
         let inner = self.patience.wait(0, self.inner.put_multipart_opts(name, options)).await?;
-        Ok(Box::new(PatientUpload { inner, patience: self.patience, n_bytes: 0 }))
+        Ok(Box::new(UploadWithTimeouts { inner, patience: self.patience, n_bytes: 0 }))
     }
 
     async fn get_opts(&self, name: &Path, options: GetOptions) -> Result<GetResult> {
@@ -135,14 +135,14 @@ impl ObjectStore for Patient {
 
 /// An upload in parts.
 #[derive(Debug)]
-struct PatientUpload {
+struct UploadWithTimeouts {
     inner: Box<dyn MultipartUpload>,
     patience: Patience,
     n_bytes: usize,
 }
 
 #[async_trait]
-impl MultipartUpload for PatientUpload {
+impl MultipartUpload for UploadWithTimeouts {
     fn put_part(&mut self, payload: PutPayload) -> UploadPart {
         let n_bytes = payload.content_length();
         self.n_bytes += n_bytes;
@@ -171,9 +171,9 @@ mod tests {
 
     const NEVER: Duration = Duration::from_secs(1 << 20);
 
-    fn patient(config: ThrottleConfig) -> Patient {
+    fn patient(config: ThrottleConfig) -> WithTimeouts {
         let store = ThrottledStore::new(InMemory::new(), config);
-        Patient { inner: Arc::new(store), patience: Patience { answering: Duration::from_millis(1) } }
+        WithTimeouts { inner: Arc::new(store), patience: Patience { answering: Duration::from_millis(1) } }
     }
 
     #[tokio::test]
@@ -218,7 +218,7 @@ mod tests {
 
     #[tokio::test]
     async fn what_answers_is_as_it_is() {
-        let store = Patient::new(Arc::new(InMemory::new()));
+        let store = WithTimeouts::new(Arc::new(InMemory::new()));
         let name = Path::from("name");
         let mut upload = store.put_multipart(&name).await.unwrap();
         upload.put_part("te".into()).await.unwrap();

@@ -12,9 +12,9 @@
 use super::super::geometry::Geometry;
 use super::{Operator, regular};
 use crate::error::NumericsError;
+use crate::function::COLUMNS_AT_ONCE;
 use crate::function::functionals::{JetFunctional, deviations, has_variance};
 use crate::function::interpolant::Interpolant;
-use crate::function::price::COLUMNS_AT_ONCE;
 use crate::machine::vector::{dot, norm};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;

@@ -10,7 +10,7 @@ use super::doubts::Findings;
 use super::{Operator, regular};
 use crate::error::NumericsError;
 use crate::function::functionals::JetFunctional;
-use crate::function::moving::{FunctionalsRequest, Moving, MovingFunctionals};
+use crate::function::local_kriging::{FunctionalsRequest, KrigedFunctionals, LocalKriging};
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::solver::trend::Trend;
@@ -18,7 +18,7 @@ use crate::solver::trend::Trend;
 /// A function through values, kriged around each query.
 #[derive(Clone, Copy)]
 pub struct Kriged<'a> {
-    pub moving: &'a Moving,
+    pub moving: &'a LocalKriging,
     /// `[n]`, unit V.
     pub values: &'a [f64],
     pub trend: Option<&'a Trend>,
@@ -43,7 +43,7 @@ impl Operator {
     ///
     /// # Errors
     /// [`NumericsError::DerivativesVary`] where the process has no such derivatives, and the errors of
-    /// [`Moving::at`].
+    /// [`LocalKriging::at`].
     pub fn on_kriged(
         self,
         geometry: &Geometry,
@@ -81,8 +81,8 @@ impl Kriged<'_> {
         Ok(self.judged(operator, geometry, found))
     }
 
-    fn judged(self, operator: Operator, geometry: &Geometry, found: MovingFunctionals) -> OfKriged {
-        let MovingFunctionals { jets, mut deviations, n_dependent } = found;
+    fn judged(self, operator: Operator, geometry: &Geometry, found: KrigedFunctionals) -> OfKriged {
+        let KrigedFunctionals { jets, mut deviations, n_dependent } = found;
         let values = operator.of_jets(geometry, &jets);
         let root = self.factor.sqrt();
         deviations.iter_mut().for_each(|deviation| *deviation *= root);

@@ -18,7 +18,7 @@ use crate::http::wire::read::points::Points;
 use crate::http::wire::write::array::Array;
 use crate::http::wire::write::integers::Integers;
 use crate::store::clouds::RegisteredCloud;
-use gramian_numerics::function::moving::Moving;
+use gramian_numerics::function::local_kriging::LocalKriging;
 use gramian_numerics::machine::price::Sizes;
 use gramian_numerics::model::Report;
 use gramian_numerics::model::price::{OperatorAsked, operator_price};
@@ -200,7 +200,7 @@ impl Applying<'_> {
         Ok(self.answer(Found { values, deviations, degenerate, report }))
     }
 
-    fn by_kriging(&self, moving: &Moving, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
+    fn by_kriging(&self, moving: &LocalKriging, observer: &JobObserver) -> Result<AppliedAnswer, Problem> {
         let Self { work, operator, fits, surface } = self;
         let refused = |error| fits.main.refused(error);
         let plan = &fits.main.plan;

@@ -73,7 +73,7 @@ pub async fn find_cloud(
     let owner = admission.owner;
     let Some(Durable { objects, .. }) = &app.durable else { return Ok(app.clouds.get(owner, id)) };
     match app.clouds.recall(objects, &holder_of(app, owner), id, TRUST).await {
-        Recalled::Here(cloud) => return Ok(Some(cloud)),
+        Recalled::LocalJob(cloud) => return Ok(Some(cloud)),
         Recalled::Gone => {
             forget_results(app, owner, id);
             return Ok(None);
@@ -282,7 +282,7 @@ pub async fn catch_up(app: Arc<App>) {
             offer_again(&app, durable, owner).await;
         }
         // Clouds refused meanwhile are offered in the next round.
-        durable.n_made_up.store(n_refused, Ordering::Release);
+        durable.n_offered_again.store(n_refused, Ordering::Release);
         if durable.is_up_to_date() {
             tracing::info!("the store has taken all clouds");
         }

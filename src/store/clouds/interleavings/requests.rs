@@ -94,7 +94,7 @@ impl Process {
 
     async fn get(&self) -> Answer {
         match self.clouds.recall(&self.objects, &holder(), id(), Duration::ZERO).await {
-            Recalled::Here(_) => return Answer::Found(true),
+            Recalled::LocalJob(_) => return Answer::Found(true),
             Recalled::Gone => return Answer::Found(false),
             Recalled::Unknown => {}
         }

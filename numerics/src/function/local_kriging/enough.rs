@@ -1,7 +1,7 @@
 //! A check that neighbourhoods are large enough.
 
 use super::NEIGHBOURS;
-use super::{Asked, Moving, MovingRequest, Quantities, Raw};
+use super::{Asked, KrigingRequest, LocalKriging, Quantities, Raw};
 use crate::error::NumericsError;
 use crate::machine::instruction_set::InstructionSet;
 use crate::observer::Observer;
@@ -20,14 +20,14 @@ const LOOKED_AT: usize = 32;
 /// below a deviation.
 const UNSETTLED: f64 = 0.1;
 
-impl Moving {
+impl LocalKriging {
     /// Returns the difference between values from neighbourhoods and from their nearer halves, in deviations.
     ///
     /// It is the root mean square over a sample of at most 32 queries. `None` if it is at most 0.1, or if
     /// every neighbourhood is the whole cloud.
     ///
     /// # Errors
-    /// Returns the errors of [`Moving::at`].
+    /// Returns the errors of [`LocalKriging::at`].
     pub fn unsettled(
         &self,
         values: &[f64],
@@ -41,7 +41,7 @@ impl Moving {
         let sample = queries.select(&thinned_points(queries, LOOKED_AT));
         let by = |n_neighbours: usize| {
             let order = JetOrder::Value;
-            let request = MovingRequest { order, has_variances: true, has_deviations: false, trend };
+            let request = KrigingRequest { order, has_variances: true, has_deviations: false, trend };
             let (set, quantities) = (InstructionSet::best(), Quantities::none());
             self.run(values, &sample, Asked { set, request, quantities, n_neighbours }, observer)
         };

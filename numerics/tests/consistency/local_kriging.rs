@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gramian_numerics::function::deviations::JetDeviations;
 use gramian_numerics::function::interpolant::Interpolant;
-use gramian_numerics::function::moving::{Moving, MovingRequest};
+use gramian_numerics::function::local_kriging::{KrigingRequest, LocalKriging};
 use gramian_numerics::function::posterior::variances;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::observer::Unobserved;
@@ -49,13 +49,13 @@ fn kriging_from_128_neighbours_is_off_by_little_of_the_dense_deviation() {
         let dense = dense.at(&queries, JetOrder::Gradient, &Unobserved).unwrap();
         let deviations: Vec<f64> =
             variances(&solver, &queries, &Unobserved).unwrap().latent.iter().map(|v| v.sqrt()).collect();
-        let request = MovingRequest {
+        let request = KrigingRequest {
             order: JetOrder::Gradient,
             has_variances: true,
             has_deviations: false,
             trend: None,
         };
-        let found = Moving::new(system(), sampling.clone(), &Unobserved)
+        let found = LocalKriging::new(system(), sampling.clone(), &Unobserved)
             .unwrap()
             .at(&values, &queries, request, &Unobserved)
             .unwrap();
@@ -90,12 +90,12 @@ fn what_is_not_known_of_the_mean_counts_as_in_the_dense_posterior() {
     let system = || System::new(cloud.clone(), kernel.clone(), Regularization::Uniform(0.01)).unwrap();
     let solver = Arc::new(Solver::dense(system(), &Unobserved).unwrap());
     let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
-    let moving = Moving::new(system(), sampling.clone(), &Unobserved).unwrap();
+    let moving = LocalKriging::new(system(), sampling.clone(), &Unobserved).unwrap();
     for mean in [Mean::Constant, Mean::Linear] {
         let noise = Noise::Uniform(0.01);
         let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
         let trend = learn_mean(observed, &kernel, &Unobserved).unwrap().trend;
-        let request = MovingRequest {
+        let request = KrigingRequest {
             order: JetOrder::Hessian,
             has_variances: false,
             has_deviations: true,

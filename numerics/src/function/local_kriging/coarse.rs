@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::NEIGHBOURS;
 use super::near::Near;
-use super::{Moving, MovingRequest};
+use super::{KrigingRequest, LocalKriging};
 use crate::error::NumericsError;
 use crate::function::functionals::{JetFunctional, has_variance};
 use crate::kernel::Kernel;
@@ -31,12 +31,12 @@ const SURER: f64 = 0.95;
 /// Local kriging of means of near points, one mean for each cell.
 pub(crate) struct Coarse {
     cells: Cells,
-    moving: Moving,
+    moving: LocalKriging,
 }
 
 impl Coarse {
     /// Local kriging of the means.
-    pub fn moving(&self) -> &Moving {
+    pub fn moving(&self) -> &LocalKriging {
         &self.moving
     }
 
@@ -48,7 +48,7 @@ impl Coarse {
     }
 }
 
-impl Moving {
+impl LocalKriging {
     /// Returns the means of points that give derivatives with smaller deviations than the points themselves.
     ///
     /// The comparison takes derivatives of order `order` at a sample of the queries. Returns `None` if no
@@ -59,7 +59,7 @@ impl Moving {
     /// within one mean. Sizes grow fourfold as long as the deviations fall.
     ///
     /// # Errors
-    /// Returns the errors of [`Moving::at`].
+    /// Returns the errors of [`LocalKriging::at`].
     pub(crate) fn surest(
         &self,
         queries: &Cloud,
@@ -106,7 +106,7 @@ impl Moving {
         let stretched = kernel.stretched_cloud(&cloud);
         let near = Near::Stretched(Neighbours::of(stretched.as_ref().unwrap_or(&cloud), observer)?);
         let system = System::new(cloud, kernel.clone(), Regularization::per_point(noise)?)?;
-        Ok(Coarse { cells, moving: Moving { system, near } })
+        Ok(Coarse { cells, moving: LocalKriging { system, near } })
     }
 
     /// Returns the root mean square deviation of the derivatives of highest order at some queries.
@@ -118,7 +118,7 @@ impl Moving {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<f64, NumericsError> {
-        let request = MovingRequest { order, has_variances: false, has_deviations: true, trend: None };
+        let request = KrigingRequest { order, has_variances: false, has_deviations: true, trend: None };
         let found = self.at(&vec![0.0; self.system.n_points()], queries, request, observer)?;
         let all = found.deviations.unwrap_or_default();
         let highest = [all.hessians, all.gradients, all.values].into_iter().find(|list| !list.is_empty());

@@ -7,17 +7,17 @@ use crate::solver::Solver;
 use crate::sums::regularization::Regularization;
 use crate::testing::{all_families, fibonacci_sphere};
 
-const EVERYTHING: MovingRequest<'_> =
-    MovingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations: false, trend: None };
+const EVERYTHING: KrigingRequest<'_> =
+    KrigingRequest { order: JetOrder::Hessian, has_variances: true, has_deviations: false, trend: None };
 
 fn system(cloud: &Cloud, family: Family, alpha: f64) -> System {
     let kernel = Kernel::new(family, 0.9, 1.7).unwrap();
     System::new(Arc::new(cloud.clone()), kernel, Regularization::uniform(alpha).unwrap()).unwrap()
 }
 
-fn moving(system: System) -> Moving {
+fn moving(system: System) -> LocalKriging {
     let sampling = Arc::new(Sampling::of(system.cloud(), &Unobserved).unwrap());
-    Moving::new(system, sampling, &Unobserved).unwrap()
+    LocalKriging::new(system, sampling, &Unobserved).unwrap()
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn a_small_cloud_has_the_dense_deviations_of_derivatives_on_every_instruction_se
         let dense = Interpolant::fit(solver, &values, &Unobserved).unwrap();
         let squares = |deviations: &[f64]| deviations.iter().map(|s| s * s).collect::<Vec<f64>>();
         for order in [JetOrder::Value, JetOrder::Gradient, JetOrder::Hessian] {
-            let request = MovingRequest { order, has_variances: false, has_deviations: true, trend: None };
+            let request = KrigingRequest { order, has_variances: false, has_deviations: true, trend: None };
             let expected = JetDeviations::of(&dense, 1.0, &queries, order.degree(), &Unobserved);
             for set in InstructionSet::available() {
                 let moving = moving(system(&cloud, family, 1e-3));
@@ -116,7 +116,7 @@ fn covariances_and_distances_that_are_next_to_nothing_change_no_answer() {
             let dense = Interpolant::fit(dense, &values, &Unobserved).unwrap();
             let dense = dense.at(&cloud, JetOrder::Value, &Unobserved).unwrap();
             for set in InstructionSet::available() {
-                let request = MovingRequest { order: JetOrder::Value, ..EVERYTHING };
+                let request = KrigingRequest { order: JetOrder::Value, ..EVERYTHING };
                 let found = moving(system(&cloud, family, 1e-2));
                 let found = found.at_with(set, &values, &cloud, request, &Unobserved).unwrap();
                 let context = format!("{family:?}, {}", set.name());
@@ -182,8 +182,12 @@ fn values_are_met_without_noise_and_variances_lie_between_nothing_and_the_prior(
     let (cloud, values) = spiral();
     for family in all_families() {
         let moving = moving(system(&cloud, family, 0.0));
-        let request =
-            MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false, trend: None };
+        let request = KrigingRequest {
+            order: JetOrder::Value,
+            has_variances: true,
+            has_deviations: false,
+            trend: None,
+        };
         let found = moving.at(&values, &cloud, request, &Unobserved).unwrap();
         let (k0, variances) = (moving.system().kernel().at_zero(), found.variances.unwrap());
         for (query, value) in values.iter().enumerate() {
@@ -255,7 +259,7 @@ fn a_kink_at_a_point_has_no_gradient() {
     let refused = moving.at(&values, &queries, EVERYTHING, &Unobserved).err();
     assert_eq!(refused, Some(NumericsError::KernelNotSmooth { query: 1, point: 77 }));
     let request =
-        MovingRequest { order: JetOrder::Value, has_variances: false, has_deviations: false, trend: None };
+        KrigingRequest { order: JetOrder::Value, has_variances: false, has_deviations: false, trend: None };
     assert!(moving.at(&values, &queries, request, &Unobserved).is_ok());
 }
 

@@ -4,7 +4,7 @@ use super::batch::{Batch, Observations};
 use super::kriging::{Krige, Workspace};
 use super::parts::{Found, Parts};
 use super::quantities::{Quantities, Quantity, Sized};
-use super::{Asked, Moving};
+use super::{Asked, LocalKriging};
 use crate::error::{NotDefinite, NumericsError};
 use crate::machine::instruction_set::InstructionSet;
 use crate::machine::vector::dot;
@@ -15,7 +15,7 @@ use crate::sums::jets::{JetOrder, Layout};
 
 /// Data shared by all batches of a request.
 pub(super) struct Fit<'a> {
-    pub(super) moving: &'a Moving,
+    pub(super) moving: &'a LocalKriging,
     pub(super) observations: Observations<'a>,
     pub(super) queries: &'a Cloud,
     pub(super) parts: Parts,
@@ -41,7 +41,12 @@ pub(super) struct Room {
 }
 
 impl<'a> Fit<'a> {
-    pub(super) fn new(moving: &'a Moving, values: &'a [f64], queries: &'a Cloud, asked: Asked<'a>) -> Self {
+    pub(super) fn new(
+        moving: &'a LocalKriging,
+        values: &'a [f64],
+        queries: &'a Cloud,
+        asked: Asked<'a>,
+    ) -> Self {
         let Asked { request, quantities, n_neighbours, .. } = asked;
         let (d, uncertainty) = (queries.dimension(), request.trend.and_then(Trend::uncertainty));
         let observations =
@@ -88,7 +93,7 @@ impl Room {
     /// # Errors
     /// [`NumericsError::KernelNotSmooth`] if a query is a point of the cloud and that is refused.
     pub(super) fn put(&mut self, fit: &Fit<'_>, first: usize, n_queries: usize) -> Result<(), NumericsError> {
-        let Moving { system, near, .. } = fit.moving;
+        let LocalKriging { system, near, .. } = fit.moving;
         self.functionals.clear();
         for lane in 0..n_queries {
             let (query, count) = (first + lane, self.batch.count);
@@ -183,7 +188,7 @@ impl Fit<'_> {
         self.moving.system.kernel().variance() * form
     }
 
-    /// Checks that a negative variance is at least −τ, the tolerance of [`Moving::at`].
+    /// Checks that a negative variance is at least −τ, the tolerance of [`LocalKriging::at`].
     fn check_is_rounding(
         &self,
         query: usize,

@@ -51,8 +51,8 @@ use quantities::Quantities;
 
 /// Points of a neighbourhood.
 ///
-/// For Matérn 3/2 in three dimensions with little noise, means are within 3 to 5 % of the deviation of the dense
-/// posterior. With 64 points they are within 9 to 13 % (docs/scale.md).
+/// For Matérn 3/2 in three dimensions with little noise, means are within 3 to 5 % of the deviation of the
+/// dense posterior. With 64 points they are within 9 to 13 % (docs/scale.md).
 pub const NEIGHBOURS: usize = 128;
 
 /// Local kriging of a system: a small solve around each query.
@@ -64,7 +64,7 @@ pub const NEIGHBOURS: usize = 128;
 /// # use gramian_numerics::points::cloud::Cloud;
 /// # use gramian_numerics::solver::{Solver, System};
 /// # use gramian_numerics::sums::regularization::Regularization;
-/// use gramian_numerics::function::moving::{Moving, MovingRequest};
+/// use gramian_numerics::function::local_kriging::{LocalKriging, KrigingRequest};
 /// use gramian_numerics::points::sampling::Sampling;
 /// use gramian_numerics::sums::jets::JetOrder;
 ///
@@ -74,21 +74,21 @@ pub const NEIGHBOURS: usize = 128;
 /// let system = System::new(cloud, kernel, Regularization::uniform(1e-8)?)?;
 /// let sampling = Arc::new(Sampling::of(system.cloud(), &Unobserved)?);
 /// let values: Vec<f64> = system.cloud().points().map(|x| x[0].sin()).collect();
-/// let kriging = Moving::new(system, sampling, &Unobserved)?;
+/// let kriging = LocalKriging::new(system, sampling, &Unobserved)?;
 /// let request =
-///     MovingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false, trend: None };
+///     KrigingRequest { order: JetOrder::Value, has_variances: true, has_deviations: false, trend: None };
 /// let found = kriging.at(&values, &Cloud::new(vec![0.3], 1)?, request, &Unobserved)?;
 /// assert!((found.jets.values()[0] - 0.3f64.sin()).abs() < 1e-4);
 /// # Ok::<(), gramian_numerics::error::NumericsError>(())
 /// ```
-pub struct Moving {
+pub struct LocalKriging {
     system: System,
     near: Near,
 }
 
 /// A request for jets at queries, with variances or deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MovingRequest<'a> {
+pub struct KrigingRequest<'a> {
     pub order: JetOrder,
     /// Whether variances of the latent function are wanted.
     pub has_variances: bool,
@@ -99,7 +99,7 @@ pub struct MovingRequest<'a> {
 }
 
 /// Jets at queries, with variances or deviations.
-pub struct MovingAnswer {
+pub struct KrigingAnswer {
     pub jets: Jets,
     /// Variances of the latent function, if asked for.
     pub variances: Option<Variances>,
@@ -122,7 +122,7 @@ pub(crate) struct FunctionalsRequest<'a> {
 }
 
 /// Jets at queries, with the deviations of functionals of their derivatives.
-pub(crate) struct MovingFunctionals {
+pub(crate) struct KrigedFunctionals {
     pub(crate) jets: Jets,
     /// Deviations of the functionals, `[m, count]`.
     pub(crate) deviations: Vec<f64>,
@@ -130,7 +130,7 @@ pub(crate) struct MovingFunctionals {
     pub(crate) n_dependent: usize,
 }
 
-impl Moving {
+impl LocalKriging {
     /// Prepares local kriging of a system, given the sampling of its cloud.
     ///
     /// # Errors
@@ -179,9 +179,9 @@ impl Moving {
         &self,
         values: &[f64],
         queries: &Cloud,
-        request: MovingRequest<'_>,
+        request: KrigingRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<MovingAnswer, NumericsError> {
+    ) -> Result<KrigingAnswer, NumericsError> {
         self.at_with(InstructionSet::best(), values, queries, request, observer)
     }
 
@@ -190,9 +190,9 @@ impl Moving {
         set: InstructionSet,
         values: &[f64],
         queries: &Cloud,
-        request: MovingRequest<'_>,
+        request: KrigingRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<MovingAnswer, NumericsError> {
+    ) -> Result<KrigingAnswer, NumericsError> {
         let (kernel, d, order) = (self.system.kernel(), queries.dimension(), request.order.degree());
         let quantities = match request.has_deviations {
             true => Quantities::derivatives(kernel, d, order)?,
@@ -208,28 +208,28 @@ impl Moving {
             JetDeviations { clamped, ..JetDeviations::of_packed(&sure, d, order) }
         });
         let variances = request.has_variances.then_some(variances);
-        Ok(MovingAnswer { jets, variances, deviations, n_dependent })
+        Ok(KrigingAnswer { jets, variances, deviations, n_dependent })
     }
 
     /// Evaluates jets at queries, with the deviations `[m, count]` of functionals of their derivatives.
     ///
     /// # Errors
-    /// Returns the errors of [`Moving::at`].
+    /// Returns the errors of [`LocalKriging::at`].
     pub(crate) fn functionals_at(
         &self,
         values: &[f64],
         queries: &Cloud,
         asked: FunctionalsRequest<'_>,
         observer: &dyn Observer,
-    ) -> Result<MovingFunctionals, NumericsError> {
+    ) -> Result<KrigedFunctionals, NumericsError> {
         let FunctionalsRequest { order, functionals, count, trend } = asked;
         let quantities = Quantities::functionals(self.system.kernel(), functionals, count, order.degree())?;
-        let request = MovingRequest { order, has_variances: false, has_deviations: false, trend };
+        let request = KrigingRequest { order, has_variances: false, has_deviations: false, trend };
         let (set, n_neighbours) = (InstructionSet::best(), self.n_neighbours());
         let asked = Asked { set, request, quantities, n_neighbours };
         let Raw { jets, sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;
         let deviations = sure.chunks_exact(n_sure).flat_map(|sure| &sure[1..]).map(|s| s.abs()).collect();
-        Ok(MovingFunctionals { jets, deviations, n_dependent })
+        Ok(KrigedFunctionals { jets, deviations, n_dependent })
     }
 
     fn run(
@@ -272,10 +272,10 @@ impl Moving {
     }
 }
 
-/// A request to [`Moving::run`], which splits it into batches.
+/// A request to [`LocalKriging::run`], which splits it into batches.
 struct Asked<'a> {
     set: InstructionSet,
-    request: MovingRequest<'a>,
+    request: KrigingRequest<'a>,
     quantities: Quantities<'a>,
     /// Points per neighbourhood.
     n_neighbours: usize,
