@@ -88,7 +88,7 @@ pub enum SolverKind {
 
 /// A quantity that not every solver can compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Quantity {
+pub enum Quantity {
     /// The diagonal of `(K + αI)⁻¹`.
     InverseDiagonal,
     /// A matrix with a column for each point.

@@ -34,7 +34,7 @@
 //! let jets = function.at(&at, JetOrder::Gradient, &Unobserved)?;
 //! assert!(jets.values()[0].abs() < 1e-6);
 //!
-//! // The surface is the level set of the function through the constant 1. A circle of radius 2 has curvature 1/2.
+//! // The surface is the level set of the function through the constant 1.
 //! let signature = Interpolant::signature(solver, &Unobserved)?;
 //! let surface = Surface::of(signature, None, &Unobserved)?;
 //! let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved)?;

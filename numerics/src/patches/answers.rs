@@ -38,7 +38,7 @@ pub struct PatchGeometry {
 /// Standard deviations of curvatures in flat arrays, unit 1/L, and 1/L^{d−1} for the Gaussian one. Those of
 /// principal curvatures are in the ascending order of the curvatures for the normals they come with.
 #[derive(Default)]
-pub(crate) struct CurvatureDeviations {
+pub struct CurvatureDeviations {
     /// Principal curvatures, `[m, d−1]`.
     pub principal: Vec<f64>,
     /// Mean curvature, `[m]`.

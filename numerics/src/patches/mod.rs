@@ -60,8 +60,6 @@ pub struct Patches {
     count: usize,
     noise: f64,
     kernel: PatchKernel,
-    /// Points per mean, at most. 1 if the points themselves are used.
-    group: usize,
 }
 
 /// Hyperparameters of the covariance of the heights: medians over the sites.
@@ -110,7 +108,7 @@ impl Patches {
                 1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
                 _ => Support::means(&cloud, group, observer)?,
             };
-            let (deviation, patches) = Self::over(sites, support, group, observer)?;
+            let (deviation, patches) = Self::over(sites, support, observer)?;
             let is_exact = patches.noise == 0.0;
             let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
             if is_better {
@@ -125,12 +123,7 @@ impl Patches {
 
     /// Learns the hyperparameters on one support. Also returns the median over the sites of the largest
     /// deviation of a principal curvature, which [`Patches::learned_at`] compares between group sizes.
-    fn over(
-        sites: &Cloud,
-        support: Support,
-        group: usize,
-        observer: &dyn Observer,
-    ) -> Result<(f64, Self), NumericsError> {
+    fn over(sites: &Cloud, support: Support, observer: &dyn Observer) -> Result<(f64, Self), NumericsError> {
         let d = sites.dimension();
         let count = n_neighbours(d, support.cloud().n_points());
         let mut patches = Self {
@@ -140,7 +133,6 @@ impl Patches {
             count,
             noise: 0.0,
             kernel: PatchKernel::default(),
-            group,
         };
         if count < n_terms(d) + 2 {
             return Ok((f64::INFINITY, patches));
@@ -211,11 +203,6 @@ impl Patches {
         self.kernel
     }
 
-    /// Greatest number of points of the cloud that a neighbourhood draws on.
-    pub(crate) fn n_points_used(&self) -> usize {
-        self.count * self.group
-    }
-
     /// Bytes held on the heap besides the cloud and its sampling.
     pub fn n_bytes(&self) -> usize {
         self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
@@ -238,7 +225,7 @@ mod tests {
             let cloud = Arc::new(Cloud::new(on_sphere.collect(), dimension).unwrap());
             let sampling = Arc::new(Sampling::of(&cloud, &Unobserved).unwrap());
             let patches = Patches::of(cloud.clone(), sampling, &Unobserved).unwrap();
-            assert_eq!(patches.n_points_used() > 0, has_answers, "d = {dimension}");
+            assert_eq!(patches.count > 0, has_answers, "d = {dimension}");
             let found = patches.at(&cloud, true, true, &Unobserved).unwrap();
             assert_eq!(found.is_known.contains(&true), has_answers, "d = {dimension}");
         }

@@ -245,11 +245,6 @@ impl Trend {
         std::iter::once(self.coefficients[0] - at_centre).chain(slopes).collect()
     }
 
-    /// Returns the number of functions of the mean.
-    pub(crate) fn n_functions(&self) -> usize {
-        self.coefficients.len()
-    }
-
     /// Bytes held on the heap.
     pub(crate) fn n_bytes(&self) -> usize {
         vec_bytes(&self.coefficients) + vec_bytes(&self.covariance) + vec_bytes(&self.basis.centre)

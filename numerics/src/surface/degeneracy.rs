@@ -52,7 +52,7 @@ pub struct Degeneracy {
 
 /// Quality of the nodes around a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Resolution {
+pub enum Resolution {
     Resolved,
     /// The nodes misrepresent the curvature of the surface.
     Unresolved,

@@ -20,7 +20,7 @@ use crate::patches::{CurvatureDeviations, PatchGeometry, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
-use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
+use crate::points::sampling::Sampling;
 
 /// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
 /// known.

@@ -322,7 +322,7 @@ fn planned<O: Operation>(
 }
 
 /// Finds the clouds that a request names and memory does not have, if there is a store to look in.
-fn elsewhere<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<CloudId> {
+fn ids_not_in_memory<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<CloudId> {
     if app.durable.is_none() {
         return Vec::new();
     }

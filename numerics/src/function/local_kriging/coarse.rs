@@ -29,7 +29,7 @@ const COMPARED: usize = 32;
 const SURER: f64 = 0.95;
 
 /// Local kriging of means of near points, one mean for each cell.
-pub(crate) struct Coarse {
+pub struct Coarse {
     cells: Cells,
     moving: LocalKriging,
 }

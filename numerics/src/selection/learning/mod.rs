@@ -121,7 +121,8 @@ const LEAST_VALUES: usize = 8;
 /// let values: Vec<f64> = cloud.points().map(|x| x[0].sin()).collect();
 /// let sampling = Sampling::of(&cloud, &Unobserved)?;
 /// let (noise, mean) = (Noise::Unknown, Mean::Constant);
-/// let learned = learn(Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean }, &Unobserved)?;
+/// let observed = Observed { cloud: &cloud, sampling: &sampling, values: &values, noise, mean };
+/// let learned = learn(observed, &Unobserved)?;
 /// assert!(learned.length_scale > 0.5 && learned.ratio < 1e-3); // a wave that is nearly without noise
 /// # Ok::<(), gramian_numerics::error::NumericsError>(())
 /// ```

@@ -192,7 +192,7 @@ fn free_slopes<'a>(
 
 /// The bound of its range that a number has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
+pub enum Side {
     Min,
     Max,
 }

@@ -30,7 +30,8 @@ use crate::solver::Solver;
 use crate::solver::trend::{Basis, Mean};
 use crate::sums::jets::{JetOrder, Jets, check_smooth_at};
 use crate::sums::nodes::Nodes;
-pub use doubts::{JUDGED_FUNCTIONALS, Judged};
+pub(crate) use doubts::JUDGED_FUNCTIONALS;
+pub use doubts::Judged;
 pub use kriged::{Kriged, OfKriged};
 pub use stencils::{RowKind, SparseMatrix, Stencils};
 

@@ -37,7 +37,7 @@ pub(crate) use serving::serve;
 ///
 /// Building it costs one evaluation at all points and a quadric through the neighbours of each. So it is made
 /// once per factorization.
-pub(crate) struct SignatureSurface {
+pub struct SignatureSurface {
     signature: Signature,
     sampling: Arc<Sampling>,
     quadrics: LocalQuadrics,
