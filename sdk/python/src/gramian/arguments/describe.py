@@ -23,7 +23,7 @@ def described(kind: str, members: Mapping[str, object]) -> str:
 def in_words(value: object) -> str:
     """Returns the `repr` of a member.
 
-    >>> from gramian.describe import in_words
+    >>> from gramian.arguments.describe import in_words
     >>> in_words(np.zeros((8, 2))), in_words(gramian.KernelFamily.GAUSS), in_words(("signature",) * 8)
     ('array[8, 2]', "'gauss'", "('signature', 'signature', 'signature', … 8 entries)")
     """
