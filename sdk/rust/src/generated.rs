@@ -10,9 +10,9 @@ pub mod types {
     ///The smallest box around a cloud.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct BoundingBox {
-        ///The greatest value of each coordinate.
+        ///The largest value of each coordinate.
         pub max: ::std::vec::Vec<f64>,
-        ///The least value of each coordinate.
+        ///The smallest value of each coordinate.
         pub min: ::std::vec::Vec<f64>,
     }
     impl BoundingBox {
@@ -27,16 +27,18 @@ pub mod types {
         pub bounding_box: BoundingBox,
         ///The id of the cloud, to refer to it in later requests.
         pub cloud_id: CloudId,
-        ///When it was registered, in UTC.
+        ///The time of registration, in UTC.
         pub created_at: ::chrono::DateTime<::chrono::offset::Utc>,
-        ///Coordinates of each point, d.
+        ///Number of coordinates of each point, d.
         pub dimension: u64,
-        ///Points that coincide with an earlier one.
+        ///Number of points that coincide with an earlier point.
         pub n_duplicates: u64,
         ///Number of points, n.
         pub n_points: u64,
-        /**Distances between nearest points; absent if all points coincide, and in lists until the cloud was registered or
-described by itself, or a kernel chosen for it.*/
+        /**Distances between nearest points.
+
+Absent if all points coincide. A list of clouds has it only once a kernel was chosen for the cloud, or
+the cloud was registered or described by itself.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub spacing: ::std::option::Option<Spacing>,
     }
@@ -106,7 +108,7 @@ described by itself, or a kernel chosen for it.*/
     pub struct CloudList {
         ///The clouds of this page.
         pub clouds: ::std::vec::Vec<Cloud>,
-        ///The cursor of the next page; absent on the last one.
+        ///The cursor of the next page. Absent on the last page.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub next: ::std::option::Option<Cursor>,
     }
@@ -115,18 +117,20 @@ described by itself, or a kernel chosen for it.*/
             Default::default()
         }
     }
-    ///A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+    /**A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
+given.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug, Default)]
     #[serde(deny_unknown_fields)]
     pub struct CloudRef {
         ///The id of a registered cloud, 64 hexadecimal digits.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub id: ::std::option::Option<CloudId>,
-        /**Normals at the points, one row each, of any length but 0, with `points` only. Their side is outward. An empty list
-counts as absent.*/
+        /**Normals at the points, a row each, of any length but 0, with `points` only. They point to the outward
+side. An empty list counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///The points, one row of coordinates each, all of the same length; the cloud is registered with them.
+        /**The points, with a row of coordinates each, all of the same length. The cloud is registered with the
+request.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub points: ::std::vec::Vec<::std::vec::Vec<f64>>,
     }
@@ -139,10 +143,12 @@ counts as absent.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct CloudRequest {
-        ///Normals at the points, one row each, of any length but 0. Their side is outward. An empty list counts as absent.
+        /**Normals at the points, one row each.
+
+They may have any length but 0. The side they point to is outward. An empty list counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normals: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///The points, one row of coordinates each, all of the same length.
+        ///The points, one row of coordinates each. All rows have the same length.
         pub points: ::std::vec::Vec<::std::vec::Vec<f64>>,
     }
     impl CloudRequest {
@@ -208,45 +214,51 @@ counts as absent.*/
                 })
         }
     }
-    ///A cloud that samples a hypersurface, and where its curvatures are wanted.
+    ///A cloud that samples a hypersurface, and queries at which to compute its curvatures.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct CurvaturesRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside what every answer has.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Which way normals point, and with them the sign of curvatures; `outward` if absent.
+        ///The direction of normals, which determines the sign of curvatures. Default: `outward`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub orientation: ::std::option::Option<OrientationChoice>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-learn the same.*/
+        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+
+Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+the same sites and the points around them.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///Which function's level surface is meant; `auto` if absent.
+        ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -260,42 +272,49 @@ learn the same.*/
     pub struct CurvaturesResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
         ///Standard deviations of the Gaussian curvatures, 1/length to the d − 1.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gaussian_curvature_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///Their product at each query, 1/length to the d − 1; null where there are none.
+        /**The product of the principal curvatures at each query, 1/length to the d − 1. Null where there are
+none.*/
         pub gaussian_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///|∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        /**|∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
+`offset`.*/
         pub gradient_norms: ::std::vec::Vec<f64>,
         ///The signature function at each query: 1 on the surface, usually more inside a closed one.
         pub levels: ::std::vec::Vec<f64>,
         ///Standard deviations of the mean curvatures, 1/length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_curvature_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///Their average at each query, 1/length; null where there are none.
+        ///The average of the principal curvatures at each query, 1/length. Null where there are none.
         pub mean_curvatures: ::std::vec::Vec<::std::option::Option<f64>>,
-        /**Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
-there is no answer or none is known.*/
+        /**Standard deviation of the angle of the normal at each query, radians.
+
+95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
+deviation is not known.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normal_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///The normal at each query, of length 1; null where there is none.
+        ///The normal at each query, of length 1. Null where there is none.
         pub normals: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
         ///Standard deviations of the principal curvatures at each query, in their order, 1/length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub principal_curvature_deviations: ::std::vec::Vec<
             ::std::option::Option<::std::vec::Vec<f64>>,
         >,
-        ///The d − 1 principal curvatures at each query, ascending, 1/length; null where there is none.
+        ///The d − 1 principal curvatures at each query, ascending, 1/length. Null where there is none.
         pub principal_curvatures: ::std::vec::Vec<
             ::std::option::Option<::std::vec::Vec<f64>>,
         >,
-        ///A unit direction for each of them, its largest component positive; any basis where curvatures coincide.
+        /**A unit direction for each principal curvature, its largest component positive.
+
+Where curvatures coincide, their directions are an arbitrary basis.*/
         pub principal_directions: ::std::vec::Vec<
             ::std::option::Option<::std::vec::Vec<::std::vec::Vec<f64>>>,
         >,
-        ///The function whose level surface was used at each query; `signature` where there is no answer.
+        /**The function whose level surface was used at each query. It is `signature` where there is no
+answer.*/
         pub surfaces: ::std::vec::Vec<SurfaceUsed>,
     }
     impl CurvaturesResponse {
@@ -306,12 +325,14 @@ there is no answer or none is known.*/
     ///A query where geometry has no meaning, or less accuracy than it seems.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Degenerate {
-        /**|∇| of the function that was asked there: 1/length for the signature function, about 1 for the offset model, 0
-where that has no answer.*/
+        /**|∇| of the function used at the query.
+
+Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that
+has no answer.*/
         pub gradient_norm: f64,
         ///The position of the query.
         pub query: u64,
-        ///Why.
+        ///The reason why the query is degenerate.
         pub reason: DegenerateReason,
     }
     impl Degenerate {
@@ -319,7 +340,7 @@ where that has no answer.*/
             Default::default()
         }
     }
-    ///Why a query is degenerate.
+    ///The reason why a query is degenerate.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -394,59 +415,63 @@ where that has no answer.*/
             value.parse()
         }
     }
-    ///What an answer says of itself: the numbers used, how the system was solved, and how well.
+    ///Diagnostics of an answer: the numbers used, the method, and its accuracy.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Diagnostics {
-        ///What was added to the diagonal; absent with `noise_variances`.
+        ///The number added to the diagonal. Absent with `noise_variances`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The id of the cloud, to refer to it in later requests.
         pub cloud_id: CloudId,
-        ///Coordinates of each point, d.
+        ///Number of coordinates of each point, d.
         pub dimension: u64,
-        ///How the matrix was factorized.
+        ///The factorization of the matrix.
         pub factorization: FactorizationUsed,
-        ///The same for the fit of the surface, in answers about values on a surface.
+        ///Diagnostics of the fit of the surface, in answers about values on a surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<::std::boxed::Box<Diagnostics>>,
-        ///The kernel used, in full.
+        ///The kernel used, with all parameters.
         pub kernel: KernelUsed,
-        ///The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /**The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
+mean is 0.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_coefficients: ::std::vec::Vec<f64>,
-        ///|u(X) − Y|, unit of the values; absent for values from the local solver, which is not asked at the points.
+        /**|u(X) − Y|, unit of the values.
+
+Absent for values from the local solver, which is not evaluated at the points.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub misfit: ::std::option::Option<f64>,
-        ///Points that were merged into an earlier one.
+        ///Number of points that were merged into an earlier point.
         pub n_merged_duplicates: u64,
-        ///Points of the cloud, n.
+        ///Number of points of the cloud, n.
         pub n_points: u64,
-        ///Queries answered, m.
+        ///Number of queries answered, m.
         pub n_queries: u64,
-        ///‖u‖² = ΛᵀKΛ in the native space of the kernel.
+        ///‖u‖² = ΛᵀKΛ, the squared norm in the native space of the kernel.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub native_norm_squared: ::std::option::Option<f64>,
-        ///Standard deviation of the noise of the points across the surface, as estimated, length.
+        ///Estimated standard deviation of the noise of the points across the surface, length.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub noise_deviation: ::std::option::Option<f64>,
         ///Numerical rank of the matrix.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub rank: ::std::option::Option<u64>,
-        ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as a fraction of all.
+        ///Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits that survive.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub reciprocal_condition: ::std::option::Option<f64>,
-        ///‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and surfaces, with Y = 1.
+        /**‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean. For matrices and surfaces,
+Y = 1.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub relative_residual: ::std::option::Option<f64>,
         ///The solver used.
         pub solver: SolverUsed,
-        ///Why it was chosen, where `auto` chose another one than the dense one.
+        ///The reason why `auto` chose a solver other than the dense one. Absent otherwise.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver_reason: ::std::option::Option<::std::string::String>,
-        ///Rows of a sparse operator by how their weights came about.
+        ///Number of rows of a sparse operator by how their weights were computed.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub stencils: ::std::option::Option<StencilsUsed>,
-        ///What was changed or limits the accuracy.
+        ///Changes that were made, and limits of the accuracy.
         pub warnings: ::std::vec::Vec<Warning>,
     }
     impl Diagnostics {
@@ -454,7 +479,7 @@ where that has no answer.*/
             Default::default()
         }
     }
-    ///What to do with points that coincide when alpha is 0.
+    ///The treatment of points that coincide when alpha is 0.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -520,22 +545,24 @@ where that has no answer.*/
             Default::default()
         }
     }
-    ///What a request would take.
+    ///The expected cost of a request.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct EstimateResponse {
-        ///Whether there is memory and time enough for it, if nothing else is under way.
+        ///True if memory and time suffice for the request when nothing else runs.
         pub admissible: bool,
-        ///Memory that it would take beside what is held already.
+        ///Memory that the request would need beside what is held already, bytes.
         pub bytes: i64,
-        ///Whether all factorizations that it needs are there.
+        ///True if all factorizations that the request needs are there.
         pub cached: bool,
-        ///Floating-point operations, as counted beforehand.
+        ///Number of floating-point operations, counted beforehand.
         pub flops: f64,
         ///The operation, repeated.
         pub operation: ::std::string::String,
-        ///Seconds from its turn to its answer, by what ran on this machine since the server started.
+        /**Expected seconds from the request's turn in the queue to its answer.
+
+They are learned from what ran on this machine since the server started.*/
         pub seconds: f64,
-        ///What it would be served by.
+        ///The solver that would be used.
         pub solver: SolverUsed,
     }
     impl EstimateResponse {
@@ -543,8 +570,9 @@ where that has no answer.*/
             Default::default()
         }
     }
-    /**How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no
-answer has them yet.*/
+    /**The factorization of the Gram matrix.
+
+`bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.*/
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -618,12 +646,12 @@ answer has them yet.*/
     ///The best score of a family.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct FamilyScore {
-        ///The kernel family, with ν where it is Matérn.
+        ///The kernel family.
         pub family: KernelFamily,
-        ///matern: the smoothness ν.
+        ///The smoothness ν of the Matérn family. Absent for other families.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
-        ///Its best score; null where the matrix was not positive definite from any start.
+        ///The best score of the family. Null if the matrix was not positive definite from any start.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub score: ::std::option::Option<f64>,
     }
@@ -632,12 +660,12 @@ answer has them yet.*/
             Default::default()
         }
     }
-    ///One field of the request that was refused.
+    ///A field of the request that was refused.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct FieldError {
-        ///What is wrong with this field.
+        ///The reason why the field was refused.
         pub detail: ::std::string::String,
-        ///RFC 6901 pointer into the request body, such as `/cloud/points/17/2`; for query parameters, `/<name>`.
+        ///RFC 6901 pointer into the request body, such as `/cloud/points/17/2`. For query parameters, `/<name>`.
         pub pointer: ::std::string::String,
     }
     impl FieldError {
@@ -649,14 +677,14 @@ answer has them yet.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct FreeParameter {
-        ///length_scales: the axis, from 0; every axis if absent, each within these bounds.
+        ///The axis, from 0, for `length_scales` only. Default: every axis, each within these bounds.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub axis: ::std::option::Option<u64>,
-        ///The greatest that it may be.
+        ///The upper bound.
         pub max: f64,
-        ///The least that it may be.
+        ///The lower bound.
         pub min: f64,
-        ///Which.
+        ///The parameter.
         pub parameter: SelectionParameter,
     }
     impl FreeParameter {
@@ -664,27 +692,29 @@ answer has them yet.*/
             Default::default()
         }
     }
-    /**The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as in
-the request.*/
+    /**The surface of an operator, if it differs from the surface of the request.
+
+It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug, Default)]
     #[serde(deny_unknown_fields)]
     pub struct Geometry {
-        ///Added to the diagonal of its Gram matrix.
+        ///Added to the diagonal of the Gram matrix of the surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
         ///The cloud whose level surface carries the operator.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub cloud: ::std::option::Option<CloudRef>,
-        ///The kernel of its signature function.
+        ///The kernel of the signature function of the surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///One entry per point of its cloud, instead of `alpha`. An empty list counts as absent.
+        /**Noise variances of the surface, an entry per point of its cloud, instead of `alpha`. An empty list
+counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///How its linear system is solved.
+        ///The method that solves the linear system of the surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///Which function's level surface is meant.
+        ///The function whose level set is the surface.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -693,7 +723,7 @@ the request.*/
             Default::default()
         }
     }
-    ///What a geometric answer has beside what it always has.
+    ///Optional parts of a geometric answer.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -755,43 +785,51 @@ the request.*/
             Default::default()
         }
     }
-    ///Many lists of values at the points of a cloud, and where the functions through them are wanted.
+    /**Many lists of values at the points of a cloud, and queries at which to evaluate the functions through
+them.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct InterpolationBatchRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        ///The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub derivatives: ::std::option::Option<i32>,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside what was asked for; nothing if absent.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of each function; a constant if absent with the kernel, else 0.
+        ///The mean of each function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///Lists of values, one per point each, in their order. They have kernel and noise in common.
+        /**Lists of values. Each has a value per point, in the order of the points.
+
+All lists have kernel and noise in common.*/
         pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
     }
     impl InterpolationBatchRequest {
@@ -799,33 +837,47 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+    ///The interpolants (regression functions, if alpha > 0) at the queries. All have the same deviations.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct InterpolationBatchResponse {
-        ///How the answer came about; `relative_residual` is the greatest of all lists.
+        /**The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
+all lists.*/
         pub diagnostics: Diagnostics,
-        ///The same for the components of ∇u.
+        /**Standard deviation of each component of ∇u at each query.
+
+Present if `include` has `deviations` and `derivatives` is 1 or 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradient_deviations: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///For each list ∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        /**Gradients ∇u at each query for each list, unit of the values per length.
+
+Present if `derivatives` is 1 or 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        ///The same for the entries of D²u.
+        /**Standard deviation of each entry of D²u at each query.
+
+Present if `include` has `deviations` and `derivatives` is 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub hessian_deviations: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        ///For each list D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        /**Hessians D²u at each query for each list, unit of the values per length squared.
+
+Present if `derivatives` is 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub hessians: ::std::vec::Vec<
             ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
         >,
-        ///For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /**The mean of each function, a row per list. Absent if the mean is 0.
+
+A row is the constant, followed by a slope per coordinate if the mean is linear.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_coefficients: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Standard deviation of any of the functions at each query given its values, under the kernel as covariance and alpha as variance of the
-noise; with `deviations`.*/
+        /**Standard deviation of each function at each query, given its values. Present if `include` has
+`deviations`.
+
+The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
+deviations.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub value_deviations: ::std::vec::Vec<f64>,
-        ///For each list u at each query.
+        ///Values u at each query, a row per list.
         pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
     }
     impl InterpolationBatchResponse {
@@ -833,40 +885,45 @@ noise; with `deviations`.*/
             Default::default()
         }
     }
-    ///Values at the points of a cloud, and where the function through them is wanted.
+    ///Values at the points of a cloud, and queries at which to evaluate the function through them.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct InterpolationRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///0 for values, 1 for gradients as well, 2 for Hessians as well; 0 if absent.
+        ///The highest order of derivatives: 0 for values, 1 adds gradients, 2 adds Hessians. Default: 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub derivatives: ::std::option::Option<i32>,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside what was asked for; nothing if absent.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the function; a constant if absent with the kernel, else 0.
+        ///The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points, in their order.
@@ -880,22 +937,27 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     ///The interpolant (regression function, if alpha > 0) at the queries.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct InterpolationResponse {
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        ///The same for the components of ∇u.
+        /**Standard deviation of each component of ∇u at each query.
+
+Present if `include` has `deviations` and `derivatives` is 1 or 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradient_deviations: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///∇u at each query, unit of the values per length; with `derivatives` of 1 or 2.
+        ///∇u at each query, unit of the values per length. Present if `derivatives` is 1 or 2.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///The same for the entries of D²u.
+        /**Standard deviation of each entry of D²u at each query.
+
+Present if `include` has `deviations` and `derivatives` is 2.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub hessian_deviations: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        ///D²u at each query, unit of the values per length squared; with `derivatives` of 2.
+        ///D²u at each query, unit of the values per length squared. Present if `derivatives` is 2.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub hessians: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        /**Standard deviation of u at each query given the values, under the kernel as covariance and alpha as variance of the noise; with
-`deviations`.*/
+        /**Standard deviation of u at each query, given the values. Present if `include` has `deviations`.
+
+The kernel is taken as covariance, and alpha as variance of the noise.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub value_deviations: ::std::vec::Vec<f64>,
         ///u at each query.
@@ -909,22 +971,22 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     ///A job.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Job {
-        ///When it was asked for, in UTC.
+        ///The time at which the job was requested, in UTC.
         pub created_at: ::chrono::DateTime<::chrono::offset::Utc>,
-        ///When it ended, in UTC; absent before.
+        ///The time at which the job ended, in UTC. Absent before.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub ended_at: ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
-        ///Until when its result is kept, in UTC; absent before there is one.
+        ///The time until which the result is kept, in UTC. Absent before there is a result.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub expires_at: ::std::option::Option<::chrono::DateTime<::chrono::offset::Utc>>,
         ///The id of the job.
         pub job_id: JobId,
-        ///Why it failed: the problem that the request would have been answered with.
+        ///The problem that made the job fail, and that the request would have been answered with.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub problem: ::std::option::Option<Problem>,
-        ///How far it is.
+        ///The progress of the job.
         pub progress: JobProgress,
-        ///Where it is.
+        ///The state of the job.
         pub status: JobStatus,
     }
     impl Job {
@@ -996,18 +1058,20 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 })
         }
     }
-    ///How far a job is.
+    ///The progress of a job.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct JobProgress {
-        ///The part of the time it is expected to take that has gone by, from 0 to 1.
+        ///The elapsed part of the time that the job is expected to take, from 0 to 1.
         pub fraction: f64,
-        ///Of the last solve, relative; absent before there is one.
+        ///Relative residual of the last solve. Absent before there is one.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub residual: ::std::option::Option<f64>,
-        ///Seconds until it is done, by what ran on this machine; absent while that is unknown.
+        ///Seconds until the job is done, predicted from what ran on this machine. Absent while unknown.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub seconds_left: ::std::option::Option<f64>,
-        ///What is being done: `queued`, then the stages of `Server-Timing`: `parse`, `gram`, `factor`, `solve`, `evaluate`; `done` in the end.
+        /**The current stage: `queued`, `parse`, `gram`, `factor`, `solve`, `evaluate`, or `done` in the end.
+
+Stages from `parse` to `evaluate` are those of `Server-Timing`.*/
         pub stage: ::std::string::String,
     }
     impl JobProgress {
@@ -1015,7 +1079,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///Where a job is.
+    ///The state of a job.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1082,29 +1146,34 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    /**A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
+    /**A kernel `k(x, y) = variance · φ(r²)`.
+
+Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
 is refused.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct Kernel {
-        ///laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of the cloud.
+        ///laplace: φ = exp(−√(r² + epsilon)). Default: 0, which leaves a kink at the points of the cloud.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub epsilon: ::std::option::Option<f64>,
         ///The family, which determines φ.
         pub family: KernelFamily,
-        ///The length scale ℓ, in the unit of the coordinates; chosen from the cloud if absent.
+        ///The length scale ℓ, in the unit of the coordinates. Default: chosen from the cloud.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub length_scale: ::std::option::Option<f64>,
-        ///A length scale for each axis instead, in the units of the coordinates. An empty list counts as absent.
+        /**A length scale per axis, in the units of the coordinates, instead of `length_scale`. An empty list
+counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub length_scales: ::std::vec::Vec<f64>,
-        ///matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no enumerations of fractions.)
+        /**matern: the smoothness ν, one of 0.5, 1.5, …, 8.5. Default: 2.5.
+
+The schema gives a range, because generators do not support enumerations of fractions.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
-        ///wendland: 2, 4 or 6 times differentiable; 4 if absent.
+        ///wendland: 2, 4 or 6 times differentiable. Default: 4.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub smoothness: ::std::option::Option<Smoothness>,
-        ///The factor of φ, unit of the values squared; 1 if absent.
+        ///The factor of φ, unit of the values squared. Default: 1.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub variance: ::std::option::Option<f64>,
     }
@@ -1116,18 +1185,22 @@ is refused.*/
     ///A family of kernels.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct KernelDescription {
-        ///Whether it has derivatives at the points of the cloud, as geometry and operators need there.
+        /**The condition under which the kernel has derivatives at the points of the cloud.
+
+Geometry and operators need derivatives there.*/
         pub differentiable_at_points: ::std::string::String,
-        ///The name in a kernel object.
+        ///The name of the family in a kernel object.
         pub family: KernelFamily,
-        ///φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel is variance · φ.
+        /**φ as a function of r. The kernel is variance · φ(r).
+
+r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c².*/
         pub formula: ::std::string::String,
-        ///The greatest dimension in which it is positive definite; absent if every one.
+        ///The largest dimension in which the kernel is positive definite. Absent if there is no limit.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub max_dimension: ::std::option::Option<u64>,
         ///Parameters beside `length_scale`, or `length_scales`, and `variance`.
         pub parameters: ::std::vec::Vec<KernelParameter>,
-        ///How smooth functions fitted with it are.
+        ///The smoothness of functions fitted with the kernel.
         pub smoothness: ::std::string::String,
     }
     impl KernelDescription {
@@ -1135,7 +1208,7 @@ is refused.*/
             Default::default()
         }
     }
-    ///The families of kernels; `GET /v1/kernels` has their formulas.
+    ///The families of kernels. `GET /v1/kernels` has their formulas.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1202,10 +1275,10 @@ is refused.*/
             value.parse()
         }
     }
-    ///All families.
+    ///All kernel families.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct KernelList {
-        ///The families, in the order of their names in the documentation.
+        ///The families, in the order in which the documentation names them.
         pub kernels: ::std::vec::Vec<KernelDescription>,
     }
     impl KernelList {
@@ -1213,14 +1286,14 @@ is refused.*/
             Default::default()
         }
     }
-    ///A parameter that a family takes beside `length_scale` and `variance`.
+    ///A parameter of a kernel family beside `length_scale` and `variance`.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct KernelParameter {
-        ///The value if absent.
+        ///The default.
         pub default: f64,
-        ///Its name in a kernel object.
+        ///The name of the parameter in a kernel object.
         pub name: ::std::string::String,
-        ///The values it may take.
+        ///The values that the parameter may take.
         pub range: ::std::string::String,
     }
     impl KernelParameter {
@@ -1228,7 +1301,7 @@ is refused.*/
             Default::default()
         }
     }
-    ///The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+    ///The kernel that was used, with every number. Sent back as `kernel`, it gives the same answer.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct KernelUsed {
         ///laplace: φ = exp(−√(r² + epsilon)).
@@ -1236,16 +1309,16 @@ is refused.*/
         pub epsilon: ::std::option::Option<f64>,
         ///The family, which determines φ.
         pub family: KernelFamily,
-        ///The length scale ℓ, in the unit of the coordinates; absent where each axis has its own.
+        ///The length scale ℓ, in the unit of the coordinates. Absent if each axis has its own.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub length_scale: ::std::option::Option<f64>,
-        ///The length scale of each axis, where each has its own.
+        ///The length scale of each axis, if each has its own.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub length_scales: ::std::vec::Vec<f64>,
         ///matern: the smoothness ν.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub nu: ::std::option::Option<f64>,
-        ///wendland: how often differentiable.
+        ///wendland: how many times the kernel is differentiable.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub smoothness: ::std::option::Option<Smoothness>,
         ///The factor of φ, unit of the values squared.
@@ -1256,40 +1329,49 @@ is refused.*/
             Default::default()
         }
     }
-    ///A cloud of nodes on a surface, and where rows of its Laplace–Beltrami matrix are wanted.
+    ///A cloud of nodes on a surface, and queries for the rows of its Laplace–Beltrami matrix.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiMatrixRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///Retired: a matrix of this path is dense. Sparse ones are answered by `/v1/laplace-beltrami/sparse-matrix`.
+        /**Deprecated: matrices of this path are dense. For sparse ones, use
+`/v1/laplace-beltrami/sparse-matrix`.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub format: ::std::option::Option<MatrixFormat>,
-        ///The surface, where its fit differs from that of the values.
+        ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        /**The mean of the functions through the values. Default: 0.
+
+With a constant mean, the matrix maps constants to exactly 0.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        /**The points to compute rows for, one row of the matrix each. Default: the points of the surface's
+cloud.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -1303,10 +1385,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub struct LaplaceBeltramiMatrixResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        /**Rows are queries, columns are the points of `cloud`, 1/length²; a row is null where there is no normal. Not symmetric
-in general.*/
+        /**The matrix, unit 1/length². Rows are queries, and columns are the points of `cloud`.
+
+A row is null where there is no normal. The matrix is not symmetric in general.*/
         pub matrix: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
     }
     impl LaplaceBeltramiMatrixResponse {
@@ -1314,40 +1397,45 @@ in general.*/
             Default::default()
         }
     }
-    ///Values on a surface, and where their Laplace–Beltrami operator is wanted.
+    ///Values on a surface, and queries at which to compute their Laplace–Beltrami operator.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The surface, where its fit differs from that of the values.
+        ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///What is wanted beside; nothing if absent.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the function; a constant if absent with the kernel, else 0.
+        ///The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the surface's cloud if absent.
+        ///The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points of `cloud`, in their order.
@@ -1363,13 +1451,15 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub struct LaplaceBeltramiResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        /**Standard deviation of Δu given the values and, as far as its deviations are known, the surface; null where there is no
-answer or no deviation; with `deviations`.*/
+        /**Standard deviation of Δu at each query. Present if `include` has `deviations`.
+
+It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+the surface. Null where there is no answer or no deviation.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub value_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///Δu at each query, unit of the values per length squared; null where there is no normal.
+        ///Δu at each query, unit of the values per length squared. Null where there is no normal.
         pub values: ::std::vec::Vec<::std::option::Option<f64>>,
     }
     impl LaplaceBeltramiResponse {
@@ -1377,39 +1467,45 @@ answer or no deviation; with `deviations`.*/
             Default::default()
         }
     }
-    ///Nodes and queries of the operator as a sparse matrix.
+    ///A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct LaplaceBeltramiSparseMatrixRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The surface, where it is not that of the request.
+        ///The surface, if it differs from that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where rows are wanted; the points of the surface if absent.
+        ///The points to compute rows for, one row of the matrix each. Default: the points of the surface.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-learn the same.*/
+        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+
+Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+the same sites and the points around them.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -1421,17 +1517,19 @@ learn the same.*/
     ///The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct LaplaceBeltramiSparseMatrixResponse {
-        ///The entries row by row, 1/length²: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
+        /**The entries row by row, 1/length².
+
+In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.*/
         pub data: ::std::vec::Vec<f64>,
         ///The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the surface came about.
+        ///The numbers used for the surface, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
         ///The column of each entry, from 0, ascending within a row.
         pub indices: ::std::vec::Vec<i64>,
-        ///Where each row begins among the entries, and how many there are, from 0.
+        ///The position of the first entry of each row, from 0, and the number of all entries at the end.
         pub indptr: ::std::vec::Vec<i64>,
-        ///Queries, nodes.
+        ///The number of queries and the number of nodes.
         pub shape: ::std::vec::Vec<i64>,
     }
     impl LaplaceBeltramiSparseMatrixResponse {
@@ -1439,14 +1537,14 @@ learn the same.*/
             Default::default()
         }
     }
-    ///What each value is predicted to be from all others.
+    ///Predictions of each value from all others.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct LeftOut {
         ///The logarithms of the densities of the values under their predictions.
         pub log_predictive_densities: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///The predictions, in the order of the points; null where the mean is not determined without the point.
+        ///The predictions, in the order of the points. Null where the mean is not determined without the point.
         pub means: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///The variances of the values predicted, their noise included.
+        ///The variances of the predicted values, noise included.
         pub variances: ::std::vec::Vec<::std::option::Option<f64>>,
     }
     impl LeftOut {
@@ -1454,7 +1552,7 @@ learn the same.*/
             Default::default()
         }
     }
-    ///How a matrix is written.
+    ///The layout of a matrix.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1505,7 +1603,7 @@ learn the same.*/
             value.parse()
         }
     }
-    ///The mean of a function: what it is made of beside the kernel, and tends to far from the points.
+    ///The mean of a function: its part beside the kernel, which it tends to far from the points.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1564,50 +1662,63 @@ learn the same.*/
             value.parse()
         }
     }
-    ///Values at the points of a cloud, and what may be chosen to explain them. The search begins with `kernel` and `alpha`.
+    /**Values at the points of a cloud, and the parameters that may vary to explain them.
+
+The search begins with `kernel` and `alpha`.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct ModelSelectionRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What is made as great as possible; the marginal likelihood if absent.
+        ///The score to maximize. Default: the marginal likelihood.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub criterion: ::std::option::Option<SelectionCriterion>,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///Families to try, with the parameters of `kernel` where it is of that family; that of the start alone if absent, and matern where nu varies.
+        /**Kernel families to try. Default: that of the start, and `matern` if `nu` varies.
+
+A family takes the parameters of `kernel` if `kernel` is of that family.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub families: ::std::vec::Vec<KernelFamily>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the function; a constant if absent with the kernel, else 0.
+        ///The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Further starts for each family, spread over the bounds; 2 if absent.
+        ///Number of further starts for each family, spread over the bounds. Default: 2.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub restarts: ::std::option::Option<i32>,
-        ///Where the further starts are; 0 if absent.
+        ///The seed that determines the further starts. Default: 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub seed: ::std::option::Option<i64>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points, in their order.
         pub values: ::std::vec::Vec<f64>,
-        /**What is free, and its bounds; 64 entries at most. Absent: length scale, or that of each axis where `kernel` has them, and variance, from a
-hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a millionth of where it begins, or
-of a millionth of the variance if that is more, to a hundred times the variance.*/
+        /**The free parameters and their bounds, at most 64 entries. Default: length scale, variance, alpha.
+
+By default, length scale and variance may become up to a hundred times smaller or larger than at
+the start. If `kernel` has a length scale per axis, each of them varies. Alpha varies unless noise
+is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
+variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
+variance if that is more.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub vary: ::std::vec::Vec<FreeParameter>,
     }
@@ -1616,33 +1727,38 @@ of a millionth of the variance if that is more, to a hundred times the variance.
             Default::default()
         }
     }
-    ///What explains the values best.
+    ///The selected kernel and noise, with scores and predictions.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct ModelSelectionResponse {
-        ///The variance of the noise that was selected; absent with `noise_variances`.
+        ///The selected variance of the noise. Absent with `noise_variances`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///Whether no slope is left to follow within the bounds.
+        ///True if no slope is left to follow within the bounds.
         pub converged: bool,
-        ///Of the fit that the search began with.
+        ///Diagnostics of the fit that the search began with.
         pub diagnostics: Diagnostics,
-        ///How often the criterion was evaluated.
+        ///Number of evaluations of the score.
         pub evaluations: u64,
         ///The families that were tried.
         pub families: ::std::vec::Vec<FamilyScore>,
-        /**Derivatives of the score in the logarithms of what is free, in the order of `vary`; for `length_scales` without an axis, in that of a factor
-of all; null for nu, which takes steps.*/
+        /**Derivatives of the score in the logarithms of the free parameters, in the order of `vary`.
+
+For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
+length scales. Null for `nu`, which takes steps.*/
         pub gradient: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///The kernel that was selected: sent as `kernel` it is used.
+        ///The selected kernel. Sent as `kernel` of a request, it is used as it is.
         pub kernel: KernelUsed,
-        ///Each value predicted from all others, in closed form.
+        ///Predictions of each value from all others, in closed form.
         pub leave_one_out: LeftOut,
-        ///The mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /**The mean of the function: the constant, then a slope per coordinate if it is linear. Absent if the
+mean is 0.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_coefficients: ::std::vec::Vec<f64>,
-        ///The criterion over alpha, ascending, all else being as selected; empty with `noise_variances`, and beyond 3,000 points.
+        /**The score over ascending alpha, with everything else as selected.
+
+Empty with `noise_variances`, and for more than 3,000 points.*/
         pub path: ::std::vec::Vec<PathEntry>,
-        ///The criterion there; greater is better.
+        ///The score of the selection. Greater is better.
         pub score: f64,
     }
     impl ModelSelectionResponse {
@@ -1650,45 +1766,51 @@ of all; null for nu, which takes steps.*/
             Default::default()
         }
     }
-    ///A cloud that samples a hypersurface, and where its normals are wanted.
+    ///A cloud that samples a hypersurface, and queries at which to compute its normals.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct NormalsRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside what every answer has.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<GeometryInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Which way normals point; `outward` if absent.
+        ///The direction of normals. Default: `outward`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub orientation: ::std::option::Option<OrientationChoice>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to compute at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-learn the same.*/
+        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+
+Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+the same sites and the points around them.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///Which function's level surface is meant; `auto` if absent.
+        ///The function whose level set is the surface. Default: `auto`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub surface: ::std::option::Option<SurfaceChoice>,
     }
@@ -1702,19 +1824,23 @@ learn the same.*/
     pub struct NormalsResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        ///|∇u| of the function in `surfaces` at each query: 1/length for `signature`, about 1 for `offset`.
+        /**|∇u| at each query for the function in `surfaces`: unit 1/length for `signature`, about 1 for
+`offset`.*/
         pub gradient_norms: ::std::vec::Vec<f64>,
         ///The signature function at each query: 1 on the surface, usually more inside a closed one.
         pub levels: ::std::vec::Vec<f64>,
-        /**Standard deviation of the angle of the normal at each query, radians: within 1.96 of it lie 95 % of the angles; null where
-there is no answer or none is known.*/
+        /**Standard deviation of the angle of the normal at each query, radians.
+
+95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
+deviation is not known.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub normal_deviations: ::std::vec::Vec<::std::option::Option<f64>>,
-        ///The normal at each query, of length 1; null where there is none.
+        ///The normal at each query, of length 1. Null where there is none.
         pub normals: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
-        ///The function whose level surface was used at each query; `signature` where there is no answer.
+        /**The function whose level surface was used at each query. It is `signature` where there is no
+answer.*/
         pub surfaces: ::std::vec::Vec<SurfaceUsed>,
     }
     impl NormalsResponse {
@@ -1839,7 +1965,7 @@ there is no answer or none is known.*/
             value.parse()
         }
     }
-    ///Which way normals point.
+    ///The direction of normals.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -1894,12 +2020,12 @@ there is no answer or none is known.*/
             value.parse()
         }
     }
-    ///The criterion at one alpha, all else being as it was selected.
+    ///The score at one alpha, with everything else as selected.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct PathEntry {
-        ///α.
+        ///The variance of the noise, α.
         pub alpha: f64,
-        ///The score; null where the matrix is not positive definite.
+        ///The score. Null where the matrix is not positive definite.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub score: ::std::option::Option<f64>,
     }
@@ -1908,49 +2034,58 @@ there is no answer or none is known.*/
             Default::default()
         }
     }
-    ///Many lists of noisy values at the points of a cloud, and where their posteriors are wanted.
+    ///Many lists of noisy values at the points of a cloud, and queries for their posteriors.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct PosteriorBatchRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside the means; nothing if absent.
+        ///Optional parts of the answer beside the means. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<PosteriorQuantity>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of each process; a constant if absent with the kernel, else 0.
+        ///The mean of each process. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Probabilities between 0 and 1 of which the quantiles of the latent functions are wanted; none if absent. An empty list counts as absent.
+        /**Probabilities between 0 and 1 for quantiles of the latent functions. Default: none.
+
+An empty list counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub quantiles: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///Draws of each latent function at all queries together; none if absent.
+        ///Joint draws of each latent function at all queries. Default: none.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub samples: ::std::option::Option<Samples>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
-        ///Lists of observed values, one per point each, in their order. They have kernel and noise in common.
+        /**Lists of observed values. Each has a value per point, in the order of the points.
+
+All lists have kernel and noise in common.*/
         pub values: ::std::vec::Vec<::std::vec::Vec<f64>>,
     }
     impl PosteriorBatchRequest {
@@ -1958,38 +2093,43 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///The Gaussian processes given the values. Lists of values have their own rows in what depends on values; the rest they share.
+    /**The Gaussian processes given the values.
+
+Each list has its own rows in everything that depends on its values. The lists share the rest.*/
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct PosteriorBatchResponse {
         ///The covariance of the latent functions between queries.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub covariance: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the answer came about; `relative_residual` is the greatest of all lists.
+        /**The numbers used, the method, its accuracy, and warnings. `relative_residual` is the largest of
+all lists.*/
         pub diagnostics: Diagnostics,
-        ///For each list the probability that a new observation exceeds `threshold`, at each query.
+        ///The probability that a new observation exceeds `threshold` at each query, a row per list.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub exceedance_probabilities: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The variances of the components of the latent functions' gradients at each query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradient_variances: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///For each list the gradient of the mean at each query.
+        ///The gradient of the mean at each query, for each list.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        ///For each list −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        ///The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub log_marginal_likelihoods: ::std::vec::Vec<f64>,
-        ///For each list the mean of the function: the constant, then a slope for each coordinate if it is linear; absent where it is 0.
+        /**The mean of each function, a row per list. Absent if the mean is 0.
+
+A row is the constant, followed by a slope per coordinate if the mean is linear.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub mean_coefficients: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///For each list the posterior mean at each query.
+        ///The posterior mean at each query, a row per list.
         pub means: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The variance of a new observation at each query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub observation_variances: ::std::vec::Vec<f64>,
-        ///For each list quantiles of the latent function, one row for each probability, a number per query.
+        ///Quantiles of the latent function for each list. A probability is a row, with a number per query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub quantiles: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
-        ///For each list draws of the latent function, one row each, a number per query.
+        ///Draws of the latent function for each list. A draw is a row, with a number per query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub samples: ::std::vec::Vec<::std::vec::Vec<::std::vec::Vec<f64>>>,
         ///The variance of the latent functions at each query.
@@ -2001,7 +2141,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///What may be asked of a posterior beside its mean.
+    ///Optional parts of a posterior, beside its mean.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2072,46 +2212,53 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    ///Noisy values at the points of a cloud, and where the posterior is wanted.
+    ///Noisy values at the points of a cloud, and queries for the posterior.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct PosteriorRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///What is wanted beside the mean; nothing if absent.
+        ///Optional parts of the answer beside the mean. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<PosteriorQuantity>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the process; a constant if absent with the kernel, else 0.
+        ///The mean of the process. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Probabilities between 0 and 1 of which the quantiles of the latent function are wanted; none if absent. An empty list counts as absent.
+        /**Probabilities between 0 and 1 for quantiles of the latent function. Default: none.
+
+An empty list counts as absent.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub quantiles: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the cloud if absent.
+        ///The points to evaluate at, one row of coordinates each. Default: the points of the cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///Draws of the latent function at all queries together; none if absent.
+        ///Joint draws of the latent function at all queries. Default: none.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub samples: ::std::option::Option<Samples>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
-        ///What a new observation is to exceed, unit of the values, for `exceedance_probabilities`.
+        ///The threshold of `exceedance_probabilities` for a new observation, unit of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub threshold: ::std::option::Option<f64>,
         ///The observed values at the points, in their order.
@@ -2128,7 +2275,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The covariance of the latent function between queries.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub covariance: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
         ///The probability that a new observation exceeds `threshold`, at each query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
@@ -2139,7 +2286,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The gradient of the mean at each query, unit of the values per length.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradients: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///−½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        ///The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub log_marginal_likelihood: ::std::option::Option<f64>,
         ///The posterior mean at each query, unit of the values.
@@ -2147,10 +2294,10 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///The variance of a new observation at each query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub observation_variances: ::std::vec::Vec<f64>,
-        ///Quantiles of the latent function, one row for each probability, a number per query.
+        ///Quantiles of the latent function. A probability is a row, with a number per query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub quantiles: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///Draws of the latent function, one row each, a number per query.
+        ///Draws of the latent function. A draw is a row, with a number per query.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub samples: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The variance of the latent function at each query, no noise added, unit of the values squared.
@@ -2165,7 +2312,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     ///A problem document (RFC 9457, `application/problem+json`).
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Problem {
-        ///What happened in this request, where, and the remedy where there is one.
+        ///The specifics of this occurrence: what happened, where, and the remedy if there is one.
         pub detail: ::std::string::String,
         ///The fields that were refused.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
@@ -2178,17 +2325,17 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
         ///An alpha for which the computation succeeds, unit of the values squared.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub minimum_alpha: ::std::option::Option<f64>,
-        ///The points in question, by position in the cloud; at most the first 1,000.
+        ///The points in question, as positions in the cloud. At most the first 1,000.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub point_indices: ::std::vec::Vec<u64>,
-        ///What the request would have needed, in the same unit.
+        ///The size that the request would have needed, in the unit of `limit`.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub required: ::std::option::Option<i64>,
-        ///The HTTP status, repeated.
+        ///The HTTP status code of the response.
         pub status: i32,
-        ///The kind of problem in words, the same for every occurrence.
+        ///The type of problem in words, the same for every occurrence.
         pub title: ::std::string::String,
-        ///The kind of problem: `/problems/<slug>`, served as a page.
+        ///The type of problem: `/problems/<slug>`, which is also served as a page.
         #[serde(rename = "type")]
         pub type_: ::std::string::String,
     }
@@ -2197,13 +2344,16 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///How many functions to draw from the posterior, and which.
+    ///Functions to draw from the posterior: their number and a seed.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct Samples {
-        ///Functions to draw.
+        ///Number of functions to draw.
         pub count: ::std::num::NonZeroU64,
-        ///Equal seeds give equal draws on processors of one kind, and more of them begin with the same ones; 0 if absent.
+        /**The seed of the draws. Default: 0.
+
+Equal seeds give equal draws on processors of one kind. A larger `count` begins with the draws of a
+smaller one.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub seed: ::std::option::Option<i64>,
     }
@@ -2212,7 +2362,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///What is made as great as possible.
+    ///The score that a selection maximizes.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2273,7 +2423,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    ///What may be free.
+    ///A parameter that may be free.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2380,7 +2530,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
                 .map_err(|e| { <D::Error as ::serde::de::Error>::custom(e.to_string()) })
         }
     }
-    ///How the linear system is solved.
+    ///The method that solves the linear system.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2439,7 +2589,9 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    ///The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
+    /**The solver that was used.
+
+`landmark` and `iterative` are reserved: no answer has them yet.*/
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2502,14 +2654,14 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    ///Distances from each point to the nearest point elsewhere.
+    ///Statistics of the distance from each point to the nearest point elsewhere.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Spacing {
-        ///The greatest of them.
+        ///The largest distance.
         pub max: f64,
-        ///The middle one.
+        ///The median distance.
         pub median: f64,
-        ///The least of them.
+        ///The smallest distance.
         pub min: f64,
     }
     impl Spacing {
@@ -2517,18 +2669,20 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///Rows of a sparse operator by how their weights came about.
+    ///Number of rows of a sparse operator by how their weights were computed.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct StencilsUsed {
         ///Rows without entries.
         pub empty: u64,
-        ///Polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones lie on one side.
+        /**Polyharmonic splines on nodes that thin out with distance, used where the nearest nodes lie on one
+side.*/
         pub graded: u64,
-        ///Least squares of the least norm, where the nodes do not determine derivatives.
+        ///Least squares of least norm, used where the nodes do not determine derivatives.
         pub least_norm: u64,
         ///Polyharmonic splines on the nearest nodes: the ordinary row.
         pub nearest: u64,
-        ///Weights without negative ones beside the diagonal, where no splines give a stable row, as at a rim.
+        /**Weights that are not negative beside the diagonal, used where no splines give a stable row, as at a
+rim.*/
         pub positive: u64,
     }
     impl StencilsUsed {
@@ -2536,7 +2690,7 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             Default::default()
         }
     }
-    ///Which function's level surface is meant.
+    ///The function whose level set is the surface.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2599,37 +2753,45 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
             value.parse()
         }
     }
-    ///A cloud of nodes on a surface, and where rows of its surface gradient matrices are wanted.
+    ///A cloud of nodes on a surface, and queries for the rows of its surface gradient matrices.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientMatrixRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The surface, where its fit differs from that of the values.
+        ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the functions through the values; 0 if absent. With a constant the matrix makes constants exactly 0.
+        /**The mean of the functions through the values. Default: 0.
+
+With a constant mean, the matrix maps constants to exactly 0.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted, one row each; the points of the surface's cloud if absent.
+        /**The points to compute rows for, one row of each matrix. Default: the points of the surface's
+cloud.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -2643,10 +2805,11 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub struct SurfaceGradientMatrixResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        /**One matrix per coordinate, rows are queries, columns are the points of `cloud`, 1/length; a row is null where there
-is no normal.*/
+        /**A matrix per coordinate, unit 1/length. Rows are queries, and columns are the points of `cloud`.
+
+A row is null where there is no normal.*/
         pub matrices: ::std::vec::Vec<
             ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
         >,
@@ -2656,40 +2819,45 @@ is no normal.*/
             Default::default()
         }
     }
-    ///Values on a surface, and where their surface gradient is wanted.
+    ///Values on a surface, and queries at which to compute their surface gradient.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The surface, where its fit differs from that of the values.
+        ///The surface, if its fit differs from that of the values.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        ///What is wanted beside; nothing if absent.
+        ///Optional parts of the answer. Default: none.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub include: ::std::vec::Vec<ValuesInclude>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
-        ///The mean of the function; a constant if absent with the kernel, else 0.
+        ///The mean of the function. Default: a constant if `kernel` is absent too, else 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub mean: ::std::option::Option<MeanChoice>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where answers are wanted; the points of the surface's cloud if absent.
+        ///The points to compute at, one row of coordinates each. Default: the points of the surface's cloud.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
         ///The values at the points of `cloud`, in their order.
@@ -2705,15 +2873,17 @@ they are given, the noise and a constant mean. The diagnostics repeat all of it.
     pub struct SurfaceGradientResponse {
         ///The queries where geometry has no meaning (null), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the answer came about.
+        ///The numbers used, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
-        /**Standard deviation of each component given the values and, as far as its deviations are known, the surface; null where there is no
-answer or no deviation; with `deviations`.*/
+        /**Standard deviation of each component at each query. Present if `include` has `deviations`.
+
+It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+the surface. Null where there is no answer or no deviation.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub gradient_deviations: ::std::vec::Vec<
             ::std::option::Option<::std::vec::Vec<f64>>,
         >,
-        ///∇u − (∇u·ν)ν at each query, unit of the values per length; null where there is no normal.
+        ///∇u − (∇u·ν)ν at each query, unit of the values per length. Null where there is no normal.
         pub gradients: ::std::vec::Vec<::std::option::Option<::std::vec::Vec<f64>>>,
     }
     impl SurfaceGradientResponse {
@@ -2721,39 +2891,45 @@ answer or no deviation; with `deviations`.*/
             Default::default()
         }
     }
-    ///Nodes and queries of the operator as a sparse matrix.
+    ///A cloud of nodes on a surface, and queries for the rows of its sparse surface gradient matrices.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     #[serde(deny_unknown_fields)]
     pub struct SurfaceGradientSparseMatrixRequest {
-        /**Added to the diagonal of the Gram matrix as given, unit of the values squared: 0 interpolates, the variance
-of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their likelihood, or
-chosen by the noise of the points of a surface, 1e-3 at least.*/
+        /**Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+surfaces it follows the noise of the points and is at least 1e-3.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub alpha: ::std::option::Option<f64>,
-        ///The points where values are known, or that sample the surface.
+        ///The points at which values are known, or that sample the surface.
         pub cloud: CloudRef,
-        ///What to do with points that coincide when alpha is 0.
+        ///The treatment of points that coincide when alpha is 0.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub duplicates: ::std::option::Option<DuplicatePolicy>,
-        ///The surface, where it is not that of the request.
+        ///The surface, if it differs from that of the request.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub geometry: ::std::option::Option<Geometry>,
-        /**The kernel. Absent, it is chosen: for a surface from the cloud, for values by their likelihood, with its variance and, unless
-they are given, the noise and a constant mean. The diagnostics repeat all of it.*/
+        /**The kernel. If absent, it is chosen.
+
+A surface's kernel is chosen from the cloud. A kernel for values is chosen by their
+likelihood, together with its variance and, unless they are given, the noise and a constant
+mean. The diagnostics repeat all of it.*/
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub kernel: ::std::option::Option<Kernel>,
         ///The variance of the noise at each point, instead of `alpha`. An empty list counts as absent.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub noise_variances: ::std::vec::Vec<f64>,
-        ///Where rows are wanted; the points of the surface if absent.
+        ///The points to compute rows for, one row of each matrix. Default: the points of the surface.
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub queries: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        /**Where `"solver": "local"` learns noise and shape of the surface, at most 192 points of the cloud; 96 to
-191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-learn the same.*/
+        /**At most 192 points of the cloud, where `"solver": "local"` learns noise and shape of the surface.
+
+Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+the same sites and the points around them.*/
         #[serde(default, skip_serializing_if = "::std::vec::Vec::is_empty")]
         pub sites: ::std::vec::Vec<::std::vec::Vec<f64>>,
-        ///How the linear system is solved.
+        ///The method that solves the linear system.
         #[serde(skip_serializing_if = "::std::option::Option::is_none")]
         pub solver: ::std::option::Option<SolverChoice>,
     }
@@ -2762,20 +2938,20 @@ learn the same.*/
             Default::default()
         }
     }
-    ///The components of the surface gradient as sparse matrices with rows for the queries and columns for the nodes.
+    ///The components of the surface gradient as sparse matrices. Rows are queries, and columns are nodes.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct SurfaceGradientSparseMatrixResponse {
-        ///The entries row by row, 1/length, one list per component.
+        ///The entries row by row, 1/length, as a list per component.
         pub data: ::std::vec::Vec<::std::vec::Vec<f64>>,
         ///The queries where geometry has no meaning (an empty row), or less accuracy than it seems.
         pub degenerate: ::std::vec::Vec<Degenerate>,
-        ///How the surface came about.
+        ///The numbers used for the surface, the method, its accuracy, and warnings.
         pub diagnostics: Diagnostics,
         ///The column of each entry, from 0, ascending within a row.
         pub indices: ::std::vec::Vec<i64>,
-        ///Where each row begins among the entries, and how many there are, from 0.
+        ///The position of the first entry of each row, from 0, and the number of all entries at the end.
         pub indptr: ::std::vec::Vec<i64>,
-        ///Components, queries, nodes.
+        ///The number of components, of queries and of nodes.
         pub shape: ::std::vec::Vec<i64>,
     }
     impl SurfaceGradientSparseMatrixResponse {
@@ -2842,7 +3018,7 @@ learn the same.*/
             value.parse()
         }
     }
-    ///What an answer about values has beside what it always has.
+    ///Optional parts of an answer about values.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -2893,18 +3069,18 @@ learn the same.*/
             value.parse()
         }
     }
-    ///What is running.
+    ///The build that is running, and what it runs on.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Version {
-        ///The interface it serves.
+        ///The version of the interface.
         pub api: ::std::string::String,
-        ///The instruction set that the kernel loops run on, chosen at start.
+        ///The instruction set of the kernel loops, chosen at start.
         pub instruction_set: ::std::string::String,
         ///The name of the service.
         pub name: ::std::string::String,
-        ///Compute threads.
+        ///Number of compute threads.
         pub threads: u64,
-        ///Its version.
+        ///The version of the service.
         pub version: ::std::string::String,
     }
     impl Version {
@@ -2915,9 +3091,9 @@ learn the same.*/
     ///Something that was changed, or that limits the accuracy of the answer.
     #[derive(::serde::Deserialize, ::serde::Serialize, Clone, Debug)]
     pub struct Warning {
-        ///What it is about.
+        ///The subject of the warning.
         pub code: WarningCode,
-        ///The same in words, with numbers.
+        ///The warning in words, with numbers.
         pub detail: ::std::string::String,
     }
     impl Warning {
@@ -2925,7 +3101,7 @@ learn the same.*/
             Default::default()
         }
     }
-    ///What a warning is about.
+    ///The subject of a warning.
     #[derive(
         ::serde::Deserialize,
         ::serde::Serialize,
@@ -11486,7 +11662,7 @@ impl ClientHooks<()> for &Client {}
 impl Client {
     /**List clouds
 
-The clouds registered with this key, oldest first.
+Returns the clouds registered with this key, oldest first.
 
 Sends a `GET` request to `/v1/clouds`
 
@@ -11505,8 +11681,9 @@ let response = client.list_clouds()
     }
     /**Register a cloud
 
-Keeps the points under an id that is the hash of their coordinates, so that later requests need not repeat them. Posting
-the same points again answers 200 with the same id. Clouds live in a bounded store, least recently used out first.
+Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded store,
+which drops the least recently used first.
 
 Sends a `POST` request to `/v1/clouds`
 
@@ -11521,8 +11698,9 @@ let response = client.create_cloud()
     }
     /**Describe a cloud
 
-Its size, the box around it and the distances between its points, not the points. `ETag` and `If-None-Match` save the
-body; asking keeps the cloud from being dropped as the least recently used.
+Returns the size of the cloud, the box around it and the distances between its points, but not the points.
+`ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to be
+dropped.
 
 Sends a `GET` request to `/v1/clouds/{cloud_id}`
 
@@ -11539,7 +11717,7 @@ let response = client.get_cloud()
     }
     /**Delete a cloud
 
-Forgets the points and everything that was computed from them.
+Deletes the points and everything that was computed from them.
 
 Sends a `DELETE` request to `/v1/clouds/{cloud_id}`
 
@@ -11556,7 +11734,7 @@ let response = client.delete_cloud()
     }
     /**Check for a cloud
 
-As GET, without the body.
+Answers like GET on the same path, without the body.
 
 Sends a `HEAD` request to `/v1/clouds/{cloud_id}`
 
@@ -11573,7 +11751,7 @@ let response = client.check_cloud()
     }
     /**List kernels
 
-The families of kernels with their formulas, parameters and smoothness.
+Returns the kernel families with their formulas, parameters and smoothness.
 
 Sends a `GET` request to `/v1/kernels`
 
@@ -11587,9 +11765,10 @@ let response = client.list_kernels()
     }
     /**Estimate a request
 
-What another request would take, before it is sent: the body is that of the other request, with the name of its operation as one member
-more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the request itself would do. What
-would be refused is refused here as well, with the same problem; times are learned from what ran on this machine.
+Returns the cost of another request before it is sent. The body is that of the other request, with
+`operation` as a further member. Nothing is factorized. Points in the body are registered and their
+neighbours are searched, as the request itself would do. A request that would be refused is refused here
+with the same problem. Times are learned from what ran on this machine.
 
 Sends a `POST` request to `/v1/estimate`
 
@@ -11604,7 +11783,8 @@ let response = client.estimate()
     }
     /**Look at a job
 
-Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how long
+it will take.
 
 Sends a `GET` request to `/v1/jobs/{job_id}`
 
@@ -11621,7 +11801,7 @@ let response = client.get_job()
     }
     /**Delete a job
 
-Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its result.
 
 Sends a `DELETE` request to `/v1/jobs/{job_id}`
 
@@ -11638,8 +11818,9 @@ let response = client.delete_job()
     }
     /**Fetch the result of a job
 
-What the request is answered with, its problem included; a success is 200 with the media type that the request asked for. Waits for the job
-to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+Answers as the request of the job would have been answered, problems included. A success is 200 with the
+media type that the request asked for. Waits for the job to end. If that takes longer than the deadline of
+requests, the answer is 504, and the job goes on.
 
 Sends a `GET` request to `/v1/jobs/{job_id}/result`
 
@@ -11656,9 +11837,9 @@ let response = client.get_job_result()
     }
     /**Interpolate values
 
-Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at the queries. At
-alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points that are factorized, each query is
-answered from the points nearest to it.
+Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at the
+queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for clouds
+that are too large to be factorized, each query is answered from the points nearest to it.
 
 Sends a `POST` request to `/v1/interpolation`
 
@@ -11673,8 +11854,8 @@ let response = client.compute_interpolation()
     }
     /**Interpolate many lists of values
 
-As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
-solver.
+Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel that is
+not given is learned from all lists together. Batches need the dense solver.
 
 Sends a `POST` request to `/v1/interpolation/batch`
 
@@ -11689,10 +11870,14 @@ let response = client.compute_interpolation_batch()
     }
     /**Compute the Gaussian process posterior
 
-With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the posterior mean at the
-queries and, if asked for, variances, covariance, gradients with their variances, quantiles, probabilities of exceedance, joint samples and the
-log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each query is answered from the points nearest to
-it, without what takes all points or queries together: covariance, samples and likelihood.
+Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+noise_variances) is the variance of the noise. On request, the answer also has variances, covariance,
+gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log marginal
+likelihood.
+
+With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered from
+the points nearest to it. Covariance, samples and likelihood need all points or queries together, so they
+are then not available.
 
 Sends a `POST` request to `/v1/posterior`
 
@@ -11707,8 +11892,8 @@ let response = client.compute_posterior()
     }
     /**Compute Gaussian process posteriors of many lists of values
 
-As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is learned from all of them together. They need the dense
-solver.
+Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+kernel that is not given is learned from all lists together. Batches need the dense solver.
 
 Sends a `POST` request to `/v1/posterior/batch`
 
@@ -11723,10 +11908,14 @@ let response = client.compute_posterior_batch()
     }
     /**Select a model
 
-Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving one out or by generalized cross-validation: from the
-kernel of the request, or the one that is learned if there is none, and from further starts, by sequential quadratic programming with exact slopes within
-bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value predicted from all others. Every evaluation costs a
-few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent with all of them.
+Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-out or
+generalized cross-validation. The search starts from the kernel of the request, or from a learned one if
+the request has none, and from further starts. It uses sequential quadratic programming with exact slopes
+within bounds.
+
+The answer has the selection, the score over alpha, and predictions of each value from all others. Every
+evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds, select
+on a sample of the points, and send the result with all of them.
 
 Sends a `POST` request to `/v1/model-selection`
 
@@ -11741,9 +11930,10 @@ let response = client.select_model()
     }
     /**Compute normals
 
-The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the interpolant of the
-constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours and repaired; where
-the gradient of u vanishes, an offset model of the nearest points answers in its place.
+Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
+interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against
+the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points takes
+the place of u.
 
 Sends a `POST` request to `/v1/normals`
 
@@ -11758,10 +11948,11 @@ let response = client.compute_normals()
     }
     /**Compute curvatures
 
-Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator S = σPD²uP/|∇u| of
-the level surface of the signature function u, or of an offset model of the nearest points where the gradient of u
-vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around a query
-do not confirm are flagged.
+Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures. Principal
+curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the signature
+function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes the
+place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points around
+a query do not confirm are flagged.
 
 Sends a `POST` request to `/v1/curvatures`
 
@@ -11776,7 +11967,8 @@ let response = client.compute_curvatures()
     }
     /**Compute surface gradients
 
-The tangential part of the gradient of the function through the values, on the level surface of the signature function.
+Returns the tangential part of the gradient of the function through the values, on the level surface of
+the signature function.
 
 Sends a `POST` request to `/v1/surface-gradient`
 
@@ -11791,7 +11983,8 @@ let response = client.compute_surface_gradient()
     }
     /**Assemble surface gradient matrices
 
-One matrix per coordinate that turns values at the nodes into that component of the surface gradient at the queries.
+Returns a matrix per coordinate. It maps values at the nodes to that component of the surface gradient at
+the queries.
 
 Sends a `POST` request to `/v1/surface-gradient/matrix`
 
@@ -11808,8 +12001,9 @@ let response = client.assemble_surface_gradient_matrix()
     }
     /**Assemble the sparse matrix of the surface gradient
 
-Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the tangent plane: exact for
-these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes.
+Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines with
+polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third order
+for second derivatives. The matrices need no kernel for values and take any number of nodes.
 
 Sends a `POST` request to `/v1/surface-gradient/sparse-matrix`
 
@@ -11826,8 +12020,8 @@ let response = client.assemble_surface_gradient_sparse_matrix()
     }
     /**Compute the Laplace–Beltrami operator
 
-Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the signature function. On
-the unit circle Δ cos θ = −cos θ.
+Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level surface of
+the signature function. On the unit circle Δ cos θ = −cos θ.
 
 Sends a `POST` request to `/v1/laplace-beltrami`
 
@@ -11842,7 +12036,8 @@ let response = client.compute_laplace_beltrami()
     }
     /**Assemble the Laplace–Beltrami matrix
 
-The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square, or not.
+Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries. The
+matrix need not be square.
 
 Sends a `POST` request to `/v1/laplace-beltrami/matrix`
 
@@ -11859,10 +12054,13 @@ let response = client.assemble_laplace_beltrami_matrix()
     }
     /**Assemble the sparse matrix of the Laplace–Beltrami operator
 
-Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4 over the tangent plane: exact
-for these, of third order for second derivatives. It needs no kernel for values and takes any number of nodes. Over the nodes
-themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows at a rim are those of a
-boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each kind.
+Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed polyharmonic
+splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of
+third order for second derivatives. The matrix needs no kernel for values and takes any number of nodes.
+
+If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for time
+steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are flagged.
+`diagnostics.stencils` counts rows of each kind.
 
 Sends a `POST` request to `/v1/laplace-beltrami/sparse-matrix`
 
@@ -11879,7 +12077,7 @@ let response = client.assemble_laplace_beltrami_sparse_matrix()
     }
     /**Check that the process lives
 
-200 as long as it answers at all, whatever it is busy with.
+Answers 200 as long as the process answers at all, whatever it is busy with.
 
 Sends a `GET` request to `/health/live`
 
@@ -11893,8 +12091,12 @@ let response = client.check_live()
     }
     /**Check that the process takes requests
 
-503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the store is required, while that
-does not take what it is given.
+Answers 503 in each of these cases:
+
+- the queue is full
+- the process shuts down
+- the compute threads make no progress
+- the store is required and does not take what it is given
 
 Sends a `GET` request to `/health/ready`
 
@@ -11908,7 +12110,8 @@ let response = client.check_ready()
     }
     /**Describe the build
 
-The version of the service and what it chose to run on this machine.
+Returns the version of the service, and the instruction set and number of threads that it chose on this
+machine.
 
 Sends a `GET` request to `/version`
 

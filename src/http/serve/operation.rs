@@ -251,28 +251,30 @@ async fn prepare<O: Operation>(
     let flops = intake.body.flops_to_parse();
     let parse = move |observer: &JobObserver| {
         let (request, memory) = parsed(intake, &shared, observer)?;
-        let elsewhere = ids_not_in_memory(&shared, admitted.owner, &request);
-        if !elsewhere.is_empty() {
-            return Ok(Parsed::Elsewhere(Box::new(request), memory, elsewhere));
+        let absent = ids_not_in_memory(&shared, admitted.owner, &request);
+        if !absent.is_empty() {
+            return Ok(Parsed::NotInMemory(Box::new(request), memory, absent));
         }
         planned::<O>((&shared, &admitted), (request, memory), Vec::new(), wanted, began, observer)
+            .map(Parsed::Planned)
     };
-    let mut parsed = app.compute.run(admission, flops, parse).await?.0?;
-    if let Parsed::Elsewhere(request, memory, ids) = parsed {
-        let mut found = Vec::new();
-        for id in ids {
-            found.extend(find_cloud(app, admission, id).await?);
+    let planned = match app.compute.run(admission, flops, parse).await?.0? {
+        Parsed::Planned(planned) => planned,
+        Parsed::NotInMemory(request, memory, ids) => {
+            let mut found = Vec::new();
+            for id in ids {
+                found.extend(find_cloud(app, admission, id).await?);
+            }
+            let (shared, admitted) = (app.clone(), admission.clone());
+            let plan = move |observer: &JobObserver| {
+                planned::<O>((&shared, &admitted), (*request, memory), found, wanted, began, observer)
+            };
+            app.compute.run(admission, 0.0, plan).await?.0?
         }
-        let (shared, admitted) = (app.clone(), admission.clone());
-        let plan = move |observer: &JobObserver| {
-            planned::<O>((&shared, &admitted), (*request, memory), found, wanted, began, observer)
-        };
-        parsed = app.compute.run(admission, 0.0, plan).await?.0?;
-    }
-    let (mut plan, memory, fresh) = match parsed {
-        Parsed::Done(prepared) => return Ok(prepared),
-        Parsed::Lacking(plan, memory, fresh) => (plan, memory, fresh),
-        Parsed::Elsewhere(..) => return Err(Problem::internal()),
+    };
+    let (mut plan, memory, fresh) = match planned {
+        Planned::Done(prepared) => return Ok(prepared),
+        Planned::Lacking(plan, memory, fresh) => (plan, memory, fresh),
     };
     while let Some(fit) = lacking_mut(&mut plan) {
         find_lacking(app, admission, fit).await?;
@@ -292,13 +294,13 @@ fn planned<O: Operation>(
     wanted: Option<Wanted>,
     began: Instant,
     observer: &JobObserver,
-) -> Result<Parsed<O>, Problem> {
+) -> Result<Planned<O::Work>, Problem> {
     let planner = Planner::with_clouds(app, admission.owner, found);
     let mut plan = request.plan(&planner)?;
     let fresh = planner.into_fresh();
     memory.shrink_to(n_bytes_held(&plan));
     if lacking_mut(&mut plan).is_some() {
-        return Ok(Parsed::Lacking(Box::new(plan), memory, fresh));
+        return Ok(Planned::Lacking(Box::new(plan), memory, fresh));
     }
     let plan = resolve(plan, memory, fresh)?;
     let mut report = Report::parsed_in(began.elapsed(), plan.main.stored.id);
@@ -309,14 +311,14 @@ fn planned<O: Operation>(
         Some((found, wanted))
     });
     Ok(match at_hand {
-        None => Parsed::Done(Prepared::Ready(Box::new(plan))),
+        None => Planned::Done(Prepared::Ready(Box::new(plan))),
         Some(((fits, memory), wanted)) => {
             let fresh = plan.fresh.clone();
             let work = Work { operation: O::NAME, is_cached: true, flops: plan.cost.work.flops };
             let began = Instant::now();
             let answered = answer::<O>(plan, &fits, memory, report, wanted, observer)?;
             admission.did_at_once(work, began.elapsed());
-            Parsed::Done(Prepared::Answered(Box::new(answered), fresh))
+            Planned::Done(Prepared::Answered(Box::new(answered), fresh))
         }
     })
 }
@@ -332,12 +334,18 @@ fn ids_not_in_memory<O: Operation>(app: &App, owner: Owner, request: &O) -> Vec<
     ids.filter(|&id| !is_at_hand(id)).collect()
 }
 
+/// A request whose body was parsed.
 enum Parsed<O: Operation> {
-    Done(Prepared<O::Work>),
+    Planned(Planned<O::Work>),
+    /// Some clouds of the request have to be read from the store before it can be planned.
+    NotInMemory(Box<O>, Reservation, Vec<CloudId>),
+}
+
+/// A request that was checked.
+enum Planned<W> {
+    Done(Prepared<W>),
     /// The fits need to know more of their clouds or values.
-    Lacking(Box<Plan<O::Work>>, Reservation, Vec<Arc<RegisteredCloud>>),
-    /// Some clouds of the request are not in memory.
-    Elsewhere(Box<O>, Reservation, Vec<CloudId>),
+    Lacking(Box<Plan<W>>, Reservation, Vec<Arc<RegisteredCloud>>),
 }
 
 /// Returns a fit that needs to know more of its cloud or its values.

@@ -16,8 +16,8 @@ class BoundingBox:
     """The smallest box around a cloud.
 
     Attributes:
-        min_ (list[float]): The least value of each coordinate.
-        max_ (list[float]): The greatest value of each coordinate.
+        min_ (list[float]): The smallest value of each coordinate.
+        max_ (list[float]): The largest value of each coordinate.
     """
 
     min_: list[float]

@@ -24,11 +24,11 @@ class Cloud:
     Attributes:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
         n_points (int): Number of points, n.
-        dimension (int): Coordinates of each point, d.
+        dimension (int): Number of coordinates of each point, d.
         bounding_box (BoundingBox): The smallest box around a cloud.
-        n_duplicates (int): Points that coincide with an earlier one.
-        created_at (datetime.datetime): When it was registered, in UTC.
-        spacing (Spacing | Unset): Distances from each point to the nearest point elsewhere.
+        n_duplicates (int): Number of points that coincide with an earlier point.
+        created_at (datetime.datetime): The time of registration, in UTC.
+        spacing (Spacing | Unset): Statistics of the distance from each point to the nearest point elsewhere.
     """
 
     cloud_id: str

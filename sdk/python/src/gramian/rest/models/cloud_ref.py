@@ -12,15 +12,17 @@ T = TypeVar("T", bound="CloudRef")
 
 @_attrs_define
 class CloudRef:
-    """A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+    """A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and `points` is
+    given.
 
-    Attributes:
-        id (str | Unset): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
-        points (list[list[float]] | Unset): The points, one row of coordinates each, all of the same length; the cloud
-            is registered with them.
-        normals (list[list[float]] | Unset): Normals at the points, one row each, of any length but 0, with `points`
-            only. Their side is outward. An empty list
-            counts as absent.
+        Attributes:
+            id (str | Unset): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
+            points (list[list[float]] | Unset): The points, with a row of coordinates each, all of the same length. The
+                cloud is registered with the
+                request.
+            normals (list[list[float]] | Unset): Normals at the points, a row each, of any length but 0, with `points` only.
+                They point to the outward
+                side. An empty list counts as absent.
     """
 
     id: str | Unset = UNSET

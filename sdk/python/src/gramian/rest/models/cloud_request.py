@@ -15,9 +15,10 @@ class CloudRequest:
     """Points to register.
 
     Attributes:
-        points (list[list[float]]): The points, one row of coordinates each, all of the same length.
-        normals (list[list[float]] | Unset): Normals at the points, one row each, of any length but 0. Their side is
-            outward. An empty list counts as absent.
+        points (list[list[float]]): The points, one row of coordinates each. All rows have the same length.
+        normals (list[list[float]] | Unset): Normals at the points, one row each.
+
+            They may have any length but 0. The side they point to is outward. An empty list counts as absent.
     """
 
     points: list[list[float]]

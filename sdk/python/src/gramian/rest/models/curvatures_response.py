@@ -23,24 +23,31 @@ class CurvaturesResponse:
 
     Attributes:
         principal_curvatures (list[list[float] | None]): The d − 1 principal curvatures at each query, ascending,
-            1/length; null where there is none.
-        principal_directions (list[list[list[float]] | None]): A unit direction for each of them, its largest component
-            positive; any basis where curvatures coincide.
-        mean_curvatures (list[float | None]): Their average at each query, 1/length; null where there are none.
-        gaussian_curvatures (list[float | None]): Their product at each query, 1/length to the d − 1; null where there
-            are none.
-        normals (list[list[float] | None]): The normal at each query, of length 1; null where there is none.
-        gradient_norms (list[float]): |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about
-            1 for `offset`.
+            1/length. Null where there is none.
+        principal_directions (list[list[list[float]] | None]): A unit direction for each principal curvature, its
+            largest component positive.
+
+            Where curvatures coincide, their directions are an arbitrary basis.
+        mean_curvatures (list[float | None]): The average of the principal curvatures at each query, 1/length. Null
+            where there are none.
+        gaussian_curvatures (list[float | None]): The product of the principal curvatures at each query, 1/length to the
+            d − 1. Null where there are
+            none.
+        normals (list[list[float] | None]): The normal at each query, of length 1. Null where there is none.
+        gradient_norms (list[float]): |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`,
+            about 1 for
+            `offset`.
         levels (list[float]): The signature function at each query: 1 on the surface, usually more inside a closed one.
-        surfaces (list[SurfaceUsed]): The function whose level surface was used at each query; `signature` where there
-            is no answer.
+        surfaces (list[SurfaceUsed]): The function whose level surface was used at each query. It is `signature` where
+            there is no
+            answer.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
         normal_deviations (list[float | None] | Unset): Standard deviation of the angle of the normal at each query,
-            radians: within 1.96 of it lie 95 % of the angles; null where
-            there is no answer or none is known.
+            radians.
+
+            95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
+            deviation is not known.
         principal_curvature_deviations (list[list[float] | None] | Unset): Standard deviations of the principal
             curvatures at each query, in their order, 1/length.
         mean_curvature_deviations (list[float | None] | Unset): Standard deviations of the mean curvatures, 1/length.

@@ -18,10 +18,11 @@ class Degenerate:
 
     Attributes:
         query (int): The position of the query.
-        reason (DegenerateReason): Why a query is degenerate.
-        gradient_norm (float): |∇| of the function that was asked there: 1/length for the signature function, about 1
-            for the offset model, 0
-            where that has no answer.
+        reason (DegenerateReason): The reason why a query is degenerate.
+        gradient_norm (float): |∇| of the function used at the query.
+
+            Its unit is 1/length for the signature function. It is about 1 for the offset model, and 0 where that
+            has no answer.
     """
 
     query: int

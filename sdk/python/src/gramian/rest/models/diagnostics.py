@@ -21,38 +21,42 @@ T = TypeVar("T", bound="Diagnostics")
 
 @_attrs_define
 class Diagnostics:
-    """What an answer says of itself: the numbers used, how the system was solved, and how well.
+    """Diagnostics of an answer: the numbers used, the method, and its accuracy.
 
     Attributes:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and the normals if given.
-        n_points (int): Points of the cloud, n.
-        n_queries (int): Queries answered, m.
-        dimension (int): Coordinates of each point, d.
-        kernel (KernelUsed): The kernel that was used, every number of it: sent back as `kernel` it gives the same
+        n_points (int): Number of points of the cloud, n.
+        n_queries (int): Number of queries answered, m.
+        dimension (int): Number of coordinates of each point, d.
+        kernel (KernelUsed): The kernel that was used, with every number. Sent back as `kernel`, it gives the same
             answer.
-        solver (SolverUsed): The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
-        factorization (FactorizationUsed): How the Gram matrix was factorized. `bunch_kaufman`, `partial_pivoting_lu`
-            and `conjugate_gradients` are reserved: no
-            answer has them yet.
-        n_merged_duplicates (int): Points that were merged into an earlier one.
-        warnings (list[Warning_]): What was changed or limits the accuracy.
-        alpha (float | Unset): What was added to the diagonal; absent with `noise_variances`.
-        solver_reason (str | Unset): Why it was chosen, where `auto` chose another one than the dense one.
+        solver (SolverUsed): The solver that was used.
+
+            `landmark` and `iterative` are reserved: no answer has them yet.
+        factorization (FactorizationUsed): The factorization of the Gram matrix.
+
+            `bunch_kaufman`, `partial_pivoting_lu` and `conjugate_gradients` are reserved: no answer has them yet.
+        n_merged_duplicates (int): Number of points that were merged into an earlier point.
+        warnings (list[Warning_]): Changes that were made, and limits of the accuracy.
+        alpha (float | Unset): The number added to the diagonal. Absent with `noise_variances`.
+        solver_reason (str | Unset): The reason why `auto` chose a solver other than the dense one. Absent otherwise.
         rank (int | Unset): Numerical rank of the matrix.
-        reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): about how many digits survive, as
-            a fraction of all.
-        relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, Y without its mean; for matrices and
-            surfaces, with Y = 1.
-        native_norm_squared (float | Unset): ‖u‖² = ΛᵀKΛ in the native space of the kernel.
-        mean_coefficients (list[float] | Unset): The mean of the function: the constant, then a slope for each
-            coordinate if it is linear; absent where it is 0.
-        misfit (float | Unset): |u(X) − Y|, unit of the values; absent for values from the local solver, which is not
-            asked at the points.
-        noise_deviation (float | Unset): Standard deviation of the noise of the points across the surface, as estimated,
+        reciprocal_condition (float | Unset): Estimate of 1/(‖K + αI‖₁‖(K + αI)⁻¹‖₁): roughly the fraction of digits
+            that survive.
+        relative_residual (float | Unset): ‖Y − (K + αI)Λ‖/‖Y‖ of the solve, where Y is the values without their mean.
+            For matrices and surfaces,
+            Y = 1.
+        native_norm_squared (float | Unset): ‖u‖² = ΛᵀKΛ, the squared norm in the native space of the kernel.
+        mean_coefficients (list[float] | Unset): The mean of the function: the constant, then a slope per coordinate if
+            it is linear. Absent if the
+            mean is 0.
+        misfit (float | Unset): |u(X) − Y|, unit of the values.
+
+            Absent for values from the local solver, which is not evaluated at the points.
+        noise_deviation (float | Unset): Estimated standard deviation of the noise of the points across the surface,
             length.
-        stencils (StencilsUsed | Unset): Rows of a sparse operator by how their weights came about.
-        geometry (Diagnostics | Unset): What an answer says of itself: the numbers used, how the system was solved, and
-            how well.
+        stencils (StencilsUsed | Unset): Number of rows of a sparse operator by how their weights were computed.
+        geometry (Diagnostics | Unset): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     cloud_id: str

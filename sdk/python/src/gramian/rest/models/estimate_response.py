@@ -14,16 +14,20 @@ T = TypeVar("T", bound="EstimateResponse")
 
 @_attrs_define
 class EstimateResponse:
-    """What a request would take.
+    """The expected cost of a request.
 
     Attributes:
         operation (str): The operation, repeated.
-        solver (SolverUsed): The solver that was used. `landmark` and `iterative` are reserved: no answer has them yet.
-        flops (float): Floating-point operations, as counted beforehand.
-        bytes_ (int): Memory that it would take beside what is held already.
-        seconds (float): Seconds from its turn to its answer, by what ran on this machine since the server started.
-        cached (bool): Whether all factorizations that it needs are there.
-        admissible (bool): Whether there is memory and time enough for it, if nothing else is under way.
+        solver (SolverUsed): The solver that was used.
+
+            `landmark` and `iterative` are reserved: no answer has them yet.
+        flops (float): Number of floating-point operations, counted beforehand.
+        bytes_ (int): Memory that the request would need beside what is held already, bytes.
+        seconds (float): Expected seconds from the request's turn in the queue to its answer.
+
+            They are learned from what ran on this machine since the server started.
+        cached (bool): True if all factorizations that the request needs are there.
+        admissible (bool): True if memory and time suffice for the request when nothing else runs.
     """
 
     operation: str

@@ -17,9 +17,10 @@ class FamilyScore:
     """The best score of a family.
 
     Attributes:
-        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-        nu (float | Unset): matern: the smoothness ν.
-        score (float | None | Unset): Its best score; null where the matrix was not positive definite from any start.
+        family (KernelFamily): The families of kernels. `GET /v1/kernels` has their formulas.
+        nu (float | Unset): The smoothness ν of the Matérn family. Absent for other families.
+        score (float | None | Unset): The best score of the family. Null if the matrix was not positive definite from
+            any start.
     """
 
     family: KernelFamily

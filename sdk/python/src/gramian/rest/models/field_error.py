@@ -13,12 +13,12 @@ T = TypeVar("T", bound="FieldError")
 
 @_attrs_define
 class FieldError:
-    """One field of the request that was refused.
+    """A field of the request that was refused.
 
     Attributes:
-        pointer (str): RFC 6901 pointer into the request body, such as `/cloud/points/17/2`; for query parameters,
+        pointer (str): RFC 6901 pointer into the request body, such as `/cloud/points/17/2`. For query parameters,
             `/<name>`. Example: /cloud/points/17/2.
-        detail (str): What is wrong with this field. Example: expected a number, found null.
+        detail (str): The reason why the field was refused. Example: expected a number, found null.
     """
 
     pointer: str

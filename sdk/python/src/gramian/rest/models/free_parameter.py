@@ -16,10 +16,10 @@ class FreeParameter:
     """A parameter that is free between bounds.
 
     Attributes:
-        parameter (SelectionParameter): What may be free.
-        min_ (float): The least that it may be.
-        max_ (float): The greatest that it may be.
-        axis (int | Unset): length_scales: the axis, from 0; every axis if absent, each within these bounds.
+        parameter (SelectionParameter): A parameter that may be free.
+        min_ (float): The lower bound.
+        max_ (float): The upper bound.
+        axis (int | Unset): The axis, from 0, for `length_scales` only. Default: every axis, each within these bounds.
     """
 
     parameter: SelectionParameter

@@ -19,21 +19,24 @@ T = TypeVar("T", bound="Geometry")
 
 @_attrs_define
 class Geometry:
-    """The surface of an operator, where it comes from another cloud, kernel or alpha than the values. What is absent is as
-    in
-    the request.
+    """The surface of an operator, if it differs from the surface of the request.
+
+    It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
 
         Attributes:
-            cloud (CloudRef | Unset): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points`
-                is given.
-            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
-                − y_c)²/length_scales_c²`. A parameter of another family
+            cloud (CloudRef | Unset): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id`
+                and `points` is
+                given.
+            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
+
+                Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
                 is refused.
-            alpha (float | Unset): Added to the diagonal of its Gram matrix.
-            noise_variances (list[float] | Unset): One entry per point of its cloud, instead of `alpha`. An empty list
+            alpha (float | Unset): Added to the diagonal of the Gram matrix of the surface.
+            noise_variances (list[float] | Unset): Noise variances of the surface, an entry per point of its cloud, instead
+                of `alpha`. An empty list
                 counts as absent.
-            solver (SolverChoice | Unset): How the linear system is solved.
-            surface (SurfaceChoice | Unset): Which function's level surface is meant.
+            solver (SolverChoice | Unset): The method that solves the linear system.
+            surface (SurfaceChoice | Unset): The function whose level set is the surface.
     """
 
     cloud: CloudRef | Unset = UNSET

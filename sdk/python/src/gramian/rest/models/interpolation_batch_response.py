@@ -17,23 +17,35 @@ T = TypeVar("T", bound="InterpolationBatchResponse")
 
 @_attrs_define
 class InterpolationBatchResponse:
-    """The interpolants (regression functions, if alpha > 0) at the queries. Deviations are those of each of them.
+    """The interpolants (regression functions, if alpha > 0) at the queries. All have the same deviations.
 
     Attributes:
-        values (list[list[float]]): For each list u at each query.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
-        gradients (list[list[list[float]]] | Unset): For each list ∇u at each query, unit of the values per length; with
-            `derivatives` of 1 or 2.
-        hessians (list[list[list[list[float]]]] | Unset): For each list D²u at each query, unit of the values per length
-            squared; with `derivatives` of 2.
-        value_deviations (list[float] | Unset): Standard deviation of any of the functions at each query given its
-            values, under the kernel as covariance and alpha as variance of the
-            noise; with `deviations`.
-        gradient_deviations (list[list[float]] | Unset): The same for the components of ∇u.
-        hessian_deviations (list[list[list[float]]] | Unset): The same for the entries of D²u.
-        mean_coefficients (list[list[float]] | Unset): For each list the mean of the function: the constant, then a
-            slope for each coordinate if it is linear; absent where it is 0.
+        values (list[list[float]]): Values u at each query, a row per list.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        gradients (list[list[list[float]]] | Unset): Gradients ∇u at each query for each list, unit of the values per
+            length.
+
+            Present if `derivatives` is 1 or 2.
+        hessians (list[list[list[list[float]]]] | Unset): Hessians D²u at each query for each list, unit of the values
+            per length squared.
+
+            Present if `derivatives` is 2.
+        value_deviations (list[float] | Unset): Standard deviation of each function at each query, given its values.
+            Present if `include` has
+            `deviations`.
+
+            The kernel is taken as covariance, and alpha as variance of the noise. All lists have the same
+            deviations.
+        gradient_deviations (list[list[float]] | Unset): Standard deviation of each component of ∇u at each query.
+
+            Present if `include` has `deviations` and `derivatives` is 1 or 2.
+        hessian_deviations (list[list[list[float]]] | Unset): Standard deviation of each entry of D²u at each query.
+
+            Present if `include` has `deviations` and `derivatives` is 2.
+        mean_coefficients (list[list[float]] | Unset): The mean of each function, a row per list. Absent if the mean is
+            0.
+
+            A row is the constant, followed by a slope per coordinate if the mean is linear.
     """
 
     values: list[list[float]]

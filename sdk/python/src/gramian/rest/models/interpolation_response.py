@@ -21,17 +21,21 @@ class InterpolationResponse:
 
     Attributes:
         values (list[float]): u at each query.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
-        gradients (list[list[float]] | Unset): ∇u at each query, unit of the values per length; with `derivatives` of 1
-            or 2.
-        hessians (list[list[list[float]]] | Unset): D²u at each query, unit of the values per length squared; with
-            `derivatives` of 2.
-        value_deviations (list[float] | Unset): Standard deviation of u at each query given the values, under the kernel
-            as covariance and alpha as variance of the noise; with
-            `deviations`.
-        gradient_deviations (list[list[float]] | Unset): The same for the components of ∇u.
-        hessian_deviations (list[list[list[float]]] | Unset): The same for the entries of D²u.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        gradients (list[list[float]] | Unset): ∇u at each query, unit of the values per length. Present if `derivatives`
+            is 1 or 2.
+        hessians (list[list[list[float]]] | Unset): D²u at each query, unit of the values per length squared. Present if
+            `derivatives` is 2.
+        value_deviations (list[float] | Unset): Standard deviation of u at each query, given the values. Present if
+            `include` has `deviations`.
+
+            The kernel is taken as covariance, and alpha as variance of the noise.
+        gradient_deviations (list[list[float]] | Unset): Standard deviation of each component of ∇u at each query.
+
+            Present if `include` has `deviations` and `derivatives` is 1 or 2.
+        hessian_deviations (list[list[list[float]]] | Unset): Standard deviation of each entry of D²u at each query.
+
+            Present if `include` has `deviations` and `derivatives` is 2.
     """
 
     values: list[float]

@@ -24,11 +24,12 @@ class Job:
 
     Attributes:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
-        status (JobStatus): Where a job is.
-        progress (JobProgress): How far a job is.
-        created_at (datetime.datetime): When it was asked for, in UTC.
-        ended_at (datetime.datetime | Unset): When it ended, in UTC; absent before.
-        expires_at (datetime.datetime | Unset): Until when its result is kept, in UTC; absent before there is one.
+        status (JobStatus): The state of a job.
+        progress (JobProgress): The progress of a job.
+        created_at (datetime.datetime): The time at which the job was requested, in UTC.
+        ended_at (datetime.datetime | Unset): The time at which the job ended, in UTC. Absent before.
+        expires_at (datetime.datetime | Unset): The time until which the result is kept, in UTC. Absent before there is
+            a result.
         problem (Problem | Unset): A problem document (RFC 9457, `application/problem+json`).
     """
 

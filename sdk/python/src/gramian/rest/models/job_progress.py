@@ -13,15 +13,16 @@ T = TypeVar("T", bound="JobProgress")
 
 @_attrs_define
 class JobProgress:
-    """How far a job is.
+    """The progress of a job.
 
     Attributes:
-        stage (str): What is being done: `queued`, then the stages of `Server-Timing`: `parse`, `gram`, `factor`,
-            `solve`, `evaluate`; `done` in the end.
-        fraction (float): The part of the time it is expected to take that has gone by, from 0 to 1.
-        residual (float | Unset): Of the last solve, relative; absent before there is one.
-        seconds_left (float | Unset): Seconds until it is done, by what ran on this machine; absent while that is
-            unknown.
+        stage (str): The current stage: `queued`, `parse`, `gram`, `factor`, `solve`, `evaluate`, or `done` in the end.
+
+            Stages from `parse` to `evaluate` are those of `Server-Timing`.
+        fraction (float): The elapsed part of the time that the job is expected to take, from 0 to 1.
+        residual (float | Unset): Relative residual of the last solve. Absent before there is one.
+        seconds_left (float | Unset): Seconds until the job is done, predicted from what ran on this machine. Absent
+            while unknown.
     """
 
     stage: str

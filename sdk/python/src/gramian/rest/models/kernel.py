@@ -14,21 +14,24 @@ T = TypeVar("T", bound="Kernel")
 
 @_attrs_define
 class Kernel:
-    """A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A
-    parameter of another family
+    """A kernel `k(x, y) = variance · φ(r²)`.
+
+    Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
     is refused.
 
         Attributes:
-            family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-            length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; chosen from the cloud if
-                absent.
-            length_scales (list[float] | Unset): A length scale for each axis instead, in the units of the coordinates. An
-                empty list counts as absent.
-            variance (float | Unset): The factor of φ, unit of the values squared; 1 if absent.
-            epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)); 0 if absent, which leaves a kink at the points of
+            family (KernelFamily): The families of kernels. `GET /v1/kernels` has their formulas.
+            length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates. Default: chosen from the
+                cloud.
+            length_scales (list[float] | Unset): A length scale per axis, in the units of the coordinates, instead of
+                `length_scale`. An empty list
+                counts as absent.
+            variance (float | Unset): The factor of φ, unit of the values squared. Default: 1.
+            epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)). Default: 0, which leaves a kink at the points of
                 the cloud.
-            nu (float | Unset): matern: one of 0.5, 1.5, …, 8.5; 2.5 if absent. (A range in the schema: generators know no
-                enumerations of fractions.)
+            nu (float | Unset): matern: the smoothness ν, one of 0.5, 1.5, …, 8.5. Default: 2.5.
+
+                The schema gives a range, because generators do not support enumerations of fractions.
             smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.
     """
 

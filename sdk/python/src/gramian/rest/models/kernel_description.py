@@ -21,14 +21,17 @@ class KernelDescription:
     """A family of kernels.
 
     Attributes:
-        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
-        formula (str): φ as a function of r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c²; the kernel
-            is variance · φ.
-        smoothness (str): How smooth functions fitted with it are.
+        family (KernelFamily): The families of kernels. `GET /v1/kernels` has their formulas.
+        formula (str): φ as a function of r. The kernel is variance · φ(r).
+
+            r = |x − y|/length_scale, or r² = Σ (x_c − y_c)²/length_scales_c².
+        smoothness (str): The smoothness of functions fitted with the kernel.
         parameters (list[KernelParameter]): Parameters beside `length_scale`, or `length_scales`, and `variance`.
-        differentiable_at_points (str): Whether it has derivatives at the points of the cloud, as geometry and operators
-            need there.
-        max_dimension (int | Unset): The greatest dimension in which it is positive definite; absent if every one.
+        differentiable_at_points (str): The condition under which the kernel has derivatives at the points of the cloud.
+
+            Geometry and operators need derivatives there.
+        max_dimension (int | Unset): The largest dimension in which the kernel is positive definite. Absent if there is
+            no limit.
     """
 
     family: KernelFamily

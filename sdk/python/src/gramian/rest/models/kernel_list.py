@@ -17,10 +17,10 @@ T = TypeVar("T", bound="KernelList")
 
 @_attrs_define
 class KernelList:
-    """All families.
+    """All kernel families.
 
     Attributes:
-        kernels (list[KernelDescription]): The families, in the order of their names in the documentation.
+        kernels (list[KernelDescription]): The families, in the order in which the documentation names them.
     """
 
     kernels: list[KernelDescription]

@@ -13,12 +13,12 @@ T = TypeVar("T", bound="KernelParameter")
 
 @_attrs_define
 class KernelParameter:
-    """A parameter that a family takes beside `length_scale` and `variance`.
+    """A parameter of a kernel family beside `length_scale` and `variance`.
 
     Attributes:
-        name (str): Its name in a kernel object.
-        default (float): The value if absent.
-        range_ (str): The values it may take.
+        name (str): The name of the parameter in a kernel object.
+        default (float): The default.
+        range_ (str): The values that the parameter may take.
     """
 
     name: str

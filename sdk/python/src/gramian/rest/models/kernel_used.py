@@ -15,14 +15,14 @@ T = TypeVar("T", bound="KernelUsed")
 
 @_attrs_define
 class KernelUsed:
-    """The kernel that was used, every number of it: sent back as `kernel` it gives the same answer.
+    """The kernel that was used, with every number. Sent back as `kernel`, it gives the same answer.
 
     Attributes:
-        family (KernelFamily): The families of kernels; `GET /v1/kernels` has their formulas.
+        family (KernelFamily): The families of kernels. `GET /v1/kernels` has their formulas.
         variance (float): The factor of φ, unit of the values squared.
-        length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates; absent where each axis has its
+        length_scale (float | Unset): The length scale ℓ, in the unit of the coordinates. Absent if each axis has its
             own.
-        length_scales (list[float] | Unset): The length scale of each axis, where each has its own.
+        length_scales (list[float] | Unset): The length scale of each axis, if each has its own.
         epsilon (float | Unset): laplace: φ = exp(−√(r² + epsilon)).
         nu (float | Unset): matern: the smoothness ν.
         smoothness (Smoothness | Unset): How often a Wendland kernel is continuously differentiable.

@@ -21,12 +21,12 @@ class LaplaceBeltramiMatrixResponse:
     """The Laplace–Beltrami operator as a matrix.
 
     Attributes:
-        matrix (list[list[float] | None]): Rows are queries, columns are the points of `cloud`, 1/length²; a row is null
-            where there is no normal. Not symmetric
-            in general.
+        matrix (list[list[float] | None]): The matrix, unit 1/length². Rows are queries, and columns are the points of
+            `cloud`.
+
+            A row is null where there is no normal. The matrix is not symmetric in general.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     matrix: list[list[float] | None]

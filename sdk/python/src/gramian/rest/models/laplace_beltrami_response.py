@@ -21,14 +21,15 @@ class LaplaceBeltramiResponse:
     """The Laplace–Beltrami operator of the values at the queries.
 
     Attributes:
-        values (list[float | None]): Δu at each query, unit of the values per length squared; null where there is no
+        values (list[float | None]): Δu at each query, unit of the values per length squared. Null where there is no
             normal.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
-        value_deviations (list[float | None] | Unset): Standard deviation of Δu given the values and, as far as its
-            deviations are known, the surface; null where there is no
-            answer or no deviation; with `deviations`.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        value_deviations (list[float | None] | Unset): Standard deviation of Δu at each query. Present if `include` has
+            `deviations`.
+
+            It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+            the surface. Null where there is no answer or no deviation.
     """
 
     values: list[float | None]

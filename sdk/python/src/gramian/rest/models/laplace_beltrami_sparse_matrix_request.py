@@ -20,30 +20,35 @@ T = TypeVar("T", bound="LaplaceBeltramiSparseMatrixRequest")
 
 @_attrs_define
 class LaplaceBeltramiSparseMatrixRequest:
-    """Nodes and queries of the operator as a sparse matrix.
+    """A cloud of nodes on a surface, and queries for the rows of its sparse Laplace–Beltrami matrix.
 
     Attributes:
-        cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
-        kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
-            − y_c)²/length_scales_c²`. A parameter of another family
+        cloud (CloudRef): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and
+            `points` is
+            given.
+        kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
+
+            Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
             is refused.
-        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
-            interpolates, the variance
-            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
-            likelihood, or
-            chosen by the noise of the points of a surface, 1e-3 at least.
+        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+            0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+            Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+            surfaces it follows the noise of the points and is at least 1e-3.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
-        solver (SolverChoice | Unset): How the linear system is solved.
-        duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
-        queries (list[list[float]] | Unset): Where rows are wanted; the points of the surface if absent.
-        geometry (Geometry | Unset): The surface of an operator, where it comes from another cloud, kernel or alpha than
-            the values. What is absent is as in
-            the request.
-        sites (list[list[float]] | Unset): Where `"solver": "local"` learns noise and shape of the surface, at most 192
-            points of the cloud; 96 to
-            191 that it chooses if absent. Parts of one cloud with the same sites, and the points around them,
-            learn the same.
+        solver (SolverChoice | Unset): The method that solves the linear system.
+        duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
+        queries (list[list[float]] | Unset): The points to compute rows for, one row of the matrix each. Default: the
+            points of the surface.
+        geometry (Geometry | Unset): The surface of an operator, if it differs from the surface of the request.
+
+            It may come from another cloud, kernel or alpha than the values. Absent fields are taken from the request.
+        sites (list[list[float]] | Unset): At most 192 points of the cloud, where `"solver": "local"` learns noise and
+            shape of the surface.
+
+            Default: 96 to 191 points that the solver chooses. Parts of one cloud learn the same if they have
+            the same sites and the points around them.
     """
 
     cloud: CloudRef

@@ -21,15 +21,16 @@ class LaplaceBeltramiSparseMatrixResponse:
     """The Laplace–Beltrami operator as a sparse matrix with rows for the queries and columns for the nodes.
 
     Attributes:
-        shape (list[int]): Queries, nodes.
-        indptr (list[int]): Where each row begins among the entries, and how many there are, from 0.
+        shape (list[int]): The number of queries and the number of nodes.
+        indptr (list[int]): The position of the first entry of each row, from 0, and the number of all entries at the
+            end.
         indices (list[int]): The column of each entry, from 0, ascending within a row.
-        data (list[float]): The entries row by row, 1/length²: `scipy.sparse.csr_matrix((data, indices, indptr),
-            shape)`.
+        data (list[float]): The entries row by row, 1/length².
+
+            In Python: `scipy.sparse.csr_matrix((data, indices, indptr), shape)`.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (an empty row), or less accuracy than
             it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     shape: list[int]

@@ -13,12 +13,12 @@ T = TypeVar("T", bound="LeftOut")
 
 @_attrs_define
 class LeftOut:
-    """What each value is predicted to be from all others.
+    """Predictions of each value from all others.
 
     Attributes:
-        means (list[float | None]): The predictions, in the order of the points; null where the mean is not determined
+        means (list[float | None]): The predictions, in the order of the points. Null where the mean is not determined
             without the point.
-        variances (list[float | None]): The variances of the values predicted, their noise included.
+        variances (list[float | None]): The variances of the predicted values, noise included.
         log_predictive_densities (list[float | None]): The logarithms of the densities of the values under their
             predictions.
     """

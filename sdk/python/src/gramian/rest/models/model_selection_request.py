@@ -23,36 +23,45 @@ T = TypeVar("T", bound="ModelSelectionRequest")
 
 @_attrs_define
 class ModelSelectionRequest:
-    """Values at the points of a cloud, and what may be chosen to explain them. The search begins with `kernel` and
-    `alpha`.
+    """Values at the points of a cloud, and the parameters that may vary to explain them.
+
+    The search begins with `kernel` and `alpha`.
 
         Attributes:
-            cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
+            cloud (CloudRef): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and
+                `points` is
+                given.
             values (list[float]): The values at the points, in their order.
-            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
-                − y_c)²/length_scales_c²`. A parameter of another family
+            kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
+
+                Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
                 is refused.
-            alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
-                interpolates, the variance
-                of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
-                likelihood, or
-                chosen by the noise of the points of a surface, 1e-3 at least.
+            alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+                0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+                Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+                surfaces it follows the noise of the points and is at least 1e-3.
             noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
                 list counts as absent.
-            solver (SolverChoice | Unset): How the linear system is solved.
-            duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
-            mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
-                the points.
-            criterion (SelectionCriterion | Unset): What is made as great as possible.
-            vary (list[FreeParameter] | Unset): What is free, and its bounds; 64 entries at most. Absent: length scale, or
-                that of each axis where `kernel` has them, and variance, from a
-                hundredth to a hundred times of where the search begins; and alpha, unless noise is given for each point, from a
-                millionth of where it begins, or
-                of a millionth of the variance if that is more, to a hundred times the variance.
-            families (list[KernelFamily] | Unset): Families to try, with the parameters of `kernel` where it is of that
-                family; that of the start alone if absent, and matern where nu varies.
-            restarts (int | Unset): Further starts for each family, spread over the bounds; 2 if absent.
-            seed (int | Unset): Where the further starts are; 0 if absent.
+            solver (SolverChoice | Unset): The method that solves the linear system.
+            duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
+            mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
+                points.
+            criterion (SelectionCriterion | Unset): The score that a selection maximizes.
+            vary (list[FreeParameter] | Unset): The free parameters and their bounds, at most 64 entries. Default: length
+                scale, variance, alpha.
+
+                By default, length scale and variance may become up to a hundred times smaller or larger than at
+                the start. If `kernel` has a length scale per axis, each of them varies. Alpha varies unless noise
+                is given for each point. Its lower bound is a millionth of its start, or of a millionth of the
+                variance if that is more. Its upper bound is a hundred times its start, or a hundred times the
+                variance if that is more.
+            families (list[KernelFamily] | Unset): Kernel families to try. Default: that of the start, and `matern` if `nu`
+                varies.
+
+                A family takes the parameters of `kernel` if `kernel` is of that family.
+            restarts (int | Unset): Number of further starts for each family, spread over the bounds. Default: 2.
+            seed (int | Unset): The seed that determines the further starts. Default: 0.
     """
 
     cloud: CloudRef

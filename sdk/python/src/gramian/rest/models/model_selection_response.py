@@ -21,26 +21,29 @@ T = TypeVar("T", bound="ModelSelectionResponse")
 
 @_attrs_define
 class ModelSelectionResponse:
-    """What explains the values best.
+    """The selected kernel and noise, with scores and predictions.
 
     Attributes:
-        kernel (KernelUsed): The kernel that was used, every number of it: sent back as `kernel` it gives the same
+        kernel (KernelUsed): The kernel that was used, with every number. Sent back as `kernel`, it gives the same
             answer.
-        score (float): The criterion there; greater is better.
-        gradient (list[float | None]): Derivatives of the score in the logarithms of what is free, in the order of
-            `vary`; for `length_scales` without an axis, in that of a factor
-            of all; null for nu, which takes steps.
-        converged (bool): Whether no slope is left to follow within the bounds.
-        evaluations (int): How often the criterion was evaluated.
+        score (float): The score of the selection. Greater is better.
+        gradient (list[float | None]): Derivatives of the score in the logarithms of the free parameters, in the order
+            of `vary`.
+
+            For `length_scales` without an axis, the derivative is in the logarithm of a common factor of all
+            length scales. Null for `nu`, which takes steps.
+        converged (bool): True if no slope is left to follow within the bounds.
+        evaluations (int): Number of evaluations of the score.
         families (list[FamilyScore]): The families that were tried.
-        path (list[PathEntry]): The criterion over alpha, ascending, all else being as selected; empty with
-            `noise_variances`, and beyond 3,000 points.
-        leave_one_out (LeftOut): What each value is predicted to be from all others.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
-        alpha (float | Unset): The variance of the noise that was selected; absent with `noise_variances`.
-        mean_coefficients (list[float] | Unset): The mean of the function: the constant, then a slope for each
-            coordinate if it is linear; absent where it is 0.
+        path (list[PathEntry]): The score over ascending alpha, with everything else as selected.
+
+            Empty with `noise_variances`, and for more than 3,000 points.
+        leave_one_out (LeftOut): Predictions of each value from all others.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        alpha (float | Unset): The selected variance of the noise. Absent with `noise_variances`.
+        mean_coefficients (list[float] | Unset): The mean of the function: the constant, then a slope per coordinate if
+            it is linear. Absent if the
+            mean is 0.
     """
 
     kernel: KernelUsed

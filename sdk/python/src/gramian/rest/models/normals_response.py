@@ -22,18 +22,21 @@ class NormalsResponse:
     """Unit normals of the surface at the queries.
 
     Attributes:
-        normals (list[list[float] | None]): The normal at each query, of length 1; null where there is none.
-        gradient_norms (list[float]): |∇u| of the function in `surfaces` at each query: 1/length for `signature`, about
-            1 for `offset`.
+        normals (list[list[float] | None]): The normal at each query, of length 1. Null where there is none.
+        gradient_norms (list[float]): |∇u| at each query for the function in `surfaces`: unit 1/length for `signature`,
+            about 1 for
+            `offset`.
         levels (list[float]): The signature function at each query: 1 on the surface, usually more inside a closed one.
-        surfaces (list[SurfaceUsed]): The function whose level surface was used at each query; `signature` where there
-            is no answer.
+        surfaces (list[SurfaceUsed]): The function whose level surface was used at each query. It is `signature` where
+            there is no
+            answer.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
         normal_deviations (list[float | None] | Unset): Standard deviation of the angle of the normal at each query,
-            radians: within 1.96 of it lie 95 % of the angles; null where
-            there is no answer or none is known.
+            radians.
+
+            95 % of the angles lie within 1.96 standard deviations. Null where there is no answer or the
+            deviation is not known.
     """
 
     normals: list[list[float] | None]

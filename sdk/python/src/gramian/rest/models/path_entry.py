@@ -13,11 +13,11 @@ T = TypeVar("T", bound="PathEntry")
 
 @_attrs_define
 class PathEntry:
-    """The criterion at one alpha, all else being as it was selected.
+    """The score at one alpha, with everything else as selected.
 
     Attributes:
-        alpha (float): α.
-        score (float | None | Unset): The score; null where the matrix is not positive definite.
+        alpha (float): The variance of the noise, α.
+        score (float | None | Unset): The score. Null where the matrix is not positive definite.
     """
 
     alpha: float

@@ -22,33 +22,40 @@ T = TypeVar("T", bound="PosteriorBatchRequest")
 
 @_attrs_define
 class PosteriorBatchRequest:
-    """Many lists of noisy values at the points of a cloud, and where their posteriors are wanted.
+    """Many lists of noisy values at the points of a cloud, and queries for their posteriors.
 
     Attributes:
-        cloud (CloudRef): A cloud: the id of a registered one, or its points. Exactly one of `id` and `points` is given.
-        values (list[list[float]]): Lists of observed values, one per point each, in their order. They have kernel and
-            noise in common.
-        kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)` with `r = |x − y|/length_scale`, or `r² = Σ (x_c
-            − y_c)²/length_scales_c²`. A parameter of another family
+        cloud (CloudRef): A cloud, given by the id of a registered cloud or by its points. Exactly one of `id` and
+            `points` is
+            given.
+        values (list[list[float]]): Lists of observed values. Each has a value per point, in the order of the points.
+
+            All lists have kernel and noise in common.
+        kernel (Kernel | Unset): A kernel `k(x, y) = variance · φ(r²)`.
+
+            Here `r = |x − y|/length_scale`, or `r² = Σ (x_c − y_c)²/length_scales_c²`. A parameter of another family
             is refused.
-        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared: 0
-            interpolates, the variance
-            of the noise regresses. Absent: 1e-10 with a kernel given; without one, the noise of the values by their
-            likelihood, or
-            chosen by the noise of the points of a surface, 1e-3 at least.
+        alpha (float | Unset): Added to the diagonal of the Gram matrix as given, unit of the values squared.
+
+            0 interpolates, and the variance of the noise regresses. Default: 1e-10 if a kernel is given.
+            Without a kernel, alpha is chosen. For values it is their noise by the likelihood. For
+            surfaces it follows the noise of the points and is at least 1e-3.
         noise_variances (list[float] | Unset): The variance of the noise at each point, instead of `alpha`. An empty
             list counts as absent.
-        solver (SolverChoice | Unset): How the linear system is solved.
-        duplicates (DuplicatePolicy | Unset): What to do with points that coincide when alpha is 0.
-        mean (MeanChoice | Unset): The mean of a function: what it is made of beside the kernel, and tends to far from
-            the points.
-        queries (list[list[float]] | Unset): Where answers are wanted; the points of the cloud if absent.
-        include (list[PosteriorQuantity] | Unset): What is wanted beside the means; nothing if absent.
-        samples (Samples | Unset): How many functions to draw from the posterior, and which.
-        quantiles (list[float] | Unset): Probabilities between 0 and 1 of which the quantiles of the latent functions
-            are wanted; none if absent. An empty list counts as absent.
-        threshold (float | Unset): What a new observation is to exceed, unit of the values, for
-            `exceedance_probabilities`.
+        solver (SolverChoice | Unset): The method that solves the linear system.
+        duplicates (DuplicatePolicy | Unset): The treatment of points that coincide when alpha is 0.
+        mean (MeanChoice | Unset): The mean of a function: its part beside the kernel, which it tends to far from the
+            points.
+        queries (list[list[float]] | Unset): The points to evaluate at, one row of coordinates each. Default: the points
+            of the cloud.
+        include (list[PosteriorQuantity] | Unset): Optional parts of the answer beside the means. Default: none.
+        samples (Samples | Unset): Functions to draw from the posterior: their number and a seed.
+        quantiles (list[float] | Unset): Probabilities between 0 and 1 for quantiles of the latent functions. Default:
+            none.
+
+            An empty list counts as absent.
+        threshold (float | Unset): The threshold of `exceedance_probabilities` for a new observation, unit of the
+            values.
     """
 
     cloud: CloudRef

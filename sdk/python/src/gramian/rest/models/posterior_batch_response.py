@@ -17,28 +17,31 @@ T = TypeVar("T", bound="PosteriorBatchResponse")
 
 @_attrs_define
 class PosteriorBatchResponse:
-    """The Gaussian processes given the values. Lists of values have their own rows in what depends on values; the rest
-    they share.
+    """The Gaussian processes given the values.
+
+    Each list has its own rows in everything that depends on its values. The lists share the rest.
 
         Attributes:
-            means (list[list[float]]): For each list the posterior mean at each query.
-            diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-                well.
+            means (list[list[float]]): The posterior mean at each query, a row per list.
+            diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
             variances (list[float] | Unset): The variance of the latent functions at each query.
             observation_variances (list[float] | Unset): The variance of a new observation at each query.
             covariance (list[list[float]] | Unset): The covariance of the latent functions between queries.
-            gradients (list[list[list[float]]] | Unset): For each list the gradient of the mean at each query.
+            gradients (list[list[list[float]]] | Unset): The gradient of the mean at each query, for each list.
             gradient_variances (list[list[float]] | Unset): The variances of the components of the latent functions'
                 gradients at each query.
-            samples (list[list[list[float]]] | Unset): For each list draws of the latent function, one row each, a number
-                per query.
-            quantiles (list[list[list[float]]] | Unset): For each list quantiles of the latent function, one row for each
-                probability, a number per query.
-            exceedance_probabilities (list[list[float]] | Unset): For each list the probability that a new observation
-                exceeds `threshold`, at each query.
-            log_marginal_likelihoods (list[float] | Unset): For each list −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
-            mean_coefficients (list[list[float]] | Unset): For each list the mean of the function: the constant, then a
-                slope for each coordinate if it is linear; absent where it is 0.
+            samples (list[list[list[float]]] | Unset): Draws of the latent function for each list. A draw is a row, with a
+                number per query.
+            quantiles (list[list[list[float]]] | Unset): Quantiles of the latent function for each list. A probability is a
+                row, with a number per query.
+            exceedance_probabilities (list[list[float]] | Unset): The probability that a new observation exceeds `threshold`
+                at each query, a row per list.
+            log_marginal_likelihoods (list[float] | Unset): The log marginal likelihood of each list, −½YᵀΛ − ½ ln det(K +
+                αI) − ½n ln 2π.
+            mean_coefficients (list[list[float]] | Unset): The mean of each function, a row per list. Absent if the mean is
+                0.
+
+                A row is the constant, followed by a slope per coordinate if the mean is linear.
     """
 
     means: list[list[float]]

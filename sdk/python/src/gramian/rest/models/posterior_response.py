@@ -21,8 +21,7 @@ class PosteriorResponse:
 
     Attributes:
         means (list[float]): The posterior mean at each query, unit of the values.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
         variances (list[float] | Unset): The variance of the latent function at each query, no noise added, unit of the
             values squared.
         observation_variances (list[float] | Unset): The variance of a new observation at each query.
@@ -30,12 +29,13 @@ class PosteriorResponse:
         gradients (list[list[float]] | Unset): The gradient of the mean at each query, unit of the values per length.
         gradient_variances (list[list[float]] | Unset): The variances of the components of the latent function's
             gradient at each query.
-        samples (list[list[float]] | Unset): Draws of the latent function, one row each, a number per query.
-        quantiles (list[list[float]] | Unset): Quantiles of the latent function, one row for each probability, a number
+        samples (list[list[float]] | Unset): Draws of the latent function. A draw is a row, with a number per query.
+        quantiles (list[list[float]] | Unset): Quantiles of the latent function. A probability is a row, with a number
             per query.
         exceedance_probabilities (list[float] | Unset): The probability that a new observation exceeds `threshold`, at
             each query.
-        log_marginal_likelihood (float | Unset): −½YᵀΛ − ½ ln det(K + αI) − ½n ln 2π.
+        log_marginal_likelihood (float | Unset): The log marginal likelihood of the values, −½YᵀΛ − ½ ln det(K + αI) −
+            ½n ln 2π.
     """
 
     means: list[float]

@@ -20,16 +20,17 @@ class Problem:
     """A problem document (RFC 9457, `application/problem+json`).
 
     Attributes:
-        type_ (str): The kind of problem: `/problems/<slug>`, served as a page. Example: /problems/invalid-request.
-        title (str): The kind of problem in words, the same for every occurrence.
-        status (int): The HTTP status, repeated. Example: 422.
-        detail (str): What happened in this request, where, and the remedy where there is one.
+        type_ (str): The type of problem: `/problems/<slug>`, which is also served as a page. Example:
+            /problems/invalid-request.
+        title (str): The type of problem in words, the same for every occurrence.
+        status (int): The HTTP status code of the response. Example: 422.
+        detail (str): The specifics of this occurrence: what happened, where, and the remedy if there is one.
         instance (str): The id of the request, as in `X-Request-Id`.
         errors (list[FieldError] | Unset): The fields that were refused.
         minimum_alpha (float | Unset): An alpha for which the computation succeeds, unit of the values squared.
-        point_indices (list[int] | Unset): The points in question, by position in the cloud; at most the first 1,000.
+        point_indices (list[int] | Unset): The points in question, as positions in the cloud. At most the first 1,000.
         limit (int | Unset): The limit that was exceeded, in the unit that `detail` names.
-        required (int | Unset): What the request would have needed, in the same unit.
+        required (int | Unset): The size that the request would have needed, in the unit of `limit`.
     """
 
     type_: str

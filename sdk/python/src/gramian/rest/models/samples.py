@@ -12,12 +12,14 @@ T = TypeVar("T", bound="Samples")
 
 @_attrs_define
 class Samples:
-    """How many functions to draw from the posterior, and which.
+    """Functions to draw from the posterior: their number and a seed.
 
     Attributes:
-        count (int): Functions to draw.
-        seed (int | Unset): Equal seeds give equal draws on processors of one kind, and more of them begin with the same
-            ones; 0 if absent.
+        count (int): Number of functions to draw.
+        seed (int | Unset): The seed of the draws. Default: 0.
+
+            Equal seeds give equal draws on processors of one kind. A larger `count` begins with the draws of a
+            smaller one.
     """
 
     count: int

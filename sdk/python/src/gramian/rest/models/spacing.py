@@ -13,12 +13,12 @@ T = TypeVar("T", bound="Spacing")
 
 @_attrs_define
 class Spacing:
-    """Distances from each point to the nearest point elsewhere.
+    """Statistics of the distance from each point to the nearest point elsewhere.
 
     Attributes:
-        min_ (float): The least of them.
-        median (float): The middle one.
-        max_ (float): The greatest of them.
+        min_ (float): The smallest distance.
+        median (float): The median distance.
+        max_ (float): The largest distance.
     """
 
     min_: float

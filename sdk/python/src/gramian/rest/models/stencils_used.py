@@ -13,15 +13,16 @@ T = TypeVar("T", bound="StencilsUsed")
 
 @_attrs_define
 class StencilsUsed:
-    """Rows of a sparse operator by how their weights came about.
+    """Number of rows of a sparse operator by how their weights were computed.
 
     Attributes:
         nearest (int): Polyharmonic splines on the nearest nodes: the ordinary row.
-        graded (int): Polyharmonic splines on nodes that are sparser the farther they are, where the nearest ones lie on
-            one side.
-        positive (int): Weights without negative ones beside the diagonal, where no splines give a stable row, as at a
+        graded (int): Polyharmonic splines on nodes that thin out with distance, used where the nearest nodes lie on one
+            side.
+        positive (int): Weights that are not negative beside the diagonal, used where no splines give a stable row, as
+            at a
             rim.
-        least_norm (int): Least squares of the least norm, where the nodes do not determine derivatives.
+        least_norm (int): Least squares of least norm, used where the nodes do not determine derivatives.
         empty (int): Rows without entries.
     """
 

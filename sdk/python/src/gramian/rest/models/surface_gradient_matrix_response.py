@@ -21,12 +21,12 @@ class SurfaceGradientMatrixResponse:
     """The surface gradient as matrices.
 
     Attributes:
-        matrices (list[list[list[float] | None]]): One matrix per coordinate, rows are queries, columns are the points
-            of `cloud`, 1/length; a row is null where there
-            is no normal.
+        matrices (list[list[list[float] | None]]): A matrix per coordinate, unit 1/length. Rows are queries, and columns
+            are the points of `cloud`.
+
+            A row is null where there is no normal.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     matrices: list[list[list[float] | None]]

@@ -21,14 +21,15 @@ class SurfaceGradientResponse:
     """Surface gradients at the queries.
 
     Attributes:
-        gradients (list[list[float] | None]): ∇u − (∇u·ν)ν at each query, unit of the values per length; null where
+        gradients (list[list[float] | None]): ∇u − (∇u·ν)ν at each query, unit of the values per length. Null where
             there is no normal.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (null), or less accuracy than it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
-        gradient_deviations (list[list[float] | None] | Unset): Standard deviation of each component given the values
-            and, as far as its deviations are known, the surface; null where there is no
-            answer or no deviation; with `deviations`.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
+        gradient_deviations (list[list[float] | None] | Unset): Standard deviation of each component at each query.
+            Present if `include` has `deviations`.
+
+            It comes from noise and gaps of the values and, as far as the surface has deviations, also from
+            the surface. Null where there is no answer or no deviation.
     """
 
     gradients: list[list[float] | None]

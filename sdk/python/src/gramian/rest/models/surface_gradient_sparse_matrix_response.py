@@ -18,17 +18,17 @@ T = TypeVar("T", bound="SurfaceGradientSparseMatrixResponse")
 
 @_attrs_define
 class SurfaceGradientSparseMatrixResponse:
-    """The components of the surface gradient as sparse matrices with rows for the queries and columns for the nodes.
+    """The components of the surface gradient as sparse matrices. Rows are queries, and columns are nodes.
 
     Attributes:
-        shape (list[int]): Components, queries, nodes.
-        indptr (list[int]): Where each row begins among the entries, and how many there are, from 0.
+        shape (list[int]): The number of components, of queries and of nodes.
+        indptr (list[int]): The position of the first entry of each row, from 0, and the number of all entries at the
+            end.
         indices (list[int]): The column of each entry, from 0, ascending within a row.
-        data (list[list[float]]): The entries row by row, 1/length, one list per component.
+        data (list[list[float]]): The entries row by row, 1/length, as a list per component.
         degenerate (list[Degenerate]): The queries where geometry has no meaning (an empty row), or less accuracy than
             it seems.
-        diagnostics (Diagnostics): What an answer says of itself: the numbers used, how the system was solved, and how
-            well.
+        diagnostics (Diagnostics): Diagnostics of an answer: the numbers used, the method, and its accuracy.
     """
 
     shape: list[int]

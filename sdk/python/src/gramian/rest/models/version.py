@@ -13,14 +13,14 @@ T = TypeVar("T", bound="Version")
 
 @_attrs_define
 class Version:
-    """What is running.
+    """The build that is running, and what it runs on.
 
     Attributes:
         name (str): The name of the service.
-        version (str): Its version.
-        api (str): The interface it serves.
-        instruction_set (str): The instruction set that the kernel loops run on, chosen at start.
-        threads (int): Compute threads.
+        version (str): The version of the service.
+        api (str): The version of the interface.
+        instruction_set (str): The instruction set of the kernel loops, chosen at start.
+        threads (int): Number of compute threads.
     """
 
     name: str

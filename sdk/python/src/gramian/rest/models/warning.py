@@ -17,8 +17,8 @@ class Warning_:
     """Something that was changed, or that limits the accuracy of the answer.
 
     Attributes:
-        code (WarningCode): What a warning is about.
-        detail (str): The same in words, with numbers.
+        code (WarningCode): The subject of a warning.
+        detail (str): The warning in words, with numbers.
     """
 
     code: WarningCode

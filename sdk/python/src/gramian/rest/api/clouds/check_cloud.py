@@ -70,7 +70,7 @@ def sync_detailed(
 ) -> Response[None]:
     """Check for a cloud
 
-     As GET, without the body.
+     Answers like GET on the same path, without the body.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -102,7 +102,7 @@ async def asyncio_detailed(
 ) -> Response[None]:
     """Check for a cloud
 
-     As GET, without the body.
+     Answers like GET on the same path, without the body.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and

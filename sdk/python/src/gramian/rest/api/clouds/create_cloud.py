@@ -128,10 +128,10 @@ def sync_detailed(
 ) -> Response[Cloud | Problem]:
     """Register a cloud
 
-     Keeps the points under an id that is the hash of their coordinates, so that later requests need not
-    repeat them. Posting
-    the same points again answers 200 with the same id. Clouds live in a bounded store, least recently
-    used out first.
+     Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+    coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded
+    store,
+    which drops the least recently used first.
 
     Args:
         body (CloudRequest): Points to register.
@@ -169,10 +169,10 @@ def sync(
 ) -> Cloud | Problem | None:
     """Register a cloud
 
-     Keeps the points under an id that is the hash of their coordinates, so that later requests need not
-    repeat them. Posting
-    the same points again answers 200 with the same id. Clouds live in a bounded store, least recently
-    used out first.
+     Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+    coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded
+    store,
+    which drops the least recently used first.
 
     Args:
         body (CloudRequest): Points to register.
@@ -205,10 +205,10 @@ async def asyncio_detailed(
 ) -> Response[Cloud | Problem]:
     """Register a cloud
 
-     Keeps the points under an id that is the hash of their coordinates, so that later requests need not
-    repeat them. Posting
-    the same points again answers 200 with the same id. Clouds live in a bounded store, least recently
-    used out first.
+     Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+    coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded
+    store,
+    which drops the least recently used first.
 
     Args:
         body (CloudRequest): Points to register.
@@ -244,10 +244,10 @@ async def asyncio(
 ) -> Cloud | Problem | None:
     """Register a cloud
 
-     Keeps the points under an id that is the hash of their coordinates, so that later requests need not
-    repeat them. Posting
-    the same points again answers 200 with the same id. Clouds live in a bounded store, least recently
-    used out first.
+     Keeps the points under an id, so that later requests need not repeat them. The id is the hash of the
+    coordinates: posting the same points again answers 200 with the same id. Clouds live in a bounded
+    store,
+    which drops the least recently used first.
 
     Args:
         body (CloudRequest): Points to register.

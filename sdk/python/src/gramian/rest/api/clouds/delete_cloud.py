@@ -81,7 +81,7 @@ def sync_detailed(
 ) -> Response[None | Problem]:
     """Delete a cloud
 
-     Forgets the points and everything that was computed from them.
+     Deletes the points and everything that was computed from them.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -113,7 +113,7 @@ def sync(
 ) -> None | Problem:
     """Delete a cloud
 
-     Forgets the points and everything that was computed from them.
+     Deletes the points and everything that was computed from them.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -140,7 +140,7 @@ async def asyncio_detailed(
 ) -> Response[None | Problem]:
     """Delete a cloud
 
-     Forgets the points and everything that was computed from them.
+     Deletes the points and everything that was computed from them.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -170,7 +170,7 @@ async def asyncio(
 ) -> None | Problem:
     """Delete a cloud
 
-     Forgets the points and everything that was computed from them.
+     Deletes the points and everything that was computed from them.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and

@@ -99,9 +99,11 @@ def sync_detailed(
 ) -> Response[None | Cloud | Problem]:
     """Describe a cloud
 
-     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
-    None-Match` save the
-    body; asking keeps the cloud from being dropped as the least recently used.
+     Returns the size of the cloud, the box around it and the distances between its points, but not the
+    points.
+    `ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to
+    be
+    dropped.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -133,9 +135,11 @@ def sync(
 ) -> None | Cloud | Problem:
     """Describe a cloud
 
-     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
-    None-Match` save the
-    body; asking keeps the cloud from being dropped as the least recently used.
+     Returns the size of the cloud, the box around it and the distances between its points, but not the
+    points.
+    `ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to
+    be
+    dropped.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -162,9 +166,11 @@ async def asyncio_detailed(
 ) -> Response[None | Cloud | Problem]:
     """Describe a cloud
 
-     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
-    None-Match` save the
-    body; asking keeps the cloud from being dropped as the least recently used.
+     Returns the size of the cloud, the box around it and the distances between its points, but not the
+    points.
+    `ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to
+    be
+    dropped.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and
@@ -194,9 +200,11 @@ async def asyncio(
 ) -> None | Cloud | Problem:
     """Describe a cloud
 
-     Its size, the box around it and the distances between its points, not the points. `ETag` and `If-
-    None-Match` save the
-    body; asking keeps the cloud from being dropped as the least recently used.
+     Returns the size of the cloud, the box around it and the distances between its points, but not the
+    points.
+    `ETag` and `If-None-Match` save the body. The request counts as use, so the cloud is not the next to
+    be
+    dropped.
 
     Args:
         cloud_id (str): The id of a cloud, 64 hexadecimal digits: BLAKE3 of d, n, the points and

@@ -102,7 +102,7 @@ def sync_detailed(
 ) -> Response[CloudList | Problem]:
     """List clouds
 
-     The clouds registered with this key, oldest first.
+     Returns the clouds registered with this key, oldest first.
 
     Args:
         limit (int | Unset):
@@ -137,7 +137,7 @@ def sync(
 ) -> CloudList | Problem | None:
     """List clouds
 
-     The clouds registered with this key, oldest first.
+     Returns the clouds registered with this key, oldest first.
 
     Args:
         limit (int | Unset):
@@ -167,7 +167,7 @@ async def asyncio_detailed(
 ) -> Response[CloudList | Problem]:
     """List clouds
 
-     The clouds registered with this key, oldest first.
+     Returns the clouds registered with this key, oldest first.
 
     Args:
         limit (int | Unset):
@@ -200,7 +200,7 @@ async def asyncio(
 ) -> CloudList | Problem | None:
     """List clouds
 
-     The clouds registered with this key, oldest first.
+     Returns the clouds registered with this key, oldest first.
 
     Args:
         limit (int | Unset):

@@ -126,17 +126,19 @@ def sync_detailed(
 ) -> Response[CurvaturesResponse | Problem]:
     """Compute curvatures
 
-     Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator
-    S = σPD²uP/|∇u| of
-    the level surface of the signature function u, or of an offset model of the nearest points where the
-    gradient of u
-    vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the
-    points around a query
-    do not confirm are flagged.
+     Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures.
+    Principal
+    curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
+    signature
+    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
+    the
+    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
+    around
+    a query do not confirm are flagged.
 
     Args:
-        body (CurvaturesRequest): A cloud that samples a hypersurface, and where its curvatures
-            are wanted.
+        body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its curvatures.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -167,17 +169,19 @@ def sync(
 ) -> CurvaturesResponse | Problem | None:
     """Compute curvatures
 
-     Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator
-    S = σPD²uP/|∇u| of
-    the level surface of the signature function u, or of an offset model of the nearest points where the
-    gradient of u
-    vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the
-    points around a query
-    do not confirm are flagged.
+     Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures.
+    Principal
+    curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
+    signature
+    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
+    the
+    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
+    around
+    a query do not confirm are flagged.
 
     Args:
-        body (CurvaturesRequest): A cloud that samples a hypersurface, and where its curvatures
-            are wanted.
+        body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its curvatures.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -203,17 +207,19 @@ async def asyncio_detailed(
 ) -> Response[CurvaturesResponse | Problem]:
     """Compute curvatures
 
-     Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator
-    S = σPD²uP/|∇u| of
-    the level surface of the signature function u, or of an offset model of the nearest points where the
-    gradient of u
-    vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the
-    points around a query
-    do not confirm are flagged.
+     Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures.
+    Principal
+    curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
+    signature
+    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
+    the
+    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
+    around
+    a query do not confirm are flagged.
 
     Args:
-        body (CurvaturesRequest): A cloud that samples a hypersurface, and where its curvatures
-            are wanted.
+        body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its curvatures.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -242,17 +248,19 @@ async def asyncio(
 ) -> CurvaturesResponse | Problem | None:
     """Compute curvatures
 
-     Principal curvatures with directions, mean and Gaussian curvature: eigenvalues of the shape operator
-    S = σPD²uP/|∇u| of
-    the level surface of the signature function u, or of an offset model of the nearest points where the
-    gradient of u
-    vanishes or is weak. A sphere of radius r has curvatures +1/r with outward normals. Entries that the
-    points around a query
-    do not confirm are flagged.
+     Returns principal curvatures with their directions, mean curvatures and Gaussian curvatures.
+    Principal
+    curvatures are eigenvalues of the shape operator S = σPD²uP/|∇u| of the level surface of the
+    signature
+    function u. Where the gradient of u vanishes or is weak, an offset model of the nearest points takes
+    the
+    place of u. A sphere of radius r has curvatures +1/r with outward normals. Entries that the points
+    around
+    a query do not confirm are flagged.
 
     Args:
-        body (CurvaturesRequest): A cloud that samples a hypersurface, and where its curvatures
-            are wanted.
+        body (CurvaturesRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its curvatures.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

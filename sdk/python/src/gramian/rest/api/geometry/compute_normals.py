@@ -126,15 +126,17 @@ def sync_detailed(
 ) -> Response[NormalsResponse | Problem]:
     """Compute normals
 
-     The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
-    interpolant of the
-    constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours
-    and repaired; where
-    the gradient of u vanishes, an offset model of the nearest points answers in its place.
+     Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u,
+    the
+    interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
+    against
+    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
+    takes
+    the place of u.
 
     Args:
-        body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
-            wanted.
+        body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its normals.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -165,15 +167,17 @@ def sync(
 ) -> NormalsResponse | Problem | None:
     """Compute normals
 
-     The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
-    interpolant of the
-    constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours
-    and repaired; where
-    the gradient of u vanishes, an offset model of the nearest points answers in its place.
+     Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u,
+    the
+    interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
+    against
+    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
+    takes
+    the place of u.
 
     Args:
-        body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
-            wanted.
+        body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its normals.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -199,15 +203,17 @@ async def asyncio_detailed(
 ) -> Response[NormalsResponse | Problem]:
     """Compute normals
 
-     The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
-    interpolant of the
-    constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours
-    and repaired; where
-    the gradient of u vanishes, an offset model of the nearest points answers in its place.
+     Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u,
+    the
+    interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
+    against
+    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
+    takes
+    the place of u.
 
     Args:
-        body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
-            wanted.
+        body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its normals.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -236,15 +242,17 @@ async def asyncio(
 ) -> NormalsResponse | Problem | None:
     """Compute normals
 
-     The unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u, the
-    interpolant of the
-    constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked against the neighbours
-    and repaired; where
-    the gradient of u vanishes, an offset model of the nearest points answers in its place.
+     Returns the unit normals ν = −∇u/|∇u| (outward) of the level surface of the signature function u,
+    the
+    interpolant of the constant 1. The cloud needs no mesh and no neighbourhoods. Signs are checked
+    against
+    the neighbours and repaired. Where the gradient of u vanishes, an offset model of the nearest points
+    takes
+    the place of u.
 
     Args:
-        body (NormalsRequest): A cloud that samples a hypersurface, and where its normals are
-            wanted.
+        body (NormalsRequest): A cloud that samples a hypersurface, and queries at which to
+            compute its normals.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

@@ -81,7 +81,8 @@ def sync_detailed(
 ) -> Response[None | Problem]:
     """Delete a job
 
-     Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+     Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its
+    result.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -112,7 +113,8 @@ def sync(
 ) -> None | Problem:
     """Delete a job
 
-     Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+     Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its
+    result.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -138,7 +140,8 @@ async def asyncio_detailed(
 ) -> Response[None | Problem]:
     """Delete a job
 
-     Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+     Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its
+    result.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -167,7 +170,8 @@ async def asyncio(
 ) -> None | Problem:
     """Delete a job
 
-     Cancels it, if it has not ended: its work stops soon. Forgets it and its result, if it has.
+     Cancels a job that has not ended, and its work stops soon. Deletes a job that has ended, with its
+    result.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.

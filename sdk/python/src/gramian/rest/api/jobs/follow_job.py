@@ -81,9 +81,8 @@ def sync_detailed(
 ) -> Response[Problem | str]:
     """Follow a job
 
-     Server-sent events: `progress`, with the job as its data, whenever it is further than before;
-    `done`, with the job, when it has ended, and
-    then nothing more.
+     Sends server-sent events whose data is the job. `progress` is sent whenever the job is further than
+    before. `done` is sent when the job has ended, and is the last event.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -114,9 +113,8 @@ def sync(
 ) -> Problem | str | None:
     """Follow a job
 
-     Server-sent events: `progress`, with the job as its data, whenever it is further than before;
-    `done`, with the job, when it has ended, and
-    then nothing more.
+     Sends server-sent events whose data is the job. `progress` is sent whenever the job is further than
+    before. `done` is sent when the job has ended, and is the last event.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -142,9 +140,8 @@ async def asyncio_detailed(
 ) -> Response[Problem | str]:
     """Follow a job
 
-     Server-sent events: `progress`, with the job as its data, whenever it is further than before;
-    `done`, with the job, when it has ended, and
-    then nothing more.
+     Sends server-sent events whose data is the job. `progress` is sent whenever the job is further than
+    before. `done` is sent when the job has ended, and is the last event.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -173,9 +170,8 @@ async def asyncio(
 ) -> Problem | str | None:
     """Follow a job
 
-     Server-sent events: `progress`, with the job as its data, whenever it is further than before;
-    `done`, with the job, when it has ended, and
-    then nothing more.
+     Sends server-sent events whose data is the job. `progress` is sent whenever the job is further than
+    before. `done` is sent when the job has ended, and is the last event.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.

@@ -93,7 +93,9 @@ def sync_detailed(
 ) -> Response[Job | Problem]:
     """Look at a job
 
-     Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+     Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how
+    long
+    it will take.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -124,7 +126,9 @@ def sync(
 ) -> Job | Problem | None:
     """Look at a job
 
-     Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+     Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how
+    long
+    it will take.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -150,7 +154,9 @@ async def asyncio_detailed(
 ) -> Response[Job | Problem]:
     """Look at a job
 
-     Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+     Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how
+    long
+    it will take.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -179,7 +185,9 @@ async def asyncio(
 ) -> Job | Problem | None:
     """Look at a job
 
-     Whether it waits, is being computed or has ended, how far it is, and how long it will take.
+     Returns the state of a job: whether it waits, is being computed or has ended, its progress, and how
+    long
+    it will take.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.

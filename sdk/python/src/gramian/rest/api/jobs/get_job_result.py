@@ -106,9 +106,11 @@ def sync_detailed(
 ) -> Response[None | Problem]:
     """Fetch the result of a job
 
-     What the request is answered with, its problem included; a success is 200 with the media type that
-    the request asked for. Waits for the job
-    to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+     Answers as the request of the job would have been answered, problems included. A success is 200 with
+    the
+    media type that the request asked for. Waits for the job to end. If that takes longer than the
+    deadline of
+    requests, the answer is 504, and the job goes on.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -139,9 +141,11 @@ def sync(
 ) -> None | Problem:
     """Fetch the result of a job
 
-     What the request is answered with, its problem included; a success is 200 with the media type that
-    the request asked for. Waits for the job
-    to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+     Answers as the request of the job would have been answered, problems included. A success is 200 with
+    the
+    media type that the request asked for. Waits for the job to end. If that takes longer than the
+    deadline of
+    requests, the answer is 504, and the job goes on.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -167,9 +171,11 @@ async def asyncio_detailed(
 ) -> Response[None | Problem]:
     """Fetch the result of a job
 
-     What the request is answered with, its problem included; a success is 200 with the media type that
-    the request asked for. Waits for the job
-    to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+     Answers as the request of the job would have been answered, problems included. A success is 200 with
+    the
+    media type that the request asked for. Waits for the job to end. If that takes longer than the
+    deadline of
+    requests, the answer is 504, and the job goes on.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.
@@ -198,9 +204,11 @@ async def asyncio(
 ) -> None | Problem:
     """Fetch the result of a job
 
-     What the request is answered with, its problem included; a success is 200 with the media type that
-    the request asked for. Waits for the job
-    to end; where that takes longer than requests may, the answer is 504, and the job goes on.
+     Answers as the request of the job would have been answered, problems included. A success is 200 with
+    the
+    media type that the request asked for. Waits for the job to end. If that takes longer than the
+    deadline of
+    requests, the answer is 504, and the job goes on.
 
     Args:
         job_id (str): The id of a job: a UUID of version 7, in lower case.

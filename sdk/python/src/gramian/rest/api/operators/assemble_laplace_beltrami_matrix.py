@@ -126,12 +126,13 @@ def sync_detailed(
 ) -> Response[LaplaceBeltramiMatrixResponse | Problem]:
     """Assemble the Laplace–Beltrami matrix
 
-     The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square,
-    or not.
+     Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries.
+    The
+    matrix need not be square.
 
     Args:
-        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            Laplace–Beltrami matrix are wanted.
+        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -162,12 +163,13 @@ def sync(
 ) -> LaplaceBeltramiMatrixResponse | Problem | None:
     """Assemble the Laplace–Beltrami matrix
 
-     The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square,
-    or not.
+     Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries.
+    The
+    matrix need not be square.
 
     Args:
-        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            Laplace–Beltrami matrix are wanted.
+        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -193,12 +195,13 @@ async def asyncio_detailed(
 ) -> Response[LaplaceBeltramiMatrixResponse | Problem]:
     """Assemble the Laplace–Beltrami matrix
 
-     The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square,
-    or not.
+     Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries.
+    The
+    matrix need not be square.
 
     Args:
-        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            Laplace–Beltrami matrix are wanted.
+        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -227,12 +230,13 @@ async def asyncio(
 ) -> LaplaceBeltramiMatrixResponse | Problem | None:
     """Assemble the Laplace–Beltrami matrix
 
-     The matrix that turns values at the nodes into the Laplace–Beltrami operator at the queries: square,
-    or not.
+     Returns the matrix that maps values at the nodes to the Laplace–Beltrami operator at the queries.
+    The
+    matrix need not be square.
 
     Args:
-        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            Laplace–Beltrami matrix are wanted.
+        body (LaplaceBeltramiMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

@@ -130,18 +130,22 @@ def sync_detailed(
 ) -> Response[LaplaceBeltramiSparseMatrixResponse | Problem]:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
-    over the tangent plane: exact
-    for these, of third order for second derivatives. It needs no kernel for values and takes any number
-    of nodes. Over the nodes
-    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
-    at a rim are those of a
-    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
-    kind.
+     Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed
+    polyharmonic
+    splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials,
+    and of
+    third order for second derivatives. The matrix needs no kernel for values and takes any number of
+    nodes.
+
+    If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for
+    time
+    steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are
+    flagged.
+    `diagnostics.stencils` counts rows of each kind.
 
     Args:
-        body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (LaplaceBeltramiSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -172,18 +176,22 @@ def sync(
 ) -> LaplaceBeltramiSparseMatrixResponse | Problem | None:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
-    over the tangent plane: exact
-    for these, of third order for second derivatives. It needs no kernel for values and takes any number
-    of nodes. Over the nodes
-    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
-    at a rim are those of a
-    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
-    kind.
+     Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed
+    polyharmonic
+    splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials,
+    and of
+    third order for second derivatives. The matrix needs no kernel for values and takes any number of
+    nodes.
+
+    If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for
+    time
+    steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are
+    flagged.
+    `diagnostics.stencils` counts rows of each kind.
 
     Args:
-        body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (LaplaceBeltramiSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -209,18 +217,22 @@ async def asyncio_detailed(
 ) -> Response[LaplaceBeltramiSparseMatrixResponse | Problem]:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
-    over the tangent plane: exact
-    for these, of third order for second derivatives. It needs no kernel for values and takes any number
-    of nodes. Over the nodes
-    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
-    at a rim are those of a
-    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
-    kind.
+     Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed
+    polyharmonic
+    splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials,
+    and of
+    third order for second derivatives. The matrix needs no kernel for values and takes any number of
+    nodes.
+
+    If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for
+    time
+    steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are
+    flagged.
+    `diagnostics.stencils` counts rows of each kind.
 
     Args:
-        body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (LaplaceBeltramiSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -249,18 +261,22 @@ async def asyncio(
 ) -> LaplaceBeltramiSparseMatrixResponse | Problem | None:
     """Assemble the sparse matrix of the Laplace–Beltrami operator
 
-     Weights of the nodes near each query, by smoothed polyharmonic splines with polynomials of degree 4
-    over the tangent plane: exact
-    for these, of third order for second derivatives. It needs no kernel for values and takes any number
-    of nodes. Over the nodes
-    themselves no eigenvalue has a positive real part, so that it can be stepped in time. For that, rows
-    at a rim are those of a
-    boundary that nothing flows through, and are flagged; `diagnostics.stencils` counts rows of each
-    kind.
+     Returns a matrix whose rows weight the nodes near each query. Weights come from smoothed
+    polyharmonic
+    splines with polynomials of degree 4 over the tangent plane. They are exact for these polynomials,
+    and of
+    third order for second derivatives. The matrix needs no kernel for values and takes any number of
+    nodes.
+
+    If the queries are the nodes, no eigenvalue has a positive real part, so the matrix can be used for
+    time
+    steps. To achieve this, rows at a rim are those of a boundary that nothing flows through, and are
+    flagged.
+    `diagnostics.stencils` counts rows of each kind.
 
     Args:
-        body (LaplaceBeltramiSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (LaplaceBeltramiSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse Laplace–Beltrami matrix.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

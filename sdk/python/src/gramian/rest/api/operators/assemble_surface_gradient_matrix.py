@@ -126,12 +126,13 @@ def sync_detailed(
 ) -> Response[Problem | SurfaceGradientMatrixResponse]:
     """Assemble surface gradient matrices
 
-     One matrix per coordinate that turns values at the nodes into that component of the surface gradient
-    at the queries.
+     Returns a matrix per coordinate. It maps values at the nodes to that component of the surface
+    gradient at
+    the queries.
 
     Args:
-        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            surface gradient matrices are wanted.
+        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -162,12 +163,13 @@ def sync(
 ) -> Problem | SurfaceGradientMatrixResponse | None:
     """Assemble surface gradient matrices
 
-     One matrix per coordinate that turns values at the nodes into that component of the surface gradient
-    at the queries.
+     Returns a matrix per coordinate. It maps values at the nodes to that component of the surface
+    gradient at
+    the queries.
 
     Args:
-        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            surface gradient matrices are wanted.
+        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -193,12 +195,13 @@ async def asyncio_detailed(
 ) -> Response[Problem | SurfaceGradientMatrixResponse]:
     """Assemble surface gradient matrices
 
-     One matrix per coordinate that turns values at the nodes into that component of the surface gradient
-    at the queries.
+     Returns a matrix per coordinate. It maps values at the nodes to that component of the surface
+    gradient at
+    the queries.
 
     Args:
-        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            surface gradient matrices are wanted.
+        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -227,12 +230,13 @@ async def asyncio(
 ) -> Problem | SurfaceGradientMatrixResponse | None:
     """Assemble surface gradient matrices
 
-     One matrix per coordinate that turns values at the nodes into that component of the surface gradient
-    at the queries.
+     Returns a matrix per coordinate. It maps values at the nodes to that component of the surface
+    gradient at
+    the queries.
 
     Args:
-        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and where rows of its
-            surface gradient matrices are wanted.
+        body (SurfaceGradientMatrixRequest): A cloud of nodes on a surface, and queries for the
+            rows of its surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

@@ -130,14 +130,15 @@ def sync_detailed(
 ) -> Response[Problem | SurfaceGradientSparseMatrixResponse]:
     """Assemble the sparse matrix of the surface gradient
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines
+    with
+    polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third
+    order
+    for second derivatives. The matrices need no kernel for values and take any number of nodes.
 
     Args:
-        body (SurfaceGradientSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (SurfaceGradientSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -168,14 +169,15 @@ def sync(
 ) -> Problem | SurfaceGradientSparseMatrixResponse | None:
     """Assemble the sparse matrix of the surface gradient
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines
+    with
+    polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third
+    order
+    for second derivatives. The matrices need no kernel for values and take any number of nodes.
 
     Args:
-        body (SurfaceGradientSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (SurfaceGradientSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -201,14 +203,15 @@ async def asyncio_detailed(
 ) -> Response[Problem | SurfaceGradientSparseMatrixResponse]:
     """Assemble the sparse matrix of the surface gradient
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines
+    with
+    polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third
+    order
+    for second derivatives. The matrices need no kernel for values and take any number of nodes.
 
     Args:
-        body (SurfaceGradientSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (SurfaceGradientSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -237,14 +240,15 @@ async def asyncio(
 ) -> Problem | SurfaceGradientSparseMatrixResponse | None:
     """Assemble the sparse matrix of the surface gradient
 
-     Weights of the nodes near each query, by polyharmonic splines with polynomials of degree 4 over the
-    tangent plane: exact for
-    these, of third order for second derivatives. It needs no kernel for values and takes any number of
-    nodes.
+     Returns matrices whose rows weight the nodes near each query. Weights come from polyharmonic splines
+    with
+    polynomials of degree 4 over the tangent plane. They are exact for these polynomials, and of third
+    order
+    for second derivatives. The matrices need no kernel for values and take any number of nodes.
 
     Args:
-        body (SurfaceGradientSparseMatrixRequest): Nodes and queries of the operator as a sparse
-            matrix.
+        body (SurfaceGradientSparseMatrixRequest): A cloud of nodes on a surface, and queries for
+            the rows of its sparse surface gradient matrices.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

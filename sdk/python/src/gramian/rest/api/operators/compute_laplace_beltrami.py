@@ -126,13 +126,13 @@ def sync_detailed(
 ) -> Response[LaplaceBeltramiResponse | Problem]:
     """Compute the Laplace–Beltrami operator
 
-     Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the
-    signature function. On
-    the unit circle Δ cos θ = −cos θ.
+     Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level
+    surface of
+    the signature function. On the unit circle Δ cos θ = −cos θ.
 
     Args:
-        body (LaplaceBeltramiRequest): Values on a surface, and where their Laplace–Beltrami
-            operator is wanted.
+        body (LaplaceBeltramiRequest): Values on a surface, and queries at which to compute their
+            Laplace–Beltrami operator.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -163,13 +163,13 @@ def sync(
 ) -> LaplaceBeltramiResponse | Problem | None:
     """Compute the Laplace–Beltrami operator
 
-     Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the
-    signature function. On
-    the unit circle Δ cos θ = −cos θ.
+     Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level
+    surface of
+    the signature function. On the unit circle Δ cos θ = −cos θ.
 
     Args:
-        body (LaplaceBeltramiRequest): Values on a surface, and where their Laplace–Beltrami
-            operator is wanted.
+        body (LaplaceBeltramiRequest): Values on a surface, and queries at which to compute their
+            Laplace–Beltrami operator.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -195,13 +195,13 @@ async def asyncio_detailed(
 ) -> Response[LaplaceBeltramiResponse | Problem]:
     """Compute the Laplace–Beltrami operator
 
-     Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the
-    signature function. On
-    the unit circle Δ cos θ = −cos θ.
+     Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level
+    surface of
+    the signature function. On the unit circle Δ cos θ = −cos θ.
 
     Args:
-        body (LaplaceBeltramiRequest): Values on a surface, and where their Laplace–Beltrami
-            operator is wanted.
+        body (LaplaceBeltramiRequest): Values on a surface, and queries at which to compute their
+            Laplace–Beltrami operator.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -230,13 +230,13 @@ async def asyncio(
 ) -> LaplaceBeltramiResponse | Problem | None:
     """Compute the Laplace–Beltrami operator
 
-     Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function through the values, on the level surface of the
-    signature function. On
-    the unit circle Δ cos θ = −cos θ.
+     Returns Δu = tr D²u − νᵀD²uν − tr(Dν) ∂_νu of the function u through the values, on the level
+    surface of
+    the signature function. On the unit circle Δ cos θ = −cos θ.
 
     Args:
-        body (LaplaceBeltramiRequest): Values on a surface, and where their Laplace–Beltrami
-            operator is wanted.
+        body (LaplaceBeltramiRequest): Values on a surface, and queries at which to compute their
+            Laplace–Beltrami operator.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

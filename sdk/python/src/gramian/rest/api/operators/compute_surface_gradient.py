@@ -126,12 +126,13 @@ def sync_detailed(
 ) -> Response[Problem | SurfaceGradientResponse]:
     """Compute surface gradients
 
-     The tangential part of the gradient of the function through the values, on the level surface of the
-    signature function.
+     Returns the tangential part of the gradient of the function through the values, on the level surface
+    of
+    the signature function.
 
     Args:
-        body (SurfaceGradientRequest): Values on a surface, and where their surface gradient is
-            wanted.
+        body (SurfaceGradientRequest): Values on a surface, and queries at which to compute their
+            surface gradient.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -162,12 +163,13 @@ def sync(
 ) -> Problem | SurfaceGradientResponse | None:
     """Compute surface gradients
 
-     The tangential part of the gradient of the function through the values, on the level surface of the
-    signature function.
+     Returns the tangential part of the gradient of the function through the values, on the level surface
+    of
+    the signature function.
 
     Args:
-        body (SurfaceGradientRequest): Values on a surface, and where their surface gradient is
-            wanted.
+        body (SurfaceGradientRequest): Values on a surface, and queries at which to compute their
+            surface gradient.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -193,12 +195,13 @@ async def asyncio_detailed(
 ) -> Response[Problem | SurfaceGradientResponse]:
     """Compute surface gradients
 
-     The tangential part of the gradient of the function through the values, on the level surface of the
-    signature function.
+     Returns the tangential part of the gradient of the function through the values, on the level surface
+    of
+    the signature function.
 
     Args:
-        body (SurfaceGradientRequest): Values on a surface, and where their surface gradient is
-            wanted.
+        body (SurfaceGradientRequest): Values on a surface, and queries at which to compute their
+            surface gradient.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -227,12 +230,13 @@ async def asyncio(
 ) -> Problem | SurfaceGradientResponse | None:
     """Compute surface gradients
 
-     The tangential part of the gradient of the function through the values, on the level surface of the
-    signature function.
+     Returns the tangential part of the gradient of the function through the values, on the level surface
+    of
+    the signature function.
 
     Args:
-        body (SurfaceGradientRequest): Values on a surface, and where their surface gradient is
-            wanted.
+        body (SurfaceGradientRequest): Values on a surface, and queries at which to compute their
+            surface gradient.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

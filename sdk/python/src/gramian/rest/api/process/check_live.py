@@ -62,7 +62,7 @@ def sync_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process lives
 
-     200 as long as it answers at all, whatever it is busy with.
+     Answers 200 as long as the process answers at all, whatever it is busy with.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -87,7 +87,7 @@ def sync(
 ) -> Health | Problem | None:
     """Check that the process lives
 
-     200 as long as it answers at all, whatever it is busy with.
+     Answers 200 as long as the process answers at all, whatever it is busy with.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -108,7 +108,7 @@ async def asyncio_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process lives
 
-     200 as long as it answers at all, whatever it is busy with.
+     Answers 200 as long as the process answers at all, whatever it is busy with.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -131,7 +131,7 @@ async def asyncio(
 ) -> Health | Problem | None:
     """Check that the process lives
 
-     200 as long as it answers at all, whatever it is busy with.
+     Answers 200 as long as the process answers at all, whatever it is busy with.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -62,9 +62,12 @@ def sync_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
-    store is required, while that
-    does not take what it is given.
+     Answers 503 in each of these cases:
+
+    - the queue is full
+    - the process shuts down
+    - the compute threads make no progress
+    - the store is required and does not take what it is given
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -89,9 +92,12 @@ def sync(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
-    store is required, while that
-    does not take what it is given.
+     Answers 503 in each of these cases:
+
+    - the queue is full
+    - the process shuts down
+    - the compute threads make no progress
+    - the store is required and does not take what it is given
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -112,9 +118,12 @@ async def asyncio_detailed(
 ) -> Response[Health | Problem]:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
-    store is required, while that
-    does not take what it is given.
+     Answers 503 in each of these cases:
+
+    - the queue is full
+    - the process shuts down
+    - the compute threads make no progress
+    - the store is required and does not take what it is given
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -137,9 +146,12 @@ async def asyncio(
 ) -> Health | Problem | None:
     """Check that the process takes requests
 
-     503 while its queue is full, while it shuts down, if its compute threads do not move, and, where the
-    store is required, while that
-    does not take what it is given.
+     Answers 503 in each of these cases:
+
+    - the queue is full
+    - the process shuts down
+    - the compute threads make no progress
+    - the store is required and does not take what it is given
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

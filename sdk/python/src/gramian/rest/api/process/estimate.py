@@ -126,12 +126,11 @@ def sync_detailed(
 ) -> Response[EstimateResponse | Problem]:
     """Estimate a request
 
-     What another request would take, before it is sent: the body is that of the other request, with the
-    name of its operation as one member
-    more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the
-    request itself would do. What
-    would be refused is refused here as well, with the same problem; times are learned from what ran on
-    this machine.
+     Returns the cost of another request before it is sent. The body is that of the other request, with
+    `operation` as a further member. Nothing is factorized. Points in the body are registered and their
+    neighbours are searched, as the request itself would do. A request that would be refused is refused
+    here
+    with the same problem. Times are learned from what ran on this machine.
 
     Args:
         body (EstimateRequest): The members of a request of this operation, and `operation` beside
@@ -166,12 +165,11 @@ def sync(
 ) -> EstimateResponse | Problem | None:
     """Estimate a request
 
-     What another request would take, before it is sent: the body is that of the other request, with the
-    name of its operation as one member
-    more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the
-    request itself would do. What
-    would be refused is refused here as well, with the same problem; times are learned from what ran on
-    this machine.
+     Returns the cost of another request before it is sent. The body is that of the other request, with
+    `operation` as a further member. Nothing is factorized. Points in the body are registered and their
+    neighbours are searched, as the request itself would do. A request that would be refused is refused
+    here
+    with the same problem. Times are learned from what ran on this machine.
 
     Args:
         body (EstimateRequest): The members of a request of this operation, and `operation` beside
@@ -201,12 +199,11 @@ async def asyncio_detailed(
 ) -> Response[EstimateResponse | Problem]:
     """Estimate a request
 
-     What another request would take, before it is sent: the body is that of the other request, with the
-    name of its operation as one member
-    more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the
-    request itself would do. What
-    would be refused is refused here as well, with the same problem; times are learned from what ran on
-    this machine.
+     Returns the cost of another request before it is sent. The body is that of the other request, with
+    `operation` as a further member. Nothing is factorized. Points in the body are registered and their
+    neighbours are searched, as the request itself would do. A request that would be refused is refused
+    here
+    with the same problem. Times are learned from what ran on this machine.
 
     Args:
         body (EstimateRequest): The members of a request of this operation, and `operation` beside
@@ -239,12 +236,11 @@ async def asyncio(
 ) -> EstimateResponse | Problem | None:
     """Estimate a request
 
-     What another request would take, before it is sent: the body is that of the other request, with the
-    name of its operation as one member
-    more. Nothing is factorized. Points in it are registered, and their neighbours are looked at, as the
-    request itself would do. What
-    would be refused is refused here as well, with the same problem; times are learned from what ran on
-    this machine.
+     Returns the cost of another request before it is sent. The body is that of the other request, with
+    `operation` as a further member. Nothing is factorized. Points in the body are registered and their
+    neighbours are searched, as the request itself would do. A request that would be refused is refused
+    here
+    with the same problem. Times are learned from what ran on this machine.
 
     Args:
         body (EstimateRequest): The members of a request of this operation, and `operation` beside

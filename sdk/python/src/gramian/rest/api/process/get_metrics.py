@@ -60,9 +60,10 @@ def sync_detailed(
 ) -> Response[Problem | str]:
     """Read the metrics
 
-     Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route
-    and status, the queue, memory,
-    caches, solvers, refusals, the store and the process. No label takes what clients send.
+     Returns counters, histograms and gauges in the text format of Prometheus, version 0.0.4. They cover
+    requests by route and status, the queue, memory, caches, solvers, refusals, the store and the
+    process. No
+    label has text that clients send.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -87,9 +88,10 @@ def sync(
 ) -> Problem | str | None:
     """Read the metrics
 
-     Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route
-    and status, the queue, memory,
-    caches, solvers, refusals, the store and the process. No label takes what clients send.
+     Returns counters, histograms and gauges in the text format of Prometheus, version 0.0.4. They cover
+    requests by route and status, the queue, memory, caches, solvers, refusals, the store and the
+    process. No
+    label has text that clients send.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -110,9 +112,10 @@ async def asyncio_detailed(
 ) -> Response[Problem | str]:
     """Read the metrics
 
-     Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route
-    and status, the queue, memory,
-    caches, solvers, refusals, the store and the process. No label takes what clients send.
+     Returns counters, histograms and gauges in the text format of Prometheus, version 0.0.4. They cover
+    requests by route and status, the queue, memory, caches, solvers, refusals, the store and the
+    process. No
+    label has text that clients send.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -135,9 +138,10 @@ async def asyncio(
 ) -> Problem | str | None:
     """Read the metrics
 
-     Counters, histograms and gauges in the text format of Prometheus, version 0.0.4: requests by route
-    and status, the queue, memory,
-    caches, solvers, refusals, the store and the process. No label takes what clients send.
+     Returns counters, histograms and gauges in the text format of Prometheus, version 0.0.4. They cover
+    requests by route and status, the queue, memory, caches, solvers, refusals, the store and the
+    process. No
+    label has text that clients send.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -71,7 +71,7 @@ def sync_detailed(
 ) -> Response[Problem | str]:
     """Explain a problem
 
-     The page behind the `type` of a problem document: what it means and what to do.
+     Returns the page behind the `type` of a problem document: its meaning, and what to do.
 
     Args:
         slug (str):
@@ -102,7 +102,7 @@ def sync(
 ) -> Problem | str | None:
     """Explain a problem
 
-     The page behind the `type` of a problem document: what it means and what to do.
+     Returns the page behind the `type` of a problem document: its meaning, and what to do.
 
     Args:
         slug (str):
@@ -128,7 +128,7 @@ async def asyncio_detailed(
 ) -> Response[Problem | str]:
     """Explain a problem
 
-     The page behind the `type` of a problem document: what it means and what to do.
+     Returns the page behind the `type` of a problem document: its meaning, and what to do.
 
     Args:
         slug (str):
@@ -157,7 +157,7 @@ async def asyncio(
 ) -> Problem | str | None:
     """Explain a problem
 
-     The page behind the `type` of a problem document: what it means and what to do.
+     Returns the page behind the `type` of a problem document: its meaning, and what to do.
 
     Args:
         slug (str):

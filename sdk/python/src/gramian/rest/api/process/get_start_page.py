@@ -60,7 +60,8 @@ def sync_detailed(
 ) -> Response[Problem | str]:
     """Begin here
 
-     A page that leads to the documentation, the documents for generators and the problems.
+     Returns a page with links to the documentation, the OpenAPI documents for generators and the
+    problems.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -85,7 +86,8 @@ def sync(
 ) -> Problem | str | None:
     """Begin here
 
-     A page that leads to the documentation, the documents for generators and the problems.
+     Returns a page with links to the documentation, the OpenAPI documents for generators and the
+    problems.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -106,7 +108,8 @@ async def asyncio_detailed(
 ) -> Response[Problem | str]:
     """Begin here
 
-     A page that leads to the documentation, the documents for generators and the problems.
+     Returns a page with links to the documentation, the OpenAPI documents for generators and the
+    problems.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -129,7 +132,8 @@ async def asyncio(
 ) -> Problem | str | None:
     """Begin here
 
-     A page that leads to the documentation, the documents for generators and the problems.
+     Returns a page with links to the documentation, the OpenAPI documents for generators and the
+    problems.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

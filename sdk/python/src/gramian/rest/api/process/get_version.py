@@ -62,7 +62,9 @@ def sync_detailed(
 ) -> Response[Problem | Version]:
     """Describe the build
 
-     The version of the service and what it chose to run on this machine.
+     Returns the version of the service, and the instruction set and number of threads that it chose on
+    this
+    machine.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -87,7 +89,9 @@ def sync(
 ) -> Problem | Version | None:
     """Describe the build
 
-     The version of the service and what it chose to run on this machine.
+     Returns the version of the service, and the instruction set and number of threads that it chose on
+    this
+    machine.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -108,7 +112,9 @@ async def asyncio_detailed(
 ) -> Response[Problem | Version]:
     """Describe the build
 
-     The version of the service and what it chose to run on this machine.
+     Returns the version of the service, and the instruction set and number of threads that it chose on
+    this
+    machine.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -131,7 +137,9 @@ async def asyncio(
 ) -> Problem | Version | None:
     """Describe the build
 
-     The version of the service and what it chose to run on this machine.
+     Returns the version of the service, and the instruction set and number of threads that it chose on
+    this
+    machine.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

@@ -60,7 +60,7 @@ def sync_detailed(
 ) -> Response[Problem | str]:
     """List the problems
 
-     A page with every type of problem that there is, and a link to the page of each.
+     Returns a page with every type of problem, and a link to the page of each.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -85,7 +85,7 @@ def sync(
 ) -> Problem | str | None:
     """List the problems
 
-     A page with every type of problem that there is, and a link to the page of each.
+     Returns a page with every type of problem, and a link to the page of each.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -106,7 +106,7 @@ async def asyncio_detailed(
 ) -> Response[Problem | str]:
     """List the problems
 
-     A page with every type of problem that there is, and a link to the page of each.
+     Returns a page with every type of problem, and a link to the page of each.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -129,7 +129,7 @@ async def asyncio(
 ) -> Problem | str | None:
     """List the problems
 
-     A page with every type of problem that there is, and a link to the page of each.
+     Returns a page with every type of problem, and a link to the page of each.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

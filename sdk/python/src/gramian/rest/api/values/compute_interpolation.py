@@ -126,15 +126,15 @@ def sync_detailed(
 ) -> Response[InterpolationResponse | Problem]:
     """Interpolate values
 
-     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
-    the queries. At
-    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
-    that are factorized, each query is
-    answered from the points nearest to it.
+     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at
+    the
+    queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for
+    clouds
+    that are too large to be factorized, each query is answered from the points nearest to it.
 
     Args:
-        body (InterpolationRequest): Values at the points of a cloud, and where the function
-            through them is wanted.
+        body (InterpolationRequest): Values at the points of a cloud, and queries at which to
+            evaluate the function through them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -165,15 +165,15 @@ def sync(
 ) -> InterpolationResponse | Problem | None:
     """Interpolate values
 
-     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
-    the queries. At
-    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
-    that are factorized, each query is
-    answered from the points nearest to it.
+     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at
+    the
+    queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for
+    clouds
+    that are too large to be factorized, each query is answered from the points nearest to it.
 
     Args:
-        body (InterpolationRequest): Values at the points of a cloud, and where the function
-            through them is wanted.
+        body (InterpolationRequest): Values at the points of a cloud, and queries at which to
+            evaluate the function through them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -199,15 +199,15 @@ async def asyncio_detailed(
 ) -> Response[InterpolationResponse | Problem]:
     """Interpolate values
 
-     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
-    the queries. At
-    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
-    that are factorized, each query is
-    answered from the points nearest to it.
+     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at
+    the
+    queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for
+    clouds
+    that are too large to be factorized, each query is answered from the points nearest to it.
 
     Args:
-        body (InterpolationRequest): Values at the points of a cloud, and where the function
-            through them is wanted.
+        body (InterpolationRequest): Values at the points of a cloud, and queries at which to
+            evaluate the function through them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -236,15 +236,15 @@ async def asyncio(
 ) -> InterpolationResponse | Problem | None:
     """Interpolate values
 
-     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates it with its derivatives at
-    the queries. At
-    alpha = 0 it takes the values at the points exactly. With `"solver": "local"`, and beyond the points
-    that are factorized, each query is
-    answered from the points nearest to it.
+     Fits `u = Σ λ_j k(·, x_j)` to the values, Λ = (K + αI)⁻¹Y, and evaluates u with its derivatives at
+    the
+    queries. If alpha = 0, u takes the values at the points exactly. With `"solver": "local"`, and for
+    clouds
+    that are too large to be factorized, each query is answered from the points nearest to it.
 
     Args:
-        body (InterpolationRequest): Values at the points of a cloud, and where the function
-            through them is wanted.
+        body (InterpolationRequest): Values at the points of a cloud, and queries at which to
+            evaluate the function through them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

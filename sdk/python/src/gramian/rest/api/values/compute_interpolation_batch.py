@@ -126,13 +126,14 @@ def sync_detailed(
 ) -> Response[InterpolationBatchResponse | Problem]:
     """Interpolate many lists of values
 
-     As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel
+    that is
+    not given is learned from all lists together. Batches need the dense solver.
 
     Args:
-        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and where
-            the functions through them are wanted.
+        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and
+            queries at which to evaluate the functions through
+            them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -163,13 +164,14 @@ def sync(
 ) -> InterpolationBatchResponse | Problem | None:
     """Interpolate many lists of values
 
-     As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel
+    that is
+    not given is learned from all lists together. Batches need the dense solver.
 
     Args:
-        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and where
-            the functions through them are wanted.
+        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and
+            queries at which to evaluate the functions through
+            them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -195,13 +197,14 @@ async def asyncio_detailed(
 ) -> Response[InterpolationBatchResponse | Problem]:
     """Interpolate many lists of values
 
-     As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel
+    that is
+    not given is learned from all lists together. Batches need the dense solver.
 
     Args:
-        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and where
-            the functions through them are wanted.
+        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and
+            queries at which to evaluate the functions through
+            them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -230,13 +233,14 @@ async def asyncio(
 ) -> InterpolationBatchResponse | Problem | None:
     """Interpolate many lists of values
 
-     As `/v1/interpolation` does one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Interpolates each list as `/v1/interpolation` does, with one factorization for all lists. A kernel
+    that is
+    not given is learned from all lists together. Batches need the dense solver.
 
     Args:
-        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and where
-            the functions through them are wanted.
+        body (InterpolationBatchRequest): Many lists of values at the points of a cloud, and
+            queries at which to evaluate the functions through
+            them.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

@@ -126,17 +126,22 @@ def sync_detailed(
 ) -> Response[PosteriorResponse | Problem]:
     """Compute the Gaussian process posterior
 
-     With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
-    posterior mean at the
-    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
-    probabilities of exceedance, joint samples and the
-    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
-    query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples and likelihood.
+     Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+    noise_variances) is the variance of the noise. On request, the answer also has variances,
+    covariance,
+    gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log
+    marginal
+    likelihood.
+
+    With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered
+    from
+    the points nearest to it. Covariance, samples and likelihood need all points or queries together, so
+    they
+    are then not available.
 
     Args:
-        body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
-            wanted.
+        body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
+            posterior.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -167,17 +172,22 @@ def sync(
 ) -> PosteriorResponse | Problem | None:
     """Compute the Gaussian process posterior
 
-     With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
-    posterior mean at the
-    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
-    probabilities of exceedance, joint samples and the
-    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
-    query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples and likelihood.
+     Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+    noise_variances) is the variance of the noise. On request, the answer also has variances,
+    covariance,
+    gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log
+    marginal
+    likelihood.
+
+    With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered
+    from
+    the points nearest to it. Covariance, samples and likelihood need all points or queries together, so
+    they
+    are then not available.
 
     Args:
-        body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
-            wanted.
+        body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
+            posterior.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -203,17 +213,22 @@ async def asyncio_detailed(
 ) -> Response[PosteriorResponse | Problem]:
     """Compute the Gaussian process posterior
 
-     With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
-    posterior mean at the
-    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
-    probabilities of exceedance, joint samples and the
-    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
-    query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples and likelihood.
+     Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+    noise_variances) is the variance of the noise. On request, the answer also has variances,
+    covariance,
+    gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log
+    marginal
+    likelihood.
+
+    With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered
+    from
+    the points nearest to it. Covariance, samples and likelihood need all points or queries together, so
+    they
+    are then not available.
 
     Args:
-        body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
-            wanted.
+        body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
+            posterior.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -242,17 +257,22 @@ async def asyncio(
 ) -> PosteriorResponse | Problem | None:
     """Compute the Gaussian process posterior
 
-     With the kernel as prior covariance and alpha (or noise_variances) as the variance of the noise: the
-    posterior mean at the
-    queries and, if asked for, variances, covariance, gradients with their variances, quantiles,
-    probabilities of exceedance, joint samples and the
-    log marginal likelihood. With `"solver": "local"`, and beyond the points that are factorized, each
-    query is answered from the points nearest to
-    it, without what takes all points or queries together: covariance, samples and likelihood.
+     Returns the posterior mean at the queries. The kernel is the prior covariance, and alpha (or
+    noise_variances) is the variance of the noise. On request, the answer also has variances,
+    covariance,
+    gradients with their variances, quantiles, probabilities of exceedance, joint samples and the log
+    marginal
+    likelihood.
+
+    With `"solver": "local"`, and for clouds that are too large to be factorized, each query is answered
+    from
+    the points nearest to it. Covariance, samples and likelihood need all points or queries together, so
+    they
+    are then not available.
 
     Args:
-        body (PosteriorRequest): Noisy values at the points of a cloud, and where the posterior is
-            wanted.
+        body (PosteriorRequest): Noisy values at the points of a cloud, and queries for the
+            posterior.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

@@ -126,13 +126,12 @@ def sync_detailed(
 ) -> Response[PosteriorBatchResponse | Problem]:
     """Compute Gaussian process posteriors of many lists of values
 
-     As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+    kernel that is not given is learned from all lists together. Batches need the dense solver.
 
     Args:
         body (PosteriorBatchRequest): Many lists of noisy values at the points of a cloud, and
-            where their posteriors are wanted.
+            queries for their posteriors.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -163,13 +162,12 @@ def sync(
 ) -> PosteriorBatchResponse | Problem | None:
     """Compute Gaussian process posteriors of many lists of values
 
-     As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+    kernel that is not given is learned from all lists together. Batches need the dense solver.
 
     Args:
         body (PosteriorBatchRequest): Many lists of noisy values at the points of a cloud, and
-            where their posteriors are wanted.
+            queries for their posteriors.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -195,13 +193,12 @@ async def asyncio_detailed(
 ) -> Response[PosteriorBatchResponse | Problem]:
     """Compute Gaussian process posteriors of many lists of values
 
-     As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+    kernel that is not given is learned from all lists together. Batches need the dense solver.
 
     Args:
         body (PosteriorBatchRequest): Many lists of noisy values at the points of a cloud, and
-            where their posteriors are wanted.
+            queries for their posteriors.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -230,13 +227,12 @@ async def asyncio(
 ) -> PosteriorBatchResponse | Problem | None:
     """Compute Gaussian process posteriors of many lists of values
 
-     As `/v1/posterior` does of one, with one factorization for all: a kernel that is not given is
-    learned from all of them together. They need the dense
-    solver.
+     Computes the posterior of each list as `/v1/posterior` does, with one factorization for all lists. A
+    kernel that is not given is learned from all lists together. Batches need the dense solver.
 
     Args:
         body (PosteriorBatchRequest): Many lists of noisy values at the points of a cloud, and
-            where their posteriors are wanted.
+            queries for their posteriors.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.

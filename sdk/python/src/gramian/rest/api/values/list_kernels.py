@@ -79,7 +79,7 @@ def sync_detailed(
 ) -> Response[KernelList | Problem]:
     """List kernels
 
-     The families of kernels with their formulas, parameters and smoothness.
+     Returns the kernel families with their formulas, parameters and smoothness.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -104,7 +104,7 @@ def sync(
 ) -> KernelList | Problem | None:
     """List kernels
 
-     The families of kernels with their formulas, parameters and smoothness.
+     Returns the kernel families with their formulas, parameters and smoothness.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -125,7 +125,7 @@ async def asyncio_detailed(
 ) -> Response[KernelList | Problem]:
     """List kernels
 
-     The families of kernels with their formulas, parameters and smoothness.
+     Returns the kernel families with their formulas, parameters and smoothness.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.
@@ -148,7 +148,7 @@ async def asyncio(
 ) -> KernelList | Problem | None:
     """List kernels
 
-     The families of kernels with their formulas, parameters and smoothness.
+     Returns the kernel families with their formulas, parameters and smoothness.
 
     Raises:
         errors.UnexpectedStatus: If the server returns an undocumented status code and Client.raise_on_unexpected_status is True.

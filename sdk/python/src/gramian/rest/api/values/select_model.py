@@ -126,18 +126,25 @@ def sync_detailed(
 ) -> Response[ModelSelectionResponse | Problem]:
     """Select a model
 
-     Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving
-    one out or by generalized cross-validation: from the
-    kernel of the request, or the one that is learned if there is none, and from further starts, by
-    sequential quadratic programming with exact slopes within
-    bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
-    predicted from all others. Every evaluation costs a
-    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
-    with all of them.
+     Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-
+    out or
+    generalized cross-validation. The search starts from the kernel of the request, or from a learned
+    one if
+    the request has none, and from further starts. It uses sequential quadratic programming with exact
+    slopes
+    within bounds.
+
+    The answer has the selection, the score over alpha, and predictions of each value from all others.
+    Every
+    evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds,
+    select
+    on a sample of the points, and send the result with all of them.
 
     Args:
-        body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
-            explain them. The search begins with `kernel` and `alpha`.
+        body (ModelSelectionRequest): Values at the points of a cloud, and the parameters that may
+            vary to explain them.
+
+            The search begins with `kernel` and `alpha`.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -168,18 +175,25 @@ def sync(
 ) -> ModelSelectionResponse | Problem | None:
     """Select a model
 
-     Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving
-    one out or by generalized cross-validation: from the
-    kernel of the request, or the one that is learned if there is none, and from further starts, by
-    sequential quadratic programming with exact slopes within
-    bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
-    predicted from all others. Every evaluation costs a
-    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
-    with all of them.
+     Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-
+    out or
+    generalized cross-validation. The search starts from the kernel of the request, or from a learned
+    one if
+    the request has none, and from further starts. It uses sequential quadratic programming with exact
+    slopes
+    within bounds.
+
+    The answer has the selection, the score over alpha, and predictions of each value from all others.
+    Every
+    evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds,
+    select
+    on a sample of the points, and send the result with all of them.
 
     Args:
-        body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
-            explain them. The search begins with `kernel` and `alpha`.
+        body (ModelSelectionRequest): Values at the points of a cloud, and the parameters that may
+            vary to explain them.
+
+            The search begins with `kernel` and `alpha`.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -205,18 +219,25 @@ async def asyncio_detailed(
 ) -> Response[ModelSelectionResponse | Problem]:
     """Select a model
 
-     Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving
-    one out or by generalized cross-validation: from the
-    kernel of the request, or the one that is learned if there is none, and from further starts, by
-    sequential quadratic programming with exact slopes within
-    bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
-    predicted from all others. Every evaluation costs a
-    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
-    with all of them.
+     Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-
+    out or
+    generalized cross-validation. The search starts from the kernel of the request, or from a learned
+    one if
+    the request has none, and from further starts. It uses sequential quadratic programming with exact
+    slopes
+    within bounds.
+
+    The answer has the selection, the score over alpha, and predictions of each value from all others.
+    Every
+    evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds,
+    select
+    on a sample of the points, and send the result with all of them.
 
     Args:
-        body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
-            explain them. The search begins with `kernel` and `alpha`.
+        body (ModelSelectionRequest): Values at the points of a cloud, and the parameters that may
+            vary to explain them.
+
+            The search begins with `kernel` and `alpha`.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
@@ -245,18 +266,25 @@ async def asyncio(
 ) -> ModelSelectionResponse | Problem | None:
     """Select a model
 
-     Searches the kernel and the noise that explain values best, by their marginal likelihood, by leaving
-    one out or by generalized cross-validation: from the
-    kernel of the request, or the one that is learned if there is none, and from further starts, by
-    sequential quadratic programming with exact slopes within
-    bounds. Answers what was found, the criterion over alpha from one eigendecomposition, and each value
-    predicted from all others. Every evaluation costs a
-    few factorizations, so clouds have 5,000 points at most: what a sample of more selects can be sent
-    with all of them.
+     Searches the kernel and the noise that explain the values best, by marginal likelihood, leave-one-
+    out or
+    generalized cross-validation. The search starts from the kernel of the request, or from a learned
+    one if
+    the request has none, and from further starts. It uses sequential quadratic programming with exact
+    slopes
+    within bounds.
+
+    The answer has the selection, the score over alpha, and predictions of each value from all others.
+    Every
+    evaluation costs a few factorizations, so clouds may have at most 5,000 points. For larger clouds,
+    select
+    on a sample of the points, and send the result with all of them.
 
     Args:
-        body (ModelSelectionRequest): Values at the points of a cloud, and what may be chosen to
-            explain them. The search begins with `kernel` and `alpha`.
+        body (ModelSelectionRequest): Values at the points of a cloud, and the parameters that may
+            vary to explain them.
+
+            The search begins with `kernel` and `alpha`.
         body (File): F64 or F32 tensors named as the JSON arrays, those within objects as
             `cloud.points`; the other fields as JSON text in the metadata entry `request`. At most 64
             tensors and a header of 64 KiB.
