@@ -62,7 +62,7 @@ impl Sampling {
         &self.neighbours
     }
 
-    /// h_q: mean distance from a point to the [`SPACING_NEIGHBOURS`] nearest positions elsewhere, unit L. 0
+    /// h_q: mean distance from a point to the `SPACING_NEIGHBOURS` nearest positions elsewhere, unit L. 0
     /// if the cloud has only one position.
     pub fn spacing(&self, point: usize) -> f64 {
         self.spacings[point]

@@ -126,7 +126,7 @@ impl Jets {
     /// Evaluates the expansion with `weights` (one per point of `cloud`) at the queries.
     ///
     /// Each query is summed in the order of the points, whatever the number of threads. The caller has
-    /// checked that the kernel has the derivatives asked for ([`check_smooth_at`]).
+    /// checked that the kernel has the derivatives asked for (`check_smooth_at`).
     ///
     /// # Errors
     /// [`NumericsError::Overflow`] if a result leaves float64, [`NumericsError::Cancelled`].

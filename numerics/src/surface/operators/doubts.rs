@@ -73,7 +73,7 @@ impl Judged<'_> {
 
     /// Finds the queries, ascending, at which the answers of an operator are uncertain.
     ///
-    /// Errors are computed for at most [`JUDGED_FUNCTIONALS`] functionals, at queries that are spread as all
+    /// Errors are computed for at most `JUDGED_FUNCTIONALS` functionals, at queries that are spread as all
     /// queries are. Each of the other queries takes the greatest error of those around it. All queries are
     /// uncertain for a kernel whose process has no such derivatives.
     ///

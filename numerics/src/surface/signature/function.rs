@@ -32,7 +32,7 @@ impl Signature {
     /// Solves for the weights, and evaluates u in the same pass that finds their residual.
     ///
     /// # Errors
-    /// Returns the errors of [`Solution::with_jets`].
+    /// Returns the errors of `Solution::with_jets`.
     pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let ones = vec![1.0; solver.n_points()];
         let (solution, jets) = match solver.kernel().has_kink() {
