@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::durable::factors;
 use super::fitted::{Fits, Fitted};
 use super::plan::{Cost, FitPlan};
-use super::report::Report;
+use super::report::AnswerHeaders;
 use super::sampling::find_sampling;
 use crate::http::compute::{Admission, JobObserver, StageTimes, Work};
 use crate::http::problem::Problem;
@@ -49,7 +49,7 @@ impl Fitting<'_> {
         main: &FitPlan,
         surface: Option<&FitPlan>,
         cost: Cost,
-        report: &mut Report,
+        report: &mut AnswerHeaders,
     ) -> Result<(Fits, Reservation), Problem> {
         let mut wanted = Wanted::of(main, surface, cost);
         loop {
@@ -67,7 +67,7 @@ impl Fitting<'_> {
         main: &FitPlan,
         surface: Option<&FitPlan>,
         cost: Cost,
-        report: &mut Report,
+        report: &mut AnswerHeaders,
     ) -> Option<(Fits, Reservation)> {
         let find = |plan: &FitPlan| {
             let stored = self.app.prepared.get(plan.key)?;
@@ -97,7 +97,7 @@ impl Fitting<'_> {
     async fn attempt(
         &self,
         wanted: &mut Wanted<'_>,
-        report: &mut Report,
+        report: &mut AnswerHeaders,
     ) -> Result<Option<(Fits, Reservation)>, Problem> {
         let Some(memory) = self.reserve(wanted).await? else { return Ok(None) };
         let fitted = self.fitted(wanted.main, memory.main, &mut wanted.of_main, report).await?;
@@ -183,7 +183,7 @@ impl Fitting<'_> {
         plan: &FitPlan,
         memory: Option<Reservation>,
         extent: &mut Extent,
-        report: &mut Report,
+        report: &mut AnswerHeaders,
     ) -> Result<Option<Fitted>, Problem> {
         let begin =
             |memory: Reservation| prepare(self.app.clone(), self.admission.clone(), plan.clone(), memory);
@@ -214,7 +214,7 @@ impl Fitting<'_> {
         &self,
         fitted: &Fitted,
         memory: Option<Reservation>,
-        report: &mut Report,
+        report: &mut AnswerHeaders,
     ) -> Result<Option<Arc<Surface>>, Problem> {
         let fits = &self.app.prepared;
         let (key, times) = (fitted.plan.key, Arc::new(OnceLock::new()));

@@ -16,7 +16,7 @@ use super::fitting::{Fitting, Outlook};
 use super::intake::{ReceivedBody, read_body};
 use super::plan::{Cost, FitPlan, PlannedFit};
 use super::planner::Planner;
-use super::report::Report;
+use super::report::AnswerHeaders;
 use super::sampling::find_lacking;
 use crate::config::Config;
 use crate::http::compute::{Admission, JobObserver, Work, is_light};
@@ -126,7 +126,7 @@ async fn compute<O: Operation>(
     wanted: Wanted,
     began: Instant,
 ) -> Result<Answered, Problem> {
-    let mut report = Report::parsed_in(began.elapsed(), plan.main.stored.id);
+    let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
 
     let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
     let outlook = fitting.outlook(&plan.main, plan.surface.as_ref(), plan.cost);
@@ -201,7 +201,7 @@ pub async fn estimate<O: Operation>(
 struct Answered {
     encoded: Encoded,
     memory: Reservation,
-    report: Report,
+    report: AnswerHeaders,
 }
 
 impl Answered {
@@ -216,7 +216,7 @@ fn answer<O: Operation>(
     plan: Resolved<O::Work>,
     fits: &Fits,
     memory: Reservation,
-    mut report: Report,
+    mut report: AnswerHeaders,
     wanted: Wanted,
     observer: &JobObserver,
 ) -> Result<Answered, Problem> {
@@ -303,7 +303,7 @@ fn planned<O: Operation>(
         return Ok(Planned::Lacking(Box::new(plan), memory, fresh));
     }
     let plan = resolve(plan, memory, fresh)?;
-    let mut report = Report::parsed_in(began.elapsed(), plan.main.stored.id);
+    let mut report = AnswerHeaders::parsed_in(began.elapsed(), plan.main.stored.id);
     let fitting = Fitting { app, admission, has_surface: O::HAS_SURFACE };
     let wanted = wanted.filter(|_| is_light(plan.cost.work.flops));
     let at_hand = wanted.and_then(|wanted| {

@@ -12,7 +12,7 @@ use crate::store::prepared::{CacheOutcome, PreparedFit};
 
 /// Times and cache outcome of an answer, for `Server-Timing` and `Cache-Status`.
 #[derive(Default)]
-pub struct Report {
+pub struct AnswerHeaders {
     parse: Duration,
     stages: StageTimes,
     /// Encoding time, absent if encoding continues while the answer is sent.
@@ -22,7 +22,7 @@ pub struct Report {
     cloud: Option<CloudId>,
 }
 
-impl Report {
+impl AnswerHeaders {
     /// Starts a report after parsing and planning, which took `parse` including the wait for a turn.
     pub fn parsed_in(parse: Duration, cloud: CloudId) -> Self {
         Self { parse, cloud: Some(cloud), ..Self::default() }

@@ -14,7 +14,7 @@ use gramian_numerics::machine::price::Price;
 use gramian_numerics::model::choose::AutoLocal;
 use gramian_numerics::points::sampling::Scales;
 pub use resolved::FitPlan;
-pub use surface::{PlannedSurface, SurfaceChoice};
+pub use surface::{PlannedSurface, SurfaceSource};
 pub use values::{PlannedValues, Values};
 
 /// A cloud that is fitted for an owner, with the pointers to it in the request.

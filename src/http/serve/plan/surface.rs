@@ -16,11 +16,11 @@ use gramian_numerics::sums::regularization::Regularization;
 /// A fit of a surface.
 pub struct PlannedSurface {
     pub on: FittedCloud,
-    pub(in crate::http::serve) choice: SurfaceChoice,
+    pub(in crate::http::serve) choice: SurfaceSource,
 }
 
 /// Definition of a surface.
-pub enum SurfaceChoice {
+pub enum SurfaceSource {
     /// A level of a signature function.
     Signature { kernel: Option<PlannedKernel>, regularization: Option<Regularization>, purpose: Purpose },
     /// Local regressions. They learn at `sites`, if given. `reason` is set where `auto` chose them.
@@ -30,13 +30,13 @@ pub enum SurfaceChoice {
 impl PlannedSurface {
     pub fn solver(&self) -> SolverKind {
         match self.choice {
-            SurfaceChoice::Signature { .. } => SolverKind::Dense,
-            SurfaceChoice::Regressions { .. } => SolverKind::Local,
+            SurfaceSource::Signature { .. } => SolverKind::Dense,
+            SurfaceSource::Regressions { .. } => SolverKind::Local,
         }
     }
 
     pub(in crate::http::serve) fn lack(&self) -> Option<Lack> {
-        let SurfaceChoice::Signature { kernel, regularization, .. } = &self.choice else { return None };
+        let SurfaceSource::Signature { kernel, regularization, .. } = &self.choice else { return None };
         let is_given = matches!(kernel, Some(PlannedKernel::Given(_)));
         if !is_given && self.on.stored.scales().is_none() {
             return Some(Lack::Scales);
@@ -49,8 +49,8 @@ impl PlannedSurface {
         let Self { on, choice } = self;
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         let (kernel, regularization, purpose) = match choice {
-            SurfaceChoice::Signature { kernel, regularization, purpose } => (kernel, regularization, purpose),
-            SurfaceChoice::Regressions { reason, sites } => {
+            SurfaceSource::Signature { kernel, regularization, purpose } => (kernel, regularization, purpose),
+            SurfaceSource::Regressions { reason, sites } => {
                 return FitPlan::of(on, Recipe::LocalSurface { sites }, reason, Process::default());
             }
         };

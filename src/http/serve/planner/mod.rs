@@ -6,7 +6,7 @@ mod inputs;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use super::plan::{FittedCloud, PlannedSurface, PlannedValues, SurfaceChoice, Values};
+use super::plan::{FittedCloud, PlannedSurface, PlannedValues, SurfaceSource, Values};
 use crate::http::fields::kernel::PlannedKernel;
 use crate::http::fields::{Fit, Geometry, SolverChoice};
 use crate::http::problem::Problem;
@@ -112,14 +112,14 @@ impl<'a> Planner<'a> {
         let choice = match self.choice_of_surface(&on, &options, request)? {
             Regressed::Locally(reason) => {
                 let sites = sites.map(|sites| self.sites(sites, &on.stored.cloud)).transpose()?;
-                SurfaceChoice::Regressions { reason, sites }
+                SurfaceSource::Regressions { reason, sites }
             }
             Regressed::No if sites.is_some() => return Err(only_local_has_sites()),
             Regressed::No => {
                 self.check_max_dense_points(&on)?;
                 let kernel = options.kernel.as_ref().map(|kernel| kernel.plan(on.pointers)).transpose()?;
                 let regularization = options.regularization(&on)?;
-                SurfaceChoice::Signature { kernel, regularization, purpose }
+                SurfaceSource::Signature { kernel, regularization, purpose }
             }
         };
         Ok(PlannedSurface { on, choice })
@@ -136,7 +136,7 @@ impl<'a> Planner<'a> {
         let given = options.given_process(on.pointers);
         if options.solver == SolverChoice::Local || request.model == SurfaceModel::Local {
             let pointer = if options.solver == SolverChoice::Local { "/solver" } else { "/surface" };
-            if !(2..=MAX_LOCAL_DIMENSION).contains(&d) && d >= 2 {
+            if d > MAX_LOCAL_DIMENSION {
                 let detail = format!(
                     "local regressions serve surfaces in dimensions 2 to {MAX_LOCAL_DIMENSION}, the cloud has {d}"
                 );

@@ -1,4 +1,4 @@
-"""The sides of connected pieces of a surface, by the rule of the service in numerics/src/surface/orientation.rs.
+"""The sides of connected pieces of a surface, by the rule of the service in numerics/src/surface/orientation/.
 
 A bulky piece that is in no other has the side that gives it a positive volume. So has one where the coarse function
 does not agree with itself; for all others it decides. Rims, which tiles do not know of, are not looked for.

@@ -1,6 +1,6 @@
 """Regions of a tile, in which the normals of neighbours agree.
 
-As in numerics/src/surface/orientation.rs; what that does with the regions of a cloud is in `signs`.
+As in numerics/src/surface/orientation/; what that does with the regions of a cloud is in `signs`.
 """
 
 from __future__ import annotations

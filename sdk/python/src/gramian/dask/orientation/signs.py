@@ -1,6 +1,6 @@
 """Signs that make the normals of all tiles consistent, by the rules of the service for a whole cloud.
 
-As in numerics/src/surface/orientation.rs: neighbours whose signs agree are joined to regions, and regions to pieces by
+As in numerics/src/surface/orientation/: neighbours whose signs agree are joined to regions, and regions to pieces by
 what their common borders say, surest first. Each tile finds the regions of its own points (`Regions`), a few numbers
 for each, and all of them together are joined in one place (`joined`): points in the halo of a tile link its regions to
 others. Sums over all points say which side a piece has (`Pieces`).
