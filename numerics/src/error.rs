@@ -56,6 +56,10 @@ pub enum NumericsError {
     Unsupported { solver: SolverKind, quantity: Quantity },
     #[error("{n_bytes} bytes of memory are not to be had")]
     OutOfMemory { n_bytes: usize },
+    #[error("tiles[{tile}] {requirement}")]
+    InvalidTile { tile: usize, requirement: &'static str },
+    #[error("links[{link}] leads to a region that no tile has")]
+    InvalidLink { link: usize },
     #[error("the computation was cancelled")]
     Cancelled,
 }

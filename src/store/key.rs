@@ -6,9 +6,11 @@ use super::Owner;
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::{Family, Kernel};
 use gramian_numerics::model::Recipe;
+use gramian_numerics::patches::PatchKernel;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::local::{Hyperparameters, Learning};
 
 /// Id of a cloud: a BLAKE3 hash, written as 64 hexadecimal digits.
 ///
@@ -78,8 +80,10 @@ impl FitKey {
             update_with_kernel(&mut hasher, kernel);
             update_with_regularization(&mut hasher, regularization);
         }
-        if let Some(sites) = recipe.sites() {
-            update_with_floats(&mut hasher, sites.coordinates());
+        match recipe.learning() {
+            None => {}
+            Some(Learning::AtSites(sites)) => update_with_floats(&mut hasher, sites.coordinates()),
+            Some(Learning::Known(known)) => update_with_hyperparameters(&mut hasher, known),
         }
         Self { owner, cloud_id, fit: hasher.finalize().into() }
     }
@@ -166,6 +170,17 @@ fn update_with_regularization(hasher: &mut blake3::Hasher, regularization: &Regu
     }
 }
 
+fn update_with_hyperparameters(hasher: &mut blake3::Hasher, known: &Hyperparameters) {
+    let Hyperparameters { regression, radius, least_ratio } = known;
+    hasher.update(&regression.points_per_mean.to_le_bytes());
+    let PatchKernel { length_scale, variance } = regression.kernel;
+    update_with_floats(hasher, &[regression.noise, length_scale, variance, *radius, *least_ratio]);
+    for mixture in [&regression.noise_ratios, &regression.flat_noise_ratios] {
+        hasher.update(&[mixture.len() as u8]);
+        mixture.iter().for_each(|of| update_with_floats(hasher, &[of.ratio, of.log_share]));
+    }
+}
+
 /// Adds numbers to a hash. Bytes go through a stack buffer, because hashing number by number costs more than
 /// the hash.
 fn update_with_floats(hasher: &mut blake3::Hasher, numbers: &[f64]) {
@@ -227,8 +242,8 @@ mod tests {
             of(0, &kernel(Family::Laplace { epsilon: 0.0 }, 1.0, 1.0), &alpha(0.0), false),
             of(0, &kernel(Family::Laplace { epsilon: 1.0 }, 1.0, 1.0), &alpha(0.0), false),
             of_local(recipe(SolverKind::Local, &gauss, &alpha(0.0))),
-            of_local(Recipe::LocalSurface { sites: None }),
-            of_local(Recipe::LocalSurface { sites: Some(cloud.clone().into()) }),
+            of_local(Recipe::LocalSurface { learning: None }),
+            of_local(Recipe::LocalSurface { learning: Some(Learning::AtSites(cloud.clone().into())) }),
         ];
         let distinct: std::collections::HashSet<_> = keys.iter().collect();
         assert_eq!(distinct.len(), keys.len());

@@ -29,7 +29,7 @@ use crate::surface::signature::{Signature, SignatureSurface};
 pub use making::Making;
 pub use process::ScaledProcess;
 pub use recipe::Recipe;
-pub use report::{Regressions, Report};
+pub use report::Report;
 pub use values::{EachAt, FittedValues, JetRequest, ValuesAt};
 
 /// A [`Recipe`] made ready to answer.

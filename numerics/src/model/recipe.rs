@@ -7,6 +7,7 @@ use crate::kernel::Kernel;
 use crate::points::cloud::Cloud;
 use crate::solver::System;
 use crate::sums::regularization::Regularization;
+use crate::surface::local::Learning;
 
 /// Choice of a solver and its parameters. Equal recipes over equal clouds give equal models.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,9 +16,9 @@ pub enum Recipe {
     System { kernel: Kernel, regularization: Regularization },
     /// A small system around each query, from its nearest points.
     LocalKriging { kernel: Kernel, regularization: Regularization },
-    /// A surface by local regressions, which choose kernel and noise by themselves. They learn at `sites`, if
-    /// given.
-    LocalSurface { sites: Option<Arc<Cloud>> },
+    /// A surface by local regressions, which choose kernel and noise by themselves. They learn all over the
+    /// cloud, unless `learning` says otherwise.
+    LocalSurface { learning: Option<Learning> },
 }
 
 impl Recipe {
@@ -46,10 +47,10 @@ impl Recipe {
         }
     }
 
-    /// Returns the sites where local regressions learn, if they are given.
-    pub fn sites(&self) -> Option<&Cloud> {
+    /// Returns where local regressions have their hyperparameters from, if that is given.
+    pub fn learning(&self) -> Option<&Learning> {
         match self {
-            Self::LocalSurface { sites } => sites.as_deref(),
+            Self::LocalSurface { learning } => learning.as_ref(),
             Self::System { .. } | Self::LocalKriging { .. } => None,
         }
     }

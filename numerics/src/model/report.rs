@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::patches::PatchKernel;
 use crate::solver::trend::Trend;
 use crate::solver::{Disagreement, Method, Solution, Solver};
 use crate::surface::Surface;
+use crate::surface::local::Hyperparameters;
 
 /// Quality numbers of a model and of the function that it served. Absent where the solver has none.
 #[derive(Debug, Clone, Default)]
@@ -29,16 +29,10 @@ pub struct Report {
     pub n_dependent: usize,
     /// Difference from answers by half of the neighbours, in deviations. `None` unless it is too large.
     pub unsettled: Option<f64>,
-    /// Kernel and noise that local regressions chose.
-    pub regressions: Option<Regressions>,
-}
-
-/// Kernel and noise of the heights of local regressions.
-#[derive(Debug, Clone, Copy)]
-pub struct Regressions {
-    pub kernel: PatchKernel,
-    /// Standard deviation of the points across the surface, unit L.
-    pub noise: f64,
+    /// What local regressions learned, or were given.
+    pub hyperparameters: Option<Hyperparameters>,
+    /// Number of positions around a point on which answers of local regressions depend.
+    pub reach: Option<usize>,
 }
 
 impl Report {
@@ -66,14 +60,12 @@ impl Report {
                 let signature = surface.signature();
                 Self::of_function(&signature.solver, &signature.solution, 1.0)
             }
-            Surface::Local(surface) => {
-                let (kernel, noise) = (surface.patches().kernel(), surface.patches().noise());
-                Self {
-                    misfit: Some(surface.misfit()),
-                    regressions: Some(Regressions { kernel, noise }),
-                    ..Self::default()
-                }
-            }
+            Surface::Local(surface) => Self {
+                misfit: Some(surface.misfit()),
+                hyperparameters: Some(surface.hyperparameters()),
+                reach: Some(surface.reach()),
+                ..Self::default()
+            },
         }
     }
 }

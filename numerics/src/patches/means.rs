@@ -21,6 +21,8 @@ pub(crate) enum Support {
 }
 
 pub(crate) struct Means {
+    /// Most points of a mean.
+    group: usize,
     cloud: Cloud,
     neighbours: Neighbours,
     /// Number of points of each mean, `[n]`.
@@ -31,11 +33,20 @@ pub(crate) struct Means {
 }
 
 impl Support {
-    /// Averages cells of at most `group` points.
+    /// Takes the points themselves for a group of 1, and means of at most `group` points otherwise.
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(crate) fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
+    pub(crate) fn of(
+        group: usize,
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        if group == 1 { Ok(Self::Points { cloud, sampling }) } else { Self::means(&cloud, group, observer) }
+    }
+
+    fn means(cloud: &Cloud, group: usize, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let d = cloud.dimension();
         let (mut coordinates, mut counts, mut moments) = (Vec::new(), Vec::new(), Vec::new());
         for cell in Cells::of_all(cloud, group).iter() {
@@ -47,7 +58,15 @@ impl Support {
         }
         let cloud = Cloud::new(coordinates, d)?;
         let neighbours = Neighbours::of(&cloud, observer)?;
-        Ok(Self::Means(Means { cloud, neighbours, counts, moments }))
+        Ok(Self::Means(Means { group, cloud, neighbours, counts, moments }))
+    }
+
+    /// Returns the most points of a mean, 1 where the data are points.
+    pub(crate) fn points_per_mean(&self) -> usize {
+        match self {
+            Self::Points { .. } => 1,
+            Self::Means(means) => means.group,
+        }
     }
 
     pub(crate) fn cloud(&self) -> &Cloud {

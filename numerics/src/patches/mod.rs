@@ -26,7 +26,8 @@ use super::points::sampling::{Sampling, median};
 use estimate::Estimate;
 use means::Support;
 use neighbourhood::{Neighbourhood, n_neighbours};
-use pooled::{LENGTH_SCALE, STIFF, Weighted, candidates, pool, responsibilities};
+pub use pooled::MAX_MODELS;
+use pooled::{LENGTH_SCALE, STIFF, Weighted, candidates, pool, responsibilities, weighted};
 use regression::{Kriged, Model, n_terms};
 use room::{Found, Purpose};
 
@@ -50,6 +51,31 @@ const LEAST_MEANS: usize = 60;
 /// Fraction to which deviations must fall for the next larger group size to be accepted.
 const WORTH: f64 = 0.95;
 
+/// A ratio of the variance of the noise to that of the heights, and how common it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseRatio {
+    /// Variance of the noise of a point divided by that of the heights.
+    pub ratio: f64,
+    /// Natural logarithm of the share of neighbourhoods with this ratio.
+    pub log_share: f64,
+}
+
+/// Hyperparameters that local regressions learn of a cloud. With them, a part of the cloud is regressed as
+/// the whole is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hyperparameters {
+    /// Most points per mean that a regression sees, 1 where it sees the points themselves.
+    pub points_per_mean: usize,
+    /// Mixture of noise ratios, at most [`MAX_MODELS`]. Empty where nothing can be regressed.
+    pub noise_ratios: Vec<NoiseRatio>,
+    /// Mixture for the slopes where the surface is flat. Empty where there is no noise.
+    pub flat_noise_ratios: Vec<NoiseRatio>,
+    /// σ: standard deviation of the noise of the points across the surface, unit L.
+    pub noise: f64,
+    /// Kernel of the heights: medians over the sites.
+    pub kernel: PatchKernel,
+}
+
 /// Local regressions of the surface that a cloud samples, d ≥ 2.
 pub struct Patches {
     support: Support,
@@ -63,7 +89,7 @@ pub struct Patches {
 }
 
 /// Hyperparameters of the covariance of the heights: medians over the sites.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PatchKernel {
     /// Length scale ℓ, unit L.
     pub length_scale: f64,
@@ -96,18 +122,13 @@ impl Patches {
         sampling: Arc<Sampling>,
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
-        if cloud.dimension() < 2 {
-            return Err(NumericsError::DimensionTooSmall { found: cloud.dimension() });
-        }
+        check_dimension(cloud.dimension())?;
         let mut best: Option<(f64, Self)> = None;
         for group in GROUPS {
             if group > 1 && cloud.n_points() / group < LEAST_MEANS {
                 break;
             }
-            let support = match group {
-                1 => Support::Points { cloud: cloud.clone(), sampling: sampling.clone() },
-                _ => Support::means(&cloud, group, observer)?,
-            };
+            let support = Support::of(group, cloud.clone(), sampling.clone(), observer)?;
             let (deviation, patches) = Self::over(sites, support, observer)?;
             let is_exact = patches.noise == 0.0;
             let is_better = best.as_ref().is_none_or(|(least, _)| deviation < WORTH * least);
@@ -119,6 +140,44 @@ impl Patches {
             }
         }
         best.map(|(_, patches)| patches).ok_or(NumericsError::EmptyCloud)
+    }
+
+    /// Regresses with hyperparameters that were learned before, of this cloud or of one that it is part of.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionTooSmall`] for d = 1, [`NumericsError::Cancelled`].
+    pub fn with(
+        hyperparameters: &Hyperparameters,
+        cloud: Arc<Cloud>,
+        sampling: Arc<Sampling>,
+        observer: &dyn Observer,
+    ) -> Result<Self, NumericsError> {
+        let d = cloud.dimension();
+        check_dimension(d)?;
+        let support = Support::of(hyperparameters.points_per_mean, cloud, sampling, observer)?;
+        Ok(Self {
+            count: n_neighbours(d, support.cloud().n_points()),
+            support,
+            models: weighted(&hyperparameters.noise_ratios, LENGTH_SCALE, d),
+            stiff: weighted(&hyperparameters.flat_noise_ratios, STIFF, d),
+            noise: hyperparameters.noise,
+            kernel: hyperparameters.kernel,
+        })
+    }
+
+    /// Returns what was learned, or given.
+    pub fn hyperparameters(&self) -> Hyperparameters {
+        let ratios = |models: &[Weighted]| {
+            let ratio = |of: &Weighted| NoiseRatio { ratio: of.model.noise, log_share: of.log_share };
+            models.iter().map(ratio).collect()
+        };
+        Hyperparameters {
+            points_per_mean: self.points_per_mean(),
+            noise_ratios: ratios(&self.models),
+            flat_noise_ratios: ratios(&self.stiff),
+            noise: self.noise,
+            kernel: self.kernel,
+        }
     }
 
     /// Learns the hyperparameters on one support. Also returns the median over the sites of the largest
@@ -193,6 +252,11 @@ impl Patches {
         ))
     }
 
+    /// Returns the most points of which regressions see the mean, 1 where they see the points themselves.
+    pub fn points_per_mean(&self) -> usize {
+        self.support.points_per_mean()
+    }
+
     /// σ: standard deviation of the noise of the points across the surface, unit L.
     pub fn noise(&self) -> f64 {
         self.noise
@@ -207,6 +271,15 @@ impl Patches {
     pub fn n_bytes(&self) -> usize {
         self.support.n_bytes() + vec_bytes(&self.models) + vec_bytes(&self.stiff)
     }
+}
+
+/// Returns the most points, or means, that a regression sees.
+pub(crate) fn n_regressed(dimension: usize) -> usize {
+    n_neighbours(dimension, usize::MAX)
+}
+
+fn check_dimension(dimension: usize) -> Result<(), NumericsError> {
+    if dimension < 2 { Err(NumericsError::DimensionTooSmall { found: dimension }) } else { Ok(()) }
 }
 
 #[cfg(test)]

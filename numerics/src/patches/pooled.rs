@@ -1,6 +1,7 @@
 //! Hyperparameters from the likelihood pooled over a sample of neighbourhoods.
 
-use super::regression::{Kriged, Model};
+use super::NoiseRatio;
+use super::regression::{Kriged, Model, n_terms};
 use crate::kernel::Family;
 
 /// Order of Matérn's kernel: ν = 9/2. Kriged curvatures of analytic surfaces are then as far off as their
@@ -28,7 +29,7 @@ const NOISES: [f64; 12] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 
 /// Share of the neighbourhoods below which a model is dropped.
 const LEAST_SHARE: f64 = 0.01;
 /// Greatest number of models kept.
-const MAX_MODELS: usize = 6;
+pub const MAX_MODELS: usize = 6;
 
 /// Number of expectation-maximization steps. Shares settle to a hundredth within some fifty.
 const STEPS: usize = 100;
@@ -42,9 +43,20 @@ pub(crate) struct Weighted {
 
 /// Candidate models of one length scale, among which the likelihood decides.
 pub(crate) fn candidates(n_trend: usize, length_scale: f64) -> Vec<Model> {
-    let family = Family::Matern { order: ORDER };
-    let of = |noise: f64| Model { family, length_scale, noise, n_trend };
-    NOISES.map(of).to_vec()
+    NOISES.map(|noise| model(noise, length_scale, n_trend)).to_vec()
+}
+
+/// The mixture of models with these noise ratios, for regressions in a dimension.
+pub(crate) fn weighted(ratios: &[NoiseRatio], length_scale: f64, dimension: usize) -> Vec<Weighted> {
+    let of = |&NoiseRatio { ratio, log_share }: &NoiseRatio| Weighted {
+        model: model(ratio, length_scale, n_terms(dimension)),
+        log_share,
+    };
+    ratios.iter().map(of).collect()
+}
+
+fn model(noise: f64, length_scale: f64, n_trend: usize) -> Model {
+    Model { family: Family::Matern { order: ORDER }, length_scale, noise, n_trend }
 }
 
 /// Finds the mixture of the candidates that makes a sample of neighbourhoods most likely.

@@ -7,9 +7,7 @@ pub mod operators;
 pub mod price;
 pub mod served;
 pub mod signature;
-pub mod sure;
 
-mod coarse;
 mod curvature;
 mod orientation;
 mod request;
@@ -23,7 +21,7 @@ use crate::points::neighbours::{Neighbour, Neighbours};
 use crate::points::sampling::{SPACING_NEIGHBOURS, Sampling};
 use geometry::GeometryRequest;
 use local::LocalSurface;
-pub use orientation::SurfaceOrientation;
+pub use orientation::{SurfaceOrientation, tiles};
 use served::Served;
 use signature::SignatureSurface;
 

@@ -8,7 +8,7 @@ use gramian_numerics::observer::Unobserved;
 use gramian_numerics::patches::Patches;
 use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::points::sampling::Sampling as Spacings;
-use gramian_numerics::surface::sure::least_ratio;
+use gramian_numerics::surface::local::sure::least_ratio;
 
 use crate::common::random::Random;
 use crate::sampling::{Sampling, sample};

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::hyperparameters::Hyperparameters;
 use super::kernel::KernelUsed;
 use super::schemas::CloudIdSchema;
 use crate::http::problem::Problem;
@@ -148,6 +149,14 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub noise_deviation: Option<f64>,
+    /// What local regressions learned of the cloud, or were given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub hyperparameters: Option<Hyperparameters>,
+    /// Number of positions around a point on which the answer there depends, with local regressions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub reach: Option<usize>,
     /// Number of points that were merged into an earlier point.
     pub n_merged_duplicates: usize,
     /// Number of rows of a sparse operator by how their weights were computed.

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use super::choices::{DuplicatePolicy, MeanChoice, SolverChoice, SurfaceChoice};
 use super::cloud_ref::CloudRef;
+use super::hyperparameters::Hyperparameters;
 use super::kernel::Kernel;
 use crate::http::wire::read::members::{present, present_object, present_unless_empty, present_word};
 use crate::http::wire::read::points::Points;
@@ -59,6 +60,8 @@ pub struct Fit {
     pub mean: Option<MeanChoice>,
     /// Sites at which local regressions learn, if the client gives them.
     pub sites: Option<Points>,
+    /// What local regressions learned before, if the client gives it.
+    pub hyperparameters: Option<Hyperparameters>,
 }
 
 /// Declares a request. The fields of a fit and the request's own fields are members of the same object.
@@ -123,6 +126,7 @@ macro_rules! request {
                     duplicates: self.duplicates.unwrap_or_default(),
                     mean: None,
                     sites: None,
+                    hyperparameters: None,
                 }
             }
         }

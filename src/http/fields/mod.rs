@@ -6,6 +6,7 @@ mod choices;
 mod cloud_ref;
 mod diagnostics;
 mod fit;
+mod hyperparameters;
 pub mod schemas;
 
 pub use choices::{
@@ -19,4 +20,5 @@ pub use diagnostics::{
 };
 pub(crate) use fit::request;
 pub use fit::{Fit, Geometry, HasCloud};
+pub use hyperparameters::{Hyperparameters, NoiseRatio};
 pub use kernel::{Kernel, KernelFamily, KernelUsed};

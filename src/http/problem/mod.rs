@@ -240,6 +240,8 @@ impl Problem {
             E::InvalidRegularization { point: Some(point), .. } => {
                 at(Slug::InvalidRequest, &Pointers::entry(pointers.regularization, point))
             }
+            E::InvalidTile { tile, .. } => at(Slug::InvalidRequest, &Pointers::entry("/tiles", tile)),
+            E::InvalidLink { link } => at(Slug::InvalidRequest, &Pointers::entry("/links", link)),
             E::InvalidVariation { entry, .. } => at(Slug::InvalidRequest, &Pointers::entry("/vary", entry)),
             E::KernelNotPositiveDefinite { .. } => {
                 let remedy = format!("{detail}; choose another family");

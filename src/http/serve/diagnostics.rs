@@ -2,9 +2,11 @@
 
 use super::fitted::Fitted;
 use super::plan::words;
-use crate::http::fields::{Diagnostics, FactorizationUsed, KernelUsed, SolverUsed, Warning, WarningCode};
+use crate::http::fields::{
+    Diagnostics, FactorizationUsed, Hyperparameters, KernelUsed, SolverUsed, Warning, WarningCode,
+};
 use gramian_numerics::error::SolverKind;
-use gramian_numerics::model::{Regressions, Report};
+use gramian_numerics::model::Report;
 use gramian_numerics::solver::trend::Trend;
 use gramian_numerics::solver::{Disagreement, Method, Outlier};
 use gramian_numerics::sums::regularization::Regularization;
@@ -46,8 +48,10 @@ impl Fitted {
             native_norm_squared: report.native_norm_squared.map(|norm| norm / scale),
             mean_coefficients: report.trend.as_ref().map(Trend::of_coordinates),
             misfit: report.misfit,
-            noise_deviation: report.regressions.map(|regressions| regressions.noise),
+            noise_deviation: report.hyperparameters.as_ref().map(|learned| learned.regression.noise),
             n_merged_duplicates: plan.merge.as_ref().map_or(0, |merge| merge.n_merged()),
+            hyperparameters: report.hyperparameters.as_ref().map(Hyperparameters::of),
+            reach: report.reach,
             stencils: None,
             warnings: self.warnings(report, n_queries),
             geometry: None,
@@ -67,9 +71,9 @@ impl Fitted {
                 (KernelUsed::scaled(kernel, scale), alpha)
             }
             None => {
-                let heights = report.regressions.map(|Regressions { kernel, .. }| kernel);
-                let alpha = report.regressions.map(|Regressions { noise, .. }| noise * noise);
-                (KernelUsed::heights(heights.unwrap_or_default()), alpha)
+                let learned = report.hyperparameters.as_ref().map(|learned| &learned.regression);
+                let heights = learned.map(|learned| learned.kernel);
+                (KernelUsed::heights(heights.unwrap_or_default()), learned.map(|of| of.noise * of.noise))
             }
         }
     }

@@ -346,7 +346,7 @@ fn make_surface(
                 None => Arc::new(Sampling::of(&plan.fitted, observer)?),
             };
             let normals = plan.fitted_normals();
-            let given = Given { normals: normals.as_deref(), sites: plan.recipe.sites() };
+            let given = Given { normals: normals.as_deref(), learning: plan.recipe.learning() };
             let ones = ValuesKey::of(&vec![1.0; plan.stored.cloud.n_points()]);
             let signature = shared.prepared.solution(plan.key, ones);
             let is_new = signature.is_none();

@@ -1,10 +1,10 @@
 //! Consistent signs for the normals of a cloud.
 
 use super::edges::{Edge, contradiction, join_borders, sheet_edges};
-use super::field::Field;
 use super::forest::SignedForest;
 use super::parts::Parts;
-use super::pieces::{Bounds, Piece};
+use super::pieces::{Bounds, Piece, is_large};
+use super::winding::field::Field;
 use super::{Directions, Sampled, gaps, n_neighbours, sides};
 use crate::error::NumericsError;
 
@@ -14,15 +14,15 @@ const SAME_REGION: f64 = 0.7;
 /// Least mean weight of pairs of neighbours in a cloud that resolves its surface. Below it normals turn at
 /// will from point to point, what seems a flip is the surface, and nothing is repaired. The bunny with 1 % of
 /// noise has 0.3, a torus of 24 points 0.06.
-const RESOLVED: f64 = 0.2;
+pub(super) const RESOLVED: f64 = 0.2;
 
 /// Share of the edges of a piece, by weight, that gradients may contradict for their volume to count. On
 /// separate surfaces that nearly touch it is 0.0002 to 0.005. On noisy surfaces whose gradients are wrong it
 /// is 0.04 and more, and those enclose more than the truth.
-const LOCAL_CONTRADICTION: f64 = 0.02;
+pub(super) const LOCAL_CONTRADICTION: f64 = 0.02;
 
 /// Share of the edges, by weight, that may contradict repaired signs.
-const CONTRADICTION: f64 = 0.1;
+pub(super) const CONTRADICTION: f64 = 0.1;
 
 /// Signs to multiply the normals of [`Directions`] with.
 #[derive(Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub(super) fn consistent_signs(
 ) -> Result<Signs, NumericsError> {
     let n = sampled.cloud.n_points();
     let mut edges = sheet_edges(sampled, &directions.normals);
-    let mut forest = regions(&edges, directions, n);
+    let mut forest = joined(&edges, &directions.has_sign);
     join_borders(&mut forest, &edges);
     let mut is_at_rim = directions.is_at_rim.clone();
     for edge in gaps::join_across(sampled, &directions.normals, &mut forest)? {
@@ -75,12 +75,11 @@ pub(super) fn consistent_signs(
     Ok(Signs { signs, n_flipped, is_open: has_rim.contains(&true), is_resolved, is_ambiguous })
 }
 
-/// Joins neighbouring points whose signs agree.
-fn regions(edges: &[Edge], directions: &Directions, n: usize) -> SignedForest {
-    let mut forest = SignedForest::new(n);
+/// Joins neighbouring points whose signs agree to regions. `has_sign` is `[n]`.
+pub(super) fn joined(edges: &[Edge], has_sign: &[bool]) -> SignedForest {
+    let mut forest = SignedForest::new(has_sign.len());
     for edge in edges {
-        let both_signed = directions.has_sign[edge.a] && directions.has_sign[edge.b];
-        if both_signed && edge.cosine > SAME_REGION {
+        if has_sign[edge.a] && has_sign[edge.b] && edge.cosine > SAME_REGION {
             forest.join(edge.a, edge.b, 1.0);
         }
     }
@@ -124,7 +123,7 @@ impl Scene<'_> {
     /// Returns boxes around the pieces that have a hundredth of the points or more: a hundred boxes at most.
     fn boxes_of_large(&self) -> Vec<(usize, Bounds)> {
         let (cloud, members) = (self.sampled.cloud, &self.pieces.members);
-        let large = (0..members.len()).filter(|&piece| 100 * members[piece].len() >= cloud.n_points());
+        let large = (0..members.len()).filter(|&piece| is_large(members[piece].len(), cloud.n_points()));
         large.map(|piece| (piece, Bounds::of(cloud, &members[piece]))).collect()
     }
 

@@ -6,6 +6,7 @@ use super::forest::SignedForest;
 use super::{Sampled, n_neighbours};
 use crate::machine::vector::dot;
 use crate::points::cloud::{Cloud, squared_distance};
+use crate::points::neighbours::Neighbour;
 
 /// Weight up to which two points do not count as neighbours on one sheet.
 const LEAST_WEIGHT: f64 = 0.01;
@@ -58,15 +59,21 @@ fn cosine(cloud: &Cloud, normals: &[f64], a: usize, b: usize) -> f64 {
 ///
 /// The sign of the normals does not matter.
 pub(super) fn sheet_edges(sampled: &Sampled<'_>, normals: &[f64]) -> Vec<Edge> {
-    let cloud = sampled.cloud;
-    let edges_of = |a: usize| {
-        let elsewhere = sampled.around.around(a).iter().filter(|found| found.squared_distance > 0.0);
-        let edges = elsewhere
-            .take(n_neighbours(cloud))
-            .map(move |found| Edge::between(cloud, normals, a, found.point));
-        edges.filter(|edge| edge.weight > LEAST_WEIGHT)
-    };
-    (0..cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
+    let edges_of = |a: usize| edges_around(sampled.cloud, normals, a, sampled.around.around(a));
+    (0..sampled.cloud.n_points()).into_par_iter().flat_map_iter(edges_of).collect()
+}
+
+/// Returns the edges of [`sheet_edges`] that begin at a point. `around` has the nearest positions to it,
+/// nearest first.
+pub(super) fn edges_around<'a>(
+    cloud: &'a Cloud,
+    normals: &'a [f64],
+    a: usize,
+    around: &'a [Neighbour],
+) -> impl Iterator<Item = Edge> + 'a {
+    let elsewhere = around.iter().filter(|found| found.squared_distance > 0.0).take(n_neighbours(cloud));
+    let edges = elsewhere.map(move |found| Edge::between(cloud, normals, a, found.point));
+    edges.filter(|edge| edge.weight > LEAST_WEIGHT)
 }
 
 /// Returns the edges of a point. `edges` are ordered by first point.

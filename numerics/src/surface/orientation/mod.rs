@@ -16,19 +16,16 @@
 //!    (`turns`).
 //! 4. Points whose winding numbers or neighbours still contradict their side are marked as ambiguous.
 
-mod areas;
 mod consistent;
 mod edges;
-mod field;
 mod forest;
 mod gaps;
-mod gauss;
 mod parts;
 mod pieces;
 mod sides;
 #[cfg(test)]
 mod tests;
-mod turns;
+pub mod tiles;
 mod winding;
 
 use crate::error::NumericsError;

@@ -2,6 +2,7 @@
 
 use super::{Directions, Sampled};
 use crate::points::cloud::Cloud;
+use crate::points::sampling::Sampling;
 
 /// Factor by which consistent signs may shrink the volume.
 const LOST_VOLUME: f64 = 1.05;
@@ -13,6 +14,45 @@ const UNANIMITY: f64 = 0.95;
 /// decides. It is then known better than any gradient: those of a wide kernel on an octahedron agree, and
 /// point inward. A torus with a tube of a seventh of its radius has twice as much.
 const BULKY: f64 = 0.1;
+
+/// Sums over a piece that decide its side.
+pub(super) struct Evidence {
+    /// Area where the gradients say something.
+    pub total: f64,
+    /// Vote of the gradients by area, for the signs of the piece as they are.
+    pub vote: f64,
+    /// d times the volume inside, negative if the normals point inward.
+    pub volume: f64,
+    /// d times the volume of a ball of as much surface.
+    pub ball: f64,
+    /// True if the piece lies inside another one.
+    pub is_nested: bool,
+}
+
+impl Evidence {
+    pub(super) fn is_bulky(&self) -> bool {
+        !self.is_nested && self.volume.abs() > BULKY * self.ball
+    }
+
+    pub(super) fn is_unanimous(&self) -> bool {
+        self.vote.abs() >= (2.0 * UNANIMITY - 1.0) * self.total
+    }
+
+    /// Returns the sign of the piece.
+    pub(super) fn sign(&self, has_rim: bool) -> f64 {
+        let decides_itself = has_rim || self.is_unanimous() && !self.is_bulky();
+        let by_vote = self.total > 0.0 && decides_itself || self.volume == 0.0;
+        if (if by_vote { self.vote } else { self.volume }) < 0.0 { -1.0 } else { 1.0 }
+    }
+}
+
+/// Returns whether separate surfaces that nearly touch were taken for one. Then gradients by themselves
+/// enclose more than signs that go together: `volumes` are these two. Curves cross their own inside too often
+/// for this to tell.
+pub(super) fn are_several(volumes: [f64; 2], dimension: usize) -> bool {
+    let [by_gradients, together] = volumes;
+    dimension > 2 && by_gradients > LOST_VOLUME * together
+}
 
 /// A connected part of the surface with signs relative to one another.
 pub(super) struct Piece<'a> {
@@ -38,25 +78,24 @@ impl Piece<'_> {
     /// is small or inside another piece. Otherwise the sign of the volume decides.
     pub(super) fn sign(&self, has_rim: bool, is_nested: bool) -> f64 {
         let signed = || self.points.iter().filter(|&&point| self.directions.has_sign[point]);
-        let total: f64 = signed().map(|&point| self.area(point)).sum();
-        let vote: f64 = signed().map(|&point| self.relative[point] * self.area(point)).sum();
-        let volume = self.volume(|point| self.relative[point]);
-        let is_bulky = !is_nested && volume.abs() > BULKY * self.volume_of_ball();
-        let is_unanimous = vote.abs() >= (2.0 * UNANIMITY - 1.0) * total;
-        let decides_itself = has_rim || is_unanimous && !is_bulky;
-        let decisive = if total > 0.0 && decides_itself || volume == 0.0 { vote } else { volume };
-        if decisive < 0.0 { -1.0 } else { 1.0 }
+        let evidence = Evidence {
+            total: signed().map(|&point| self.area(point)).sum(),
+            vote: signed().map(|&point| self.relative[point] * self.area(point)).sum(),
+            volume: self.volume(|point| self.relative[point]),
+            ball: self.volume_of_ball(),
+            is_nested,
+        };
+        evidence.sign(has_rim)
     }
 
     /// Returns whether consistent signs enclose less than the gradients do by themselves.
     ///
-    /// Then separate surfaces that nearly touch, each of them right, were taken for one. Curves cross their
-    /// own inside too often for this to tell.
+    /// See [`are_several`].
     pub(super) fn loses_volume(&self) -> bool {
         let signed = |sign: f64, point: usize| if self.directions.has_sign[point] { sign } else { 0.0 };
         let by_gradients = self.volume(|point| signed(1.0, point)).abs();
         let repaired = self.volume(|point| signed(self.relative[point], point)).abs();
-        self.sampled.cloud.dimension() > 2 && by_gradients > LOST_VOLUME * repaired
+        are_several([by_gradients, repaired], self.sampled.cloud.dimension())
     }
 
     /// Computes `Σ a (x − c)·ν`, d times the volume inside by the divergence theorem.
@@ -89,26 +128,41 @@ impl Piece<'_> {
     }
 
     fn area(&self, point: usize) -> f64 {
-        self.sampled.sampling.spacing(point).powi(self.sampled.cloud.dimension() as i32 - 1)
+        area(self.sampled.sampling, point, self.sampled.cloud.dimension())
     }
 }
 
+/// Area that a point stands for, in proportion: h_q^{d−1}.
+pub(super) fn area(sampling: &Sampling, point: usize, dimension: usize) -> f64 {
+    sampling.spacing(point).powi(dimension as i32 - 1)
+}
+
+/// Returns whether a piece has a hundredth of the points or more. Others may lie inside it.
+pub(super) fn is_large(n_points: usize, n_of_all: usize) -> bool {
+    100 * n_points >= n_of_all
+}
+
 /// The axis-parallel box around some points.
+#[derive(Default)]
 pub(super) struct Bounds {
-    least: Vec<f64>,
-    greatest: Vec<f64>,
+    pub least: Vec<f64>,
+    pub greatest: Vec<f64>,
 }
 
 impl Bounds {
     pub(super) fn of(cloud: &Cloud, points: &[usize]) -> Self {
-        let first = points.first().map_or(&[][..], |&point| cloud.point(point));
-        let (mut least, mut greatest) = (first.to_vec(), first.to_vec());
-        for &point in points {
-            for ((x, l), g) in cloud.point(point).iter().zip(&mut least).zip(&mut greatest) {
-                (*l, *g) = (l.min(*x), g.max(*x));
-            }
+        let corners = points.iter().map(|&point| cloud.point(point));
+        corners.fold(Self::default(), |bounds, x| bounds.with(x, x))
+    }
+
+    /// The box around this one and another, which has these corners.
+    pub(super) fn with(mut self, lower: &[f64], upper: &[f64]) -> Self {
+        if self.least.is_empty() {
+            return Self { least: lower.to_vec(), greatest: upper.to_vec() };
         }
-        Self { least, greatest }
+        self.least.iter_mut().zip(lower).for_each(|(own, other)| *own = own.min(*other));
+        self.greatest.iter_mut().zip(upper).for_each(|(own, other)| *own = own.max(*other));
+        self
     }
 
     pub(super) fn contain(&self, other: &Self) -> bool {

@@ -1,10 +1,10 @@
 //! Sides by winding numbers: pieces to turn, and points whose sides stay ambiguous.
 
 use super::edges::{Edge, averaged};
-use super::field::Field;
-use super::gauss::Problem;
 use super::parts::Parts;
-use super::turns::{Turned, turn_patches};
+use super::winding::field::Field;
+use super::winding::gauss::Problem;
+use super::winding::turns::{Turned, turn_patches};
 use crate::error::NumericsError;
 
 /// Distance of the winding number from ½, averaged over the neighbours on the sheet, beyond which a side is

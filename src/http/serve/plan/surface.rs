@@ -1,7 +1,5 @@
 //! Fit of the surface that a cloud samples.
 
-use std::sync::Arc;
-
 use super::resolved::Process;
 use super::{FitPlan, FittedCloud, Lack};
 use crate::http::fields::kernel::PlannedKernel;
@@ -10,8 +8,8 @@ use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::{Purpose, default_fit};
 use gramian_numerics::model::choose::AutoLocal;
 use gramian_numerics::model::{Recipe, ScaledProcess};
-use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::sums::regularization::Regularization;
+use gramian_numerics::surface::local::Learning;
 
 /// A fit of a surface.
 pub struct PlannedSurface {
@@ -23,8 +21,9 @@ pub struct PlannedSurface {
 pub enum SurfaceSource {
     /// A level of a signature function.
     Signature { kernel: Option<PlannedKernel>, regularization: Option<Regularization>, purpose: Purpose },
-    /// Local regressions. They learn at `sites`, if given. `reason` is set where `auto` chose them.
-    Regressions { reason: Option<AutoLocal>, sites: Option<Arc<Cloud>> },
+    /// Local regressions. They learn all over the cloud, unless `learning` says otherwise. `reason` is set
+    /// where `auto` chose them.
+    Regressions { reason: Option<AutoLocal>, learning: Option<Learning> },
 }
 
 impl PlannedSurface {
@@ -50,8 +49,8 @@ impl PlannedSurface {
         let refuse = |error| Problem::from_numerics(error, on.pointers);
         let (kernel, regularization, purpose) = match choice {
             SurfaceSource::Signature { kernel, regularization, purpose } => (kernel, regularization, purpose),
-            SurfaceSource::Regressions { reason, sites } => {
-                return FitPlan::of(on, Recipe::LocalSurface { sites }, reason, Process::default());
+            SurfaceSource::Regressions { reason, learning } => {
+                return FitPlan::of(on, Recipe::LocalSurface { learning }, reason, Process::default());
             }
         };
         let scaled = match kernel {

@@ -1,7 +1,7 @@
 //! Choice of kernel, regularization and solver in a request, and refusals of combinations that do not work.
 
 use super::inputs::length_mismatch;
-use crate::http::fields::{Fit, Geometry, Kernel, SolverChoice};
+use crate::http::fields::{Fit, Geometry, Hyperparameters, Kernel, SolverChoice};
 use crate::http::problem::slug::Slug;
 use crate::http::problem::{Pointers, Problem};
 use crate::http::serve::plan::FittedCloud;
@@ -41,10 +41,11 @@ pub(super) fn local_lacks_operators(pointer: &str) -> Problem {
     Problem::of_field(Slug::UnsupportedBySolver, pointer, detail)
 }
 
-/// Returns 422 for sites of a surface that is not regressed locally.
-pub(super) fn only_local_has_sites() -> Problem {
-    let detail = "only local regressions learn at sites: leave them out, or take \"solver\": \"local\"";
-    Problem::of_field(Slug::UnsupportedBySolver, "/sites", detail)
+/// Returns 422 for what only local regressions have, at the surface of another solver.
+pub(super) fn only_local_learns(member: &str) -> Problem {
+    let detail =
+        format!("only local regressions have {member}: leave them out, or take \"solver\": \"local\"");
+    Problem::of_field(Slug::UnsupportedBySolver, format!("/{member}"), detail)
 }
 
 /// Returns the pointers to the fit of a request.
@@ -84,6 +85,7 @@ pub(super) struct FitOptions {
     pub(super) solver: SolverChoice,
     pub(super) mean: Option<Mean>,
     pub(super) sites: Option<Points>,
+    pub(super) hyperparameters: Option<Hyperparameters>,
 }
 
 impl FitOptions {
@@ -95,6 +97,7 @@ impl FitOptions {
             solver: fit.solver,
             mean: fit.mean.map(Mean::from),
             sites: fit.sites,
+            hyperparameters: fit.hyperparameters,
         }
     }
 

@@ -18,14 +18,16 @@ use crate::store::clouds::RegisteredCloud;
 use crate::store::key::{CloudId, GivenKernel, ValuesKey};
 pub use choice::DenseOnly;
 use choice::{
-    FitOptions, TRY_LOCAL, local_lacks_operators, only_local_has_sites, pointers_of, pointers_of_surface,
+    FitOptions, TRY_LOCAL, local_lacks_operators, only_local_learns, pointers_of, pointers_of_surface,
 };
 use gramian_numerics::error::SolverKind;
 use gramian_numerics::kernel::defaults::Purpose;
 use gramian_numerics::model::choose::{AutoLocal, prefers_local};
 use gramian_numerics::patches::MAX_LOCAL_DIMENSION;
+use gramian_numerics::points::cloud::Cloud;
 use gramian_numerics::solver::trend::Mean;
 use gramian_numerics::surface::geometry::{GeometryRequest, SurfaceModel};
+use gramian_numerics::surface::local::Learning;
 use inputs::length_mismatch;
 pub use inputs::{GivenValues, check_seed, unknown_cloud, value_lists};
 
@@ -108,13 +110,13 @@ impl<'a> Planner<'a> {
         purpose: Purpose,
         request: &GeometryRequest,
     ) -> Result<PlannedSurface, Problem> {
-        let sites = options.sites.take();
+        let learning = self.learning(&mut options, &on.stored.cloud)?;
         let choice = match self.choice_of_surface(&on, &options, request)? {
             Regressed::Locally(reason) => {
-                let sites = sites.map(|sites| self.sites(sites, &on.stored.cloud)).transpose()?;
-                SurfaceSource::Regressions { reason, sites }
+                let learning = learning.map(|(_, learning)| learning);
+                SurfaceSource::Regressions { reason, learning }
             }
-            Regressed::No if sites.is_some() => return Err(only_local_has_sites()),
+            Regressed::No if let Some((member, _)) = learning => return Err(only_local_learns(member)),
             Regressed::No => {
                 self.check_max_dense_points(&on)?;
                 let kernel = options.kernel.as_ref().map(|kernel| kernel.plan(on.pointers)).transpose()?;
@@ -123,6 +125,24 @@ impl<'a> Planner<'a> {
             }
         };
         Ok(PlannedSurface { on, choice })
+    }
+
+    /// Returns where local regressions have their hyperparameters from, if the client says so, and the member
+    /// of the request that says it.
+    fn learning(
+        &self,
+        options: &mut FitOptions,
+        cloud: &Cloud,
+    ) -> Result<Option<(&'static str, Learning)>, Problem> {
+        match (options.sites.take(), options.hyperparameters.take()) {
+            (None, None) => Ok(None),
+            (Some(sites), None) => Ok(Some(("sites", Learning::AtSites(self.sites(sites, cloud)?)))),
+            (None, Some(given)) => Ok(Some(("hyperparameters", Learning::Known(Arc::new(given.plan()?))))),
+            (Some(_), Some(_)) => {
+                let detail = "hyperparameters are learned at sites, or given; leave out one of them";
+                Err(Problem::invalid_request("/sites", detail))
+            }
+        }
     }
 
     /// Decides whether a surface is regressed locally, with the reason where `auto` chose that.
@@ -266,6 +286,7 @@ impl<'a> Planner<'a> {
             solver: geometry.solver.unwrap_or(options.solver),
             mean: None,
             sites: options.sites,
+            hyperparameters: options.hyperparameters,
         };
         let on = FittedCloud { owner: self.owner, stored, pointers, duplicates: values.duplicates };
         Ok(SurfaceUnder { on, options, has_own_process })

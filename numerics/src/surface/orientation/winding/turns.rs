@@ -5,11 +5,11 @@
 //! winding numbers say that much of it is wrong. Gauss's formula finds the signs of the patches with all
 //! others.
 
-use super::edges::{Edge, averaged};
 use super::field::Field;
 use super::gauss::Problem;
-use super::parts::Parts;
 use crate::error::NumericsError;
+use crate::surface::orientation::edges::{Edge, averaged};
+use crate::surface::orientation::parts::Parts;
 
 /// Distance of the winding number from ½ from which a point is on the wrong side or faces one that is. It is
 /// averaged over the neighbours on the sheet. With noise of a third of the spacing areas are too large. The
@@ -46,7 +46,7 @@ const ON_PATCH: f64 = 0.4;
 const MOST_TURNED: f64 = 0.75;
 
 /// Result of turning patches.
-pub(super) struct Turned {
+pub(crate) struct Turned {
     /// Misfits w − ½ at the points, `[n]`.
     pub misfits: Vec<f64>,
     /// True for each piece of which patches were turned.
@@ -59,7 +59,7 @@ pub(super) struct Turned {
 ///
 /// # Errors
 /// [`NumericsError::Cancelled`].
-pub(super) fn turn_patches(
+pub(crate) fn turn_patches(
     field: &Field<'_>,
     pieces: &Parts,
     edges: &[Edge],

@@ -4,11 +4,11 @@ mod cell;
 
 use rayon::prelude::*;
 
-use super::edges::{Edge, across, edges_of};
-use super::winding::ball_volume;
-use super::{Sampled, n_neighbours};
+use super::dipoles::ball_volume;
 use crate::machine::vector::{dot, tangent_basis};
 use crate::points::cloud::squared_distance;
+use crate::surface::orientation::edges::{Edge, across, edges_of};
+use crate::surface::orientation::{Sampled, n_neighbours};
 use cell::Cell;
 
 /// Reach of the sum over the distance to the last of the neighbours. It exceeds 1 so that the last ones
@@ -127,12 +127,12 @@ impl Place<'_> {
 mod tests {
     use std::f64::consts::PI;
 
-    use super::super::edges::sheet_edges;
     use super::*;
     use crate::observer::Unobserved;
     use crate::points::cloud::Cloud;
     use crate::points::neighbourhoods::Neighbourhoods;
     use crate::points::sampling::Sampling;
+    use crate::surface::orientation::edges::sheet_edges;
     use crate::testing::{Random, fibonacci_sphere};
 
     /// Returns areas on the unit sphere, and on a sphere around it at this distance.

@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::Sampled;
 use super::areas::areas;
-use super::edges::Edge;
-use super::winding::Dipoles;
+use super::dipoles::Dipoles;
 use crate::error::NumericsError;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
+use crate::surface::orientation::Sampled;
+use crate::surface::orientation::edges::Edge;
 
 /// Points with their areas and normals, in units of the radius of the cloud. So powers of distances stay
 /// inside float64.
-pub(super) struct Field<'a> {
+pub(crate) struct Field<'a> {
     pub cloud: Cloud,
     /// Areas that the points stand for, `[n]`.
     pub areas: Vec<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Field<'a> {
 
 impl<'a> Field<'a> {
     /// Returns the field of some normals, or `None` for a cloud of one position.
-    pub(super) fn of(sampled: &Sampled<'a>, normals: &'a [f64], edges: &[Edge]) -> Option<Self> {
+    pub(crate) fn of(sampled: &Sampled<'a>, normals: &'a [f64], edges: &[Edge]) -> Option<Self> {
         let (radius, d) = (sampled.cloud.radius(), sampled.cloud.dimension());
         if radius == 0.0 {
             return None;
@@ -38,13 +38,13 @@ impl<'a> Field<'a> {
         })
     }
 
-    pub(super) fn normal(&self, point: usize) -> &[f64] {
+    pub(crate) fn normal(&self, point: usize) -> &[f64] {
         let d = self.cloud.dimension();
         &self.normals[point * d..][..d]
     }
 
     /// Returns area times normal for normals multiplied with these signs, `[n, d]`.
-    pub(super) fn moments(&self, signs: &[f64]) -> Vec<f64> {
+    pub(crate) fn moments(&self, signs: &[f64]) -> Vec<f64> {
         let factors = signs.iter().zip(&self.areas).map(|(sign, area)| sign * area);
         let rows = factors.zip(self.normals.chunks_exact(self.cloud.dimension()));
         rows.flat_map(|(factor, normal)| normal.iter().map(move |c| factor * c)).collect()
@@ -54,7 +54,7 @@ impl<'a> Field<'a> {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn misfits(&self, signs: &[f64]) -> Result<Vec<f64>, NumericsError> {
+    pub(crate) fn misfits(&self, signs: &[f64]) -> Result<Vec<f64>, NumericsError> {
         let all: Vec<usize> = (0..signs.len()).collect();
         let dipoles = Dipoles::of(&self.cloud, &self.moments(signs), &all);
         let misfit = |point: usize| {
@@ -71,7 +71,7 @@ impl<'a> Field<'a> {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn blames(&self, signs: &[f64], misfits: &[f64]) -> Result<Vec<f64>, NumericsError> {
+    pub(crate) fn blames(&self, signs: &[f64], misfits: &[f64]) -> Result<Vec<f64>, NumericsError> {
         let d = self.cloud.dimension();
         let sources: Vec<usize> = (0..misfits.len()).filter(|&point| misfits[point] != 0.0).collect();
         if sources.is_empty() {

@@ -7,12 +7,12 @@
 
 use rayon::prelude::*;
 
-use super::edges::Edge;
+use super::dipoles::Dipoles;
 use super::field::Field;
-use super::parts::Parts;
-use super::winding::Dipoles;
 use crate::error::NumericsError;
 use crate::points::sampling::median;
+use crate::surface::orientation::edges::Edge;
+use crate::surface::orientation::parts::Parts;
 
 /// Most parts whose signs are unknown. Other parts keep their signs.
 const MAX_UNKNOWN: usize = 150;
@@ -45,7 +45,7 @@ const UNCLEAR: f64 = 0.5;
 /// The problem `W s = b` for the signs of some parts relative to their present ones.
 ///
 /// The right-hand side b is ½ less what all other points contribute.
-pub(super) struct Problem {
+pub(crate) struct Problem {
     unknown: Vec<usize>,
     /// W, `[rows, unknown]`.
     matrix: Vec<f64>,
@@ -62,7 +62,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`NumericsError::Cancelled`].
-    pub(super) fn of(
+    pub(crate) fn of(
         field: &Field<'_>,
         parts: &Parts,
         wanted: &[usize],
@@ -92,7 +92,7 @@ impl Problem {
     }
 
     /// Adds springs where edges lead from one part to another.
-    pub(super) fn with_springs(mut self, parts: &Parts, edges: &[Edge], signs: &[f64]) -> Self {
+    pub(crate) fn with_springs(mut self, parts: &Parts, edges: &[Edge], signs: &[f64]) -> Self {
         let m = self.unknown.len();
         let mut place = vec![usize::MAX; parts.members.len()];
         self.unknown.iter().enumerate().for_each(|(at, &part)| place[part] = at);
@@ -111,7 +111,7 @@ impl Problem {
     /// nearer to ½.
     ///
     /// Parts are returned only if the median of |w − ½| on them becomes `at_most` or less.
-    pub(super) fn turned(&self, at_most: f64) -> Vec<usize> {
+    pub(crate) fn turned(&self, at_most: f64) -> Vec<usize> {
         let present = vec![1.0; self.unknown.len()];
         let mut found: Vec<f64> =
             self.least_squares().iter().map(|s| if *s < 0.0 { -1.0 } else { 1.0 }).collect();
@@ -128,7 +128,7 @@ impl Problem {
     }
 
     /// Returns whether the sign of a part was asked for.
-    pub(super) fn asks_for(&self, part: usize) -> bool {
+    pub(crate) fn asks_for(&self, part: usize) -> bool {
         self.unknown.contains(&part)
     }
 
@@ -154,7 +154,7 @@ impl Problem {
     }
 
     /// Finds the parts whose signs are not clearly better than the opposite ones, once some are turned.
-    pub(super) fn unclear(&self, turned: &[usize]) -> Vec<usize> {
+    pub(crate) fn unclear(&self, turned: &[usize]) -> Vec<usize> {
         let sign = |part: &usize| if turned.contains(part) { -1.0 } else { 1.0 };
         let signs: Vec<f64> = self.unknown.iter().map(sign).collect();
         let residual = self.residual(&signs);

@@ -1,26 +1,30 @@
 //! The surface made of local regressions, with one side chosen for all of it.
 
+pub mod coarse;
+pub mod sure;
+
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::NearNormals;
-use super::coarse::outward_directions;
 use super::curvature::{FLAT, principal_curvatures};
 use super::degeneracy::{DegeneracyReason, is_far};
+use super::orientation::tiles::{LabelledRegions, Signed, Tile, regions_of};
 use super::orientation::{Directions, Oriented, Sampled, SurfaceOrientation};
 use super::request::{GeometryRequest, Orientation};
 use super::served::{Deviations, Served, ServedBy, Verdict};
-use super::sure::least_ratio;
 use crate::error::NumericsError;
 use crate::machine::heap::{arc_payload, block_bytes, vec_bytes};
 use crate::machine::vector::{dot, norm};
 use crate::observer::{Observer, Stage};
-use crate::patches::{CurvatureDeviations, PatchGeometry, Patches};
+use crate::patches::{self, CurvatureDeviations, PatchGeometry, Patches};
 use crate::points::cloud::Cloud;
 use crate::points::neighbourhoods::Neighbourhoods;
 use crate::points::neighbours::Neighbour;
 use crate::points::sampling::Sampling;
+use coarse::outward_directions;
+use sure::least_ratio;
 
 /// Cosine between a normal and the gradient of the coarse function above which the sign of the normal is
 /// known.
@@ -30,13 +34,34 @@ const SAYS_SIGN: f64 = 0.2;
 /// among them seven tenths of the normals that are off by 30°.
 const UNCERTAIN_NORMAL: f64 = 0.3;
 
+/// Hyperparameters of a surface by local regressions, learned of the whole cloud.
+///
+/// A part of the cloud that is given them has the surface of the whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hyperparameters {
+    pub regression: patches::Hyperparameters,
+    /// Half the diagonal of the bounding box, unit L. Surfaces that bend less than this says count as flat.
+    pub radius: f64,
+    /// Least ratio of a curvature to its deviation at which the curvature counts as known. Infinite if none
+    /// is known.
+    pub least_ratio: f64,
+}
+
+/// Source of the hyperparameters of local regressions, other than points all over the cloud.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Learning {
+    /// Neighbourhoods of sites, `[s, d]`; see [`Patches::learned_at`].
+    AtSites(Arc<Cloud>),
+    /// Nothing is learned.
+    Known(Arc<Hyperparameters>),
+}
+
 /// Optional knowledge of a surface beside its points.
 #[derive(Clone, Copy, Default)]
 pub struct Given<'a> {
     /// Normals of the points, `[n, d]`, of any length but 0. They say which side is outward.
     pub normals: Option<&'a Cloud>,
-    /// Sites where noise and shape are learned, `[s, d]`; see [`Patches::learned_at`].
-    pub sites: Option<&'a Cloud>,
+    pub learning: Option<&'a Learning>,
 }
 
 /// Local regressions of a cloud with consistently oriented normals, d ≥ 2.
@@ -56,7 +81,7 @@ pub struct Given<'a> {
 /// let points = angles.flat_map(|t| [2.0 * t.cos(), 2.0 * t.sin()]).collect();
 /// let cloud = Arc::new(Cloud::new(points, 2)?);
 /// let sampling = Arc::new(Sampling::of(&cloud, &Unobserved)?);
-/// let given = Given { normals: None, sites: None };
+/// let given = Given { normals: None, learning: None };
 /// let surface: Surface = LocalSurface::of(cloud.clone(), sampling, given, &Unobserved)?.into();
 /// let geometry = Geometry::of(&surface, &cloud, &GeometryRequest::CURVATURES, &Unobserved)?;
 /// assert!(geometry.curvatures(&Unobserved)?.mean.iter().all(|mean| (mean - 0.5).abs() < 1e-3));
@@ -88,9 +113,13 @@ impl LocalSurface {
         observer: &dyn Observer,
     ) -> Result<Self, NumericsError> {
         observer.enter(Stage::Evaluate);
-        let patches = match given.sites {
-            None => Patches::of(cloud.clone(), sampling.clone(), observer)?,
-            Some(sites) => Patches::learned_at(sites, cloud.clone(), sampling.clone(), observer)?,
+        let (own, near) = (cloud.clone(), sampling.clone());
+        let (patches, known) = match given.learning {
+            None => (Patches::of(own, near, observer)?, None),
+            Some(Learning::AtSites(sites)) => (Patches::learned_at(sites, own, near, observer)?, None),
+            Some(Learning::Known(known)) => {
+                (Patches::with(&known.regression, own, near, observer)?, Some(known))
+            }
         };
         let mut at_points = patches.at(&cloud, true, true, observer)?;
         let oriented = orient(&cloud, &sampling, &patches, &at_points, given.normals, observer)?;
@@ -98,11 +127,16 @@ impl LocalSurface {
         let outward = |point: usize| &oriented.normals[point * d..][..d];
         at_points.turn(|point, normal| if dot(outward(point), normal) < 0.0 { -1.0 } else { 1.0 });
         let (orientation, is_ambiguous) = (oriented.how, oriented.is_ambiguous);
-        let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
-        // Unknown and bent points are not sure either.
-        let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
-        let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
-        let least_ratio = least_ratio(&ratios);
+        let (radius, least_ratio) = match known {
+            Some(known) => (known.radius, known.least_ratio),
+            None => {
+                let radius = if cloud.radius() > 0.0 { cloud.radius() } else { 1.0 };
+                // Unknown and bent points are not sure either.
+                let ratio = |point| ratio(&at_points, point, d, radius).unwrap_or(0.0);
+                let ratios: Vec<f64> = (0..cloud.n_points()).map(ratio).collect();
+                (radius, least_ratio(&ratios))
+            }
+        };
         Ok(Self { cloud, sampling, patches, at_points, orientation, is_ambiguous, radius, least_ratio })
     }
 
@@ -122,9 +156,54 @@ impl LocalSurface {
         &self.patches
     }
 
+    /// Returns what the regressions learned, or were given.
+    pub fn hyperparameters(&self) -> Hyperparameters {
+        let (radius, least_ratio) = (self.radius, self.least_ratio);
+        Hyperparameters { regression: self.patches.hyperparameters(), radius, least_ratio }
+    }
+
     /// Returns `|h|` of the heights h of the points above the surface, L.
     pub fn misfit(&self) -> f64 {
         norm(&self.at_points.heights)
+    }
+
+    /// Returns on how many of the nearest positions an answer at a point depends, at most.
+    ///
+    /// Regressions see 16, 30 or 50 positions in dimensions 2, 3 and 4, and sparse operators 13, 38 or 88.
+    /// Of means, neighbourhoods reach as far as twice the points that these have.
+    pub fn reach(&self) -> usize {
+        let of_points = match self.cloud.dimension() {
+            2 => 24,
+            3 => 48,
+            _ => 96,
+        };
+        match self.patches.points_per_mean() {
+            1 => of_points,
+            group => 2 * group * of_points,
+        }
+    }
+
+    /// Finds the regions of a tile. Its directions `[n, d]` are those of the signature function at all of its
+    /// points, of any length.
+    ///
+    /// # Errors
+    /// [`NumericsError::DimensionMismatch`], [`NumericsError::LengthMismatch`], [`NumericsError::Cancelled`].
+    pub fn regions(
+        &self,
+        tile: &Tile<'_>,
+        directions: &Cloud,
+        observer: &dyn Observer,
+    ) -> Result<LabelledRegions, NumericsError> {
+        let (n, d) = (self.cloud.n_points(), self.cloud.dimension());
+        self.cloud.check_same_dimension(directions)?;
+        if directions.n_points() != n {
+            return Err(NumericsError::LengthMismatch { expected: n, found: directions.n_points() });
+        }
+        let mut normals = self.at_points.normals.clone();
+        let along = normals.chunks_exact_mut(d).zip(directions.points());
+        let has_sign: Vec<bool> = along.map(|(normal, direction)| turn_along(normal, direction)).collect();
+        let (cloud, sampling) = (&self.cloud, &self.sampling);
+        regions_of(&Signed { cloud, sampling, normals: &normals, has_sign: &has_sign }, tile, observer)
     }
 
     /// Bytes held on the heap beside the cloud and its sampling.
@@ -255,18 +334,22 @@ fn orient(
     let mut normals = geometry.normals.clone();
     let mut has_sign = vec![false; n];
     for (point, normal) in normals.chunks_exact_mut(d).enumerate() {
-        let direction = &outward[point * d..][..d];
-        let along = dot(normal, direction);
-        has_sign[point] = along.abs() > SAYS_SIGN * norm(direction);
-        if along < 0.0 {
-            normal.iter_mut().for_each(|c| *c = -*c);
-        }
+        has_sign[point] = turn_along(normal, &outward[point * d..][..d]);
     }
     let count = super::orientation::n_around(cloud);
     let around = Neighbourhoods::of(sampling.neighbours(), cloud, count, observer)?;
     let directions = Directions { normals, has_sign, is_at_rim: geometry.is_at_rim.clone() };
     let sampled = Sampled { cloud, sampling, around: &around, observer };
     Oriented::of_directions(&sampled, directions, given.is_some())
+}
+
+/// Turns a normal to the side of a direction. Returns whether the direction says something of the side.
+fn turn_along(normal: &mut [f64], direction: &[f64]) -> bool {
+    let along = dot(normal, direction);
+    if along < 0.0 {
+        normal.iter_mut().for_each(|c| *c = -*c);
+    }
+    along.abs() > SAYS_SIGN * norm(direction)
 }
 
 /// Returns deviations in the order of the curvatures for normals of this sign.
