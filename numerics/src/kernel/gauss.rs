@@ -6,8 +6,8 @@ use pulp::Simd;
 
 use super::facts::{Facts, analytic_length_scale};
 use super::profile::Profile;
-use crate::machine::exp::exp_minus;
 use crate::machine::registers::Pack;
+use crate::machine::registers::exp::exp_minus;
 use crate::points::sampling::Scales;
 
 pub(super) struct Gauss;

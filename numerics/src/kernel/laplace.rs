@@ -7,8 +7,8 @@ use pulp::Simd;
 
 use super::facts::Facts;
 use super::profile::{HUGE, Profile, distance_and_inverse};
-use crate::machine::exp::exp_minus;
 use crate::machine::registers::Pack;
+use crate::machine::registers::exp::exp_minus;
 use crate::points::sampling::Scales;
 
 pub(super) struct Laplace {

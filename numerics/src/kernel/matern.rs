@@ -10,8 +10,8 @@ use pulp::Simd;
 use super::facts::{Facts, SMOOTH_SPACINGS};
 use super::laplace::Laplace;
 use super::profile::{Pairs, Profile, Profiles, distance_and_inverse};
-use crate::machine::exp::exp_minus;
 use crate::machine::registers::Pack;
+use crate::machine::registers::exp::exp_minus;
 use crate::points::sampling::Scales;
 
 /// The greatest order p of a Matérn kernel, ν = p + ½.

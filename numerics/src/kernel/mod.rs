@@ -13,6 +13,7 @@ pub mod defaults;
 mod facts;
 mod family;
 mod gauss;
+pub(crate) mod in_place;
 mod inverse_multiquadric;
 mod laplace;
 mod matern;

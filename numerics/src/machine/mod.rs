@@ -7,7 +7,7 @@ pub mod pages;
 pub mod price;
 
 pub(crate) mod eigen;
-pub(crate) mod exp;
+pub(crate) mod lanes;
 pub(crate) mod parallelism;
 pub(crate) mod random;
 pub(crate) mod registers;

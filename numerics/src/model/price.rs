@@ -135,9 +135,10 @@ pub fn operator_price(values: SolverKind, surface: SolverKind, asked: OperatorAs
         SolverKind::Dense => {
             let applied = applied_price(n_surface_points, asked.surface, sizes);
             let price = applied.and(judging_price(n_numbers.min(JUDGED_FUNCTIONALS), sizes));
-            match asked.has_deviations {
-                true => price.and(deviations_price(sizes.n_points, n_numbers, sizes.dimension)),
-                false => price,
+            if asked.has_deviations {
+                price.and(deviations_price(sizes.n_points, n_numbers, sizes.dimension))
+            } else {
+                price
             }
         }
     }

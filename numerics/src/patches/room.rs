@@ -6,9 +6,10 @@ use rayon::prelude::*;
 
 use super::Patches;
 use super::neighbourhood::{Neighbourhood, Scratch};
-use super::regression::{Batch, Krige, Kriged, Model, Workspace};
+use super::regression::{Batch, Krige, Kriged, Model, workspace};
 use crate::error::NumericsError;
 use crate::machine::instruction_set::InstructionSet;
+use crate::machine::lanes::Workspace;
 use crate::observer::Observer;
 use crate::points::cloud::Cloud;
 use crate::points::neighbours::Neighbour;
@@ -40,7 +41,7 @@ impl Room {
     pub(super) fn new(count: usize, dimension: usize, lanes: usize) -> Self {
         Self {
             batch: Batch::new(dimension, count, lanes),
-            workspace: Workspace::new(dimension, count),
+            workspace: workspace(dimension, count),
             scratch: Scratch::default(),
             nearest: Vec::new(),
             set: InstructionSet::best(),

@@ -51,9 +51,10 @@ fn split(cloud: &Cloud, points: &mut [u32], most: usize) -> Vec<u32> {
         return vec![n as u32];
     }
     let (left, right) = halve(cloud, points, n / 2);
-    let (mut sizes, others) = match n > SHARED {
-        true => rayon::join(|| split(cloud, left, most), || split(cloud, right, most)),
-        false => (split(cloud, left, most), split(cloud, right, most)),
+    let (mut sizes, others) = if n > SHARED {
+        rayon::join(|| split(cloud, left, most), || split(cloud, right, most))
+    } else {
+        (split(cloud, left, most), split(cloud, right, most))
     };
     sizes.extend(others);
     sizes

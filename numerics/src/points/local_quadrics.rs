@@ -55,9 +55,10 @@ impl LocalQuadric<'_> {
 
     /// Returns the curvatures for a normal on the same side as `normal`, ascending, `[d−1]`.
     pub(crate) fn curvatures_for(&self, normal: &[f64]) -> Small {
-        match dot(self.normal, normal) < 0.0 {
-            true => self.curvatures.iter().rev().map(|k| -k).collect(),
-            false => Small::from_slice(self.curvatures),
+        if dot(self.normal, normal) < 0.0 {
+            self.curvatures.iter().rev().map(|k| -k).collect()
+        } else {
+            Small::from_slice(self.curvatures)
         }
     }
 

@@ -60,9 +60,10 @@ impl<'a> Subject<'a> {
         let rows = Mat::from_fn(p, n, |a, i| column(a)[i]);
         let solved = solve_gram(&gram, rows).ok_or(NumericsError::MeanNotDetermined)?;
         let leverage = |i: usize| (0..p).map(|a| column(a)[i] * solved[(a, i)]).sum::<f64>();
-        match (0..n).any(|i| leverage(i) >= 1.0 - LEVERAGE) {
-            true => Err(NumericsError::MeanNotDetermined),
-            false => Ok(()),
+        if (0..n).any(|i| leverage(i) >= 1.0 - LEVERAGE) {
+            Err(NumericsError::MeanNotDetermined)
+        } else {
+            Ok(())
         }
     }
 

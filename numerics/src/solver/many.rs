@@ -71,9 +71,10 @@ impl Solution {
         let parts = lists.chunks_exact(n).zip(weights.chunks_exact(n)).zip(at_points.chunks_exact(n));
         for ((list, weights), at_points) in parts {
             let found = Candidate::evaluated(solver, list, weights.to_vec(), at_points.to_vec());
-            solutions.push(match found.wants_refinement(solver, list) {
-                true => Self::of(solver, list, observer)?,
-                false => found.accept(solver, list, false)?.0,
+            solutions.push(if found.wants_refinement(solver, list) {
+                Self::of(solver, list, observer)?
+            } else {
+                found.accept(solver, list, false)?.0
             });
         }
         Ok(())

@@ -24,7 +24,7 @@ use super::sums::regularization::Regularization;
 pub(crate) use condition::estimate_norm1;
 use dense::Dense;
 pub use dense::{Factor, FactorBuilder, Method, Workspace};
-pub(crate) use dense::{SMALLEST_PIVOT, factorize_in_place};
+pub(crate) use dense::{PIVOT_TOLERANCE, SMALLEST_PIVOT, factorize_in_place};
 pub use residuals::{Disagreement, Outlier, Place};
 pub(crate) use solution::MAX_RELATIVE_RESIDUAL;
 pub use solution::Solution;

@@ -31,9 +31,10 @@ impl Expansion<'_> {
         order: JetOrder,
         observer: &dyn Observer,
     ) -> Result<Jets, NumericsError> {
-        match std::ptr::eq(queries, self.centres) && order == JetOrder::Hessian {
-            true => Jets::at_points(self.centres, self.kernel, self.weights, observer),
-            false => Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer),
+        if std::ptr::eq(queries, self.centres) && order == JetOrder::Hessian {
+            Jets::at_points(self.centres, self.kernel, self.weights, observer)
+        } else {
+            Jets::evaluate(self.centres, self.kernel, self.weights, queries, order, observer)
         }
     }
 
@@ -47,9 +48,10 @@ impl Expansion<'_> {
         queries: &Cloud,
         observer: &dyn Observer,
     ) -> Result<Vec<f64>, NumericsError> {
-        match std::ptr::eq(queries, self.centres) {
-            true => kernel_times(self.centres, self.kernel, self.weights, observer),
-            false => Ok(self.at(queries, JetOrder::Value, observer)?.values()),
+        if std::ptr::eq(queries, self.centres) {
+            kernel_times(self.centres, self.kernel, self.weights, observer)
+        } else {
+            Ok(self.at(queries, JetOrder::Value, observer)?.values())
         }
     }
 }

@@ -21,9 +21,10 @@ pub fn bunny() -> (Cloud, Vec<f64>) {
 /// Angles to the normals of the mesh in degrees. A null counts as 180°.
 fn angles(cloud: &Cloud, truth: &[f64]) -> Vec<f64> {
     let geometry = geometry(cloud, Purpose::Normals);
-    let angle = |(query, truth): (usize, &[f64])| match geometry.is_null()[query] {
-        true => 180.0,
-        false => {
+    let angle = |(query, truth): (usize, &[f64])| {
+        if geometry.is_null()[query] {
+            180.0
+        } else {
             let cosine: f64 = geometry.normal(query).iter().zip(truth).map(|(a, b)| a * b).sum();
             cosine.clamp(-1.0, 1.0).acos().to_degrees()
         }

@@ -194,9 +194,10 @@ impl LocalKriging {
         observer: &dyn Observer,
     ) -> Result<KrigingAnswer, NumericsError> {
         let (kernel, d, order) = (self.system.kernel(), queries.dimension(), request.order.degree());
-        let quantities = match request.has_deviations {
-            true => Quantities::derivatives(kernel, d, order)?,
-            false => Quantities::none(),
+        let quantities = if request.has_deviations {
+            Quantities::derivatives(kernel, d, order)?
+        } else {
+            Quantities::none()
         };
         let asked = Asked { set, request, quantities, n_neighbours: self.n_neighbours() };
         let Raw { jets, mut sure, n_sure, n_dependent } = self.run(values, queries, asked, observer)?;

@@ -1,22 +1,16 @@
 //! The layout of a query's results, and of the rows of right-hand sides that they need.
 
+use crate::machine::lanes::triangle;
+
 /// Columns solved for at once. With as many rows they make 16 independent chains of products.
 pub(super) const COLUMNS: usize = 4;
 
-/// Rows of any query below the triangle: values, covariances with the query, weights, φ′ and φ″.
+/// Rows of any query below the triangle: values, and covariances of the value at the query.
 ///
-/// The rows of derivatives, functionals and functions of a mean follow.
-pub(super) const N_ROWS: usize = 5;
+/// The rows of quantities and of functions of a mean follow, then those that are not solved for.
 pub(super) const VALUES: usize = 0;
 pub(super) const CROSS: usize = 1;
-pub(super) const WEIGHTS: usize = 2;
-pub(super) const SLOPES: usize = 3;
-pub(super) const BENDS: usize = 4;
-
-/// Returns the number of entries in a triangle of n rows, which is where row n starts.
-pub(super) const fn triangle(n: usize) -> usize {
-    n * (n + 1) / 2
-}
+pub(super) const QUANTITIES: usize = 2;
 
 /// The results to compute besides the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,19 +35,34 @@ impl Parts {
         if self.n_functionals > 0 { self.n_functionals } else { self.n_derivatives }
     }
 
-    /// Rows of right-hand sides after the [`N_ROWS`] of any query.
-    pub(super) const fn n_rows(&self) -> usize {
-        self.n_derivatives + self.n_functionals + self.n_functions
-    }
-
-    /// The first row of the quantities whose variances are asked for.
-    pub(super) const fn quantities(&self) -> usize {
-        N_ROWS + if self.n_functionals > 0 { self.n_derivatives } else { 0 }
-    }
-
     /// The first row of the functions of a mean.
     pub(super) const fn functions(&self) -> usize {
-        N_ROWS + self.n_derivatives + self.n_functionals
+        QUANTITIES + self.n_quantities()
+    }
+
+    /// Rows that are solved for.
+    pub(super) const fn n_solved(&self) -> usize {
+        self.functions() + self.n_functions
+    }
+
+    /// The row of the weights.
+    pub(super) const fn weights(&self) -> usize {
+        self.n_solved()
+    }
+
+    /// The row of φ′. That of φ″ follows.
+    pub(super) const fn slopes(&self) -> usize {
+        self.n_solved() + 1
+    }
+
+    /// The first row of derivatives, which are either quantities themselves or what functionals are made of.
+    pub(super) const fn derivatives(&self) -> usize {
+        if self.n_functionals > 0 { self.n_solved() + 3 } else { QUANTITIES }
+    }
+
+    /// All rows below the triangle.
+    pub(super) const fn n_rows(&self) -> usize {
+        self.n_solved() + 3 + if self.n_functionals > 0 { self.n_derivatives } else { 0 }
     }
 
     /// Numbers per query in dimension d, laid out as [`Found`] says.

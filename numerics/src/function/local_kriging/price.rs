@@ -1,14 +1,14 @@
 //! Prices of local kriging, which solves a system of the nearest points around each query.
 
 use super::NEIGHBOURS;
+use crate::machine::lanes::MAX_LANES;
 use crate::machine::price::{Price, Sizes};
 use crate::points::sampling::{sampling_flops, sampling_price};
 
 /// Flops of kriging at one query and of the search for its neighbours.
 const FLOPS_PER_KRIGING: f64 = 1e6;
 
-/// Queries that one thread solves side by side. Memory is counted for at most `MAX_KRIGING_THREADS` threads.
-const KRIGED_AT_ONCE: usize = 8;
+/// Memory is counted for at most this many threads, each of which solves [`MAX_LANES`] queries side by side.
 const MAX_KRIGING_THREADS: usize = 64;
 
 /// The price of preparing the model: a check of the system, and a sampling of its cloud.
@@ -30,9 +30,9 @@ pub(crate) fn making_price(n_points: usize, dimension: usize, is_merged: bool, i
 /// Each query has `n_deviations` deviations.
 pub(crate) fn kriging_price(n_deviations: usize, sizes: Sizes) -> Price {
     let ([n, m, d], Sizes { n_points, n_queries, dimension }) = (sizes.as_f64(), sizes);
-    let n_threads = n_queries.div_ceil(KRIGED_AT_ONCE).min(MAX_KRIGING_THREADS);
+    let n_threads = n_queries.div_ceil(MAX_LANES).min(MAX_KRIGING_THREADS);
     // Each query holds a triangle of its system and some rows.
-    let of_thread = KRIGED_AT_ONCE * NEIGHBOURS * (NEIGHBOURS / 2 + 12 + dimension + n_deviations);
+    let of_thread = MAX_LANES * NEIGHBOURS * (NEIGHBOURS / 2 + 12 + dimension + n_deviations);
     // Searches in many dimensions visit most of the cloud.
     let visited = n.min(5.0 * NEIGHBOURS as f64 * 2f64.powi(dimension.min(60) as i32));
     let substituted = 2.0 * n_deviations as f64 * (NEIGHBOURS as f64).powi(2);

@@ -95,9 +95,10 @@ impl<'a> Quantities<'a> {
         count: usize,
         order: usize,
     ) -> Result<Self, NumericsError> {
-        match has_variance(kernel, order) {
-            true => Ok(Self::Functionals { of, count, order }),
-            false => Err(NumericsError::DerivativesVary { order }),
+        if has_variance(kernel, order) {
+            Ok(Self::Functionals { of, count, order })
+        } else {
+            Err(NumericsError::DerivativesVary { order })
         }
     }
 

@@ -3,58 +3,13 @@
 
 use pulp::Simd;
 
-use super::{Factored, triangle};
-use crate::kernel::Pairs;
+use super::{Factored, extra_rows};
+use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
+use crate::machine::lanes::triangle;
 use crate::machine::registers::{BLOCK, Pack};
 
 /// Variance added to every point besides its noise, relative to k₀. It covers rounding of the heights.
 const NUGGET: f64 = 1e-13;
-
-/// A pass that replaces squared distances by φ, in place.
-struct Fill<'a, S: Simd> {
-    simd: S,
-    entries: &'a mut [S::f64s],
-    scale: f64,
-}
-
-impl<S: Simd> Pairs<S> for Fill<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
-        (Pack::read(self.simd, self.entries, at) * self.scale, ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        profile[0].write(self.entries, at);
-    }
-}
-
-/// A pass that computes φ, φ′ and φ″ for one block of squared distances.
-struct Derivatives<'a, S: Simd> {
-    simd: S,
-    entries: &'a mut [S::f64s],
-    first: &'a mut [S::f64s],
-    second: &'a mut [S::f64s],
-    scale: f64,
-}
-
-impl<S: Simd> Pairs<S> for Derivatives<'_, S> {
-    type Others = ();
-
-    #[inline(always)]
-    fn pack(&mut self, at: usize) -> (Pack<S>, ()) {
-        (Pack::read(self.simd, self.entries, at) * self.scale, ())
-    }
-
-    #[inline(always)]
-    fn take(&mut self, at: usize, (): (), profile: [Pack<S>; 3]) {
-        profile[0].write(self.entries, at);
-        profile[1].write(self.first, at);
-        profile[2].write(self.second, at);
-    }
-}
 
 impl<S: Simd> Factored<'_, S> {
     /// Writes φ below the diagonal and 1 + noise onto it. Rows and columns of empty places are those of the
@@ -65,30 +20,30 @@ impl<S: Simd> Factored<'_, S> {
         for i in 0..n {
             let row = triangle(i);
             for j in 0..i {
-                let mut q = Pack::<S, 1>::splat(self.simd, 0.0);
+                let mut q = self.lower.splat(0.0);
                 for axis in 0..self.k {
                     let step = self.coordinate(axis, i) - self.coordinate(axis, j);
                     q = step.mul_add(step, q);
                 }
-                q.write(self.matrix, row + j);
+                self.lower.set(row + j, q);
             }
-            Pack::<S, 1>::splat(self.simd, 0.0).write(self.matrix, row + i);
+            self.lower.set(row + i, self.lower.splat(0.0));
         }
-        let scale = self.model.length_scale.powi(-2);
         let per_block = BLOCK / S::F64_LANES;
+        let scaling = self.model.scaling();
         let n_blocks = triangle(n).div_ceil(per_block);
         for block in 0..n_blocks {
-            let entries = &mut self.matrix[block * per_block..][..per_block];
-            self.model.family.profiles(Fill { simd: self.simd, entries, scale });
+            let entries = &mut self.lower.registers[block * per_block..][..per_block];
+            self.model.family.profiles(Covariances { simd: self.lower.simd, entries, scaling });
         }
         for i in 0..n {
             let (row, mask) = (triangle(i), self.mask(i));
             for j in 0..i {
                 let both = mask * self.mask(j);
-                (self.at(row + j) * both).write(self.matrix, row + j);
+                self.lower.set(row + j, self.lower.at(row + j) * both);
             }
             let noise = self.of(&self.batch.weights, i) * self.model.noise * mask + (1.0 + NUGGET);
-            noise.write(self.matrix, row + i);
+            self.lower.set(row + i, noise);
         }
     }
 
@@ -97,22 +52,22 @@ impl<S: Simd> Factored<'_, S> {
     #[inline(always)]
     pub(super) fn fill_trend(&mut self) {
         let (n, k) = (self.n, self.k);
-        let zero = Pack::<S, 1>::splat(self.simd, 0.0);
+        let zero = self.lower.splat(0.0);
         for j in 0..n {
             let mask = self.mask(j);
-            mask.write(self.matrix, self.row(n) + j);
+            self.lower.put(n, j, mask);
             for axis in 0..k {
-                (self.coordinate(axis, j) * mask).write(self.matrix, self.row(n + 1 + axis) + j);
+                self.lower.put(n + 1 + axis, j, self.coordinate(axis, j) * mask);
             }
             for term in k + 1..self.p {
                 let product = self.of(&self.batch.products, (term - k - 1) * n + j);
                 let product = if term < self.p_trend { product * mask } else { zero };
-                product.write(self.matrix, self.row(n + term) + j);
+                self.lower.put(n + term, j, product);
             }
-            (self.coordinate(k, j) * mask).write(self.matrix, self.row(n + self.p) + j);
-            (self.of(&self.batch.entailed, j) * mask).write(self.matrix, self.row(n + self.p + 1) + j);
-            for row in n + self.p + 2..self.n_rows {
-                zero.write(self.matrix, self.row(row) + j);
+            self.lower.put(n + self.p, j, self.coordinate(k, j) * mask);
+            self.lower.put(n + self.p + 1, j, self.of(&self.batch.entailed, j) * mask);
+            for row in n + self.p + 2..n + extra_rows(k + 1) {
+                self.lower.put(row, j, zero);
             }
         }
     }
@@ -125,7 +80,7 @@ impl<S: Simd> Factored<'_, S> {
         let (n, k) = (self.n, self.k);
         let scale = self.model.length_scale.powi(-2);
         let per_block = BLOCK / S::F64_LANES;
-        let zero = self.simd.splat_f64s(0.0);
+        let zero = self.lower.simd.splat_f64s(0.0);
         // A block has at most this many registers.
         let mut q = [zero; BLOCK];
         let mut first = [zero; BLOCK];
@@ -135,34 +90,35 @@ impl<S: Simd> Factored<'_, S> {
         while start < n {
             let end = (start + per_block).min(n);
             for j in start..end {
-                let mut square = Pack::<S, 1>::splat(self.simd, 0.0);
+                let mut square = self.lower.splat(0.0);
                 for axis in 0..k {
                     let t = self.coordinate(axis, j);
                     square = t.mul_add(t, square);
                 }
                 square.write(&mut q, j - start);
             }
-            self.model.family.profiles(Derivatives {
-                simd: self.simd,
+            self.model.family.profiles(CovariancesAndSlopes {
+                simd: self.lower.simd,
                 entries: &mut q[..per_block],
                 first: &mut first[..per_block],
                 second: &mut second[..per_block],
-                scale,
+                scaling: self.model.scaling(),
             });
             for j in start..end {
                 let mask = self.mask(j);
-                let phi = Pack::<S, 1>::read(self.simd, &q, j - start);
-                let slope = Pack::<S, 1>::read(self.simd, &first, j - start) * (2.0 * scale) * mask;
-                let bend = Pack::<S, 1>::read(self.simd, &second, j - start) * (4.0 * scale * scale) * mask;
-                (phi * mask).write(self.matrix, self.row(base) + j);
+                let phi = Pack::<S, 1>::read(self.lower.simd, &q, j - start);
+                let slope = Pack::<S, 1>::read(self.lower.simd, &first, j - start) * (2.0 * scale) * mask;
+                let bend =
+                    Pack::<S, 1>::read(self.lower.simd, &second, j - start) * (4.0 * scale * scale) * mask;
+                self.lower.put(base, j, phi * mask);
                 let mut term = base + 1 + k;
                 for a in 0..k {
                     let t_a = self.coordinate(a, j);
-                    (-(slope * t_a)).write(self.matrix, self.row(base + 1 + a) + j);
+                    self.lower.put(base + 1 + a, j, -(slope * t_a));
                     for b in a..k {
                         let product = bend * t_a * self.coordinate(b, j);
                         let entry = if a == b { product + slope } else { product };
-                        entry.write(self.matrix, self.row(term) + j);
+                        self.lower.put(term, j, entry);
                         term += 1;
                     }
                 }

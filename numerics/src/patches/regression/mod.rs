@@ -14,7 +14,6 @@
 mod batch;
 mod covariances;
 mod doubt;
-mod factor;
 mod model;
 #[cfg(test)]
 mod tests;
@@ -23,16 +22,15 @@ mod trend;
 use pulp::{Simd, WithSimd};
 use smallvec::SmallVec;
 
+use crate::machine::lanes::{Layout, Lower, MAX_LANES, Rounding, Workspace};
 use crate::machine::registers::{BLOCK, Pack};
 
 pub(crate) use batch::Batch;
 pub(crate) use model::Model;
 
-/// Numbers in the widest register.
-pub(crate) const MAX_LANES: usize = 8;
-
-/// Rows of a tile, which are solved for at once.
+/// Rows and columns of a tile, which are solved for at once.
 const ROWS: usize = 4;
+const COLUMNS: usize = 2;
 
 /// Rounding of the heights, in units of the radius.
 const LEAST_HEIGHT: f64 = 1e-16;
@@ -63,33 +61,22 @@ pub(crate) type Terms = SmallVec<[f64; 8]>;
 /// Numbers, one per pair of terms, on the stack for surfaces in space.
 pub(crate) type Squares = SmallVec<[f64; 36]>;
 
-/// Memory for the factorization of one batch.
-pub(crate) struct Workspace {
-    matrix: Vec<f64>,
-    start: usize,
+/// Makes memory for the factorization of one batch.
+pub(crate) fn workspace(dimension: usize, count: usize) -> Workspace {
+    let n_rows = extra_rows(dimension);
+    let n_registers = scratch(dimension, count).next_multiple_of(BLOCK);
+    // Inner products of those rows, and a system of p unknowns with as many right-hand sides.
+    Workspace::new(n_registers + 2 * n_rows * n_rows)
 }
 
-impl Workspace {
-    pub(crate) fn new(dimension: usize, count: usize) -> Self {
-        let n_rows = extra_rows(dimension);
-        let n = (triangle(count) + n_rows * count).next_multiple_of(BLOCK) * MAX_LANES;
-        // Inner products of those rows, and a system of p unknowns with as many right-hand sides.
-        let n = n + 2 * n_rows * n_rows * MAX_LANES;
-        let matrix = vec![0.0; n + MAX_LANES];
-        // Aligned to a cache line.
-        let start = matrix.as_ptr().align_offset(64).min(MAX_LANES);
-        Self { matrix, start }
-    }
+/// The place of the registers after the rows.
+fn scratch(dimension: usize, count: usize) -> usize {
+    Layout::dense(count).row(count + extra_rows(dimension))
 }
 
 /// Number of rows below K: Fᵀ, zᵀ, eᵀ and Cᵀ, rounded up to whole tiles.
 fn extra_rows(dimension: usize) -> usize {
     (2 * n_terms(dimension) + 2).next_multiple_of(ROWS)
-}
-
-/// Number of entries of a lower triangle with n rows, and the start of row n in it.
-const fn triangle(n: usize) -> usize {
-    n * (n + 1) / 2
 }
 
 /// The computation that kriges every lane of a batch with one model.
@@ -106,19 +93,20 @@ impl WithSimd for Krige<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let start = self.workspace.start;
-        let (matrix, _) = S::as_mut_simd_f64s(&mut self.workspace.matrix[start..]);
         let d = self.batch.dimension;
         let system = Factored {
-            simd,
+            lower: Lower {
+                simd,
+                layout: Layout::dense(self.batch.count),
+                registers: self.workspace.registers::<S>(),
+            },
             k: d - 1,
             n: self.batch.count,
             p: n_terms(d),
             p_trend: self.model.n_trend,
-            n_rows: self.batch.count + extra_rows(d),
+            scratch: scratch(d, self.batch.count),
             batch: self.batch,
             model: self.model,
-            matrix,
         };
         system.run(self.predicts)
     }
@@ -126,10 +114,9 @@ impl WithSimd for Krige<'_> {
 
 /// A batch during its factorization.
 ///
-/// The matrix holds the rows of the lower triangle of K one after the other. Below it come the rows of Fᵀ
-/// `[p]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`, all of length n.
+/// Below the triangle of K come the rows of Fᵀ `[p]`, zᵀ, eᵀ (the entailed heights) and Cᵀ `[p]`.
 struct Factored<'a, S: Simd> {
-    simd: S,
+    lower: Lower<'a, S>,
     /// Tangential coordinates, d − 1.
     k: usize,
     /// Places in each lane.
@@ -138,11 +125,10 @@ struct Factored<'a, S: Simd> {
     p: usize,
     /// Terms of the trend, at most p.
     p_trend: usize,
-    /// Rows of the matrix.
-    n_rows: usize,
+    /// The place of the registers after the rows.
+    scratch: usize,
     batch: &'a Batch,
     model: &'a Model,
-    matrix: &'a mut [S::f64s],
 }
 
 impl<S: Simd> Factored<'_, S> {
@@ -153,25 +139,14 @@ impl<S: Simd> Factored<'_, S> {
         if predicts {
             self.fill_covariances();
         }
-        let n_rows = if predicts { self.n_rows } else { self.n + (self.p + 2).next_multiple_of(ROWS) };
-        self.factorize(n_rows);
+        let n_rows = if predicts { extra_rows(self.k + 1) } else { (self.p + 2).next_multiple_of(ROWS) };
+        self.lower.factorize::<ROWS, COLUMNS>(self.n..self.n + n_rows, &Unguarded);
         self.solve(predicts)
     }
 
     #[inline(always)]
-    fn row(&self, i: usize) -> usize {
-        if i < self.n { triangle(i) } else { triangle(self.n) + (i - self.n) * self.n }
-    }
-
-    #[inline(always)]
     fn of(&self, list: &[f64], at: usize) -> Pack<S, 1> {
-        let (registers, _) = S::as_simd_f64s(list);
-        Pack::read(self.simd, registers, at)
-    }
-
-    #[inline(always)]
-    fn at(&self, i: usize) -> Pack<S, 1> {
-        Pack::read(self.simd, self.matrix, i)
+        Pack::of_numbers(self.lower.simd, list, at)
     }
 
     #[inline(always)]
@@ -182,5 +157,22 @@ impl<S: Simd> Factored<'_, S> {
     #[inline(always)]
     fn mask(&self, j: usize) -> Pack<S, 1> {
         self.of(&self.batch.is_point, j)
+    }
+}
+
+/// Rounding of a factor that is NaN where K is not positive definite in float64.
+struct Unguarded;
+
+impl<S: Simd> Rounding<S> for Unguarded {
+    const JOINS_PRODUCTS: bool = true;
+
+    #[inline(always)]
+    fn entry(&self, _i: usize, entry: Pack<S, 1>) -> Pack<S, 1> {
+        entry
+    }
+
+    #[inline(always)]
+    fn inverse_root(&self, square: Pack<S, 1>) -> Pack<S, 1> {
+        1.0 / square.sqrt()
     }
 }

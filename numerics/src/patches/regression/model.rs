@@ -2,8 +2,10 @@
 
 use smallvec::SmallVec;
 
-use super::{Squares, triangle};
+use super::Squares;
 use crate::kernel::Family;
+use crate::kernel::in_place::Scaling;
+use crate::machine::lanes::triangle;
 
 /// Hyperparameters of the covariance, except its scale s².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +21,12 @@ pub(crate) struct Model {
 }
 
 impl Model {
+    /// Constants of φ as it is.
+    #[inline(always)]
+    pub(super) fn scaling(&self) -> Scaling {
+        Scaling { inverse_square_length: self.length_scale.powi(-2), variance: 1.0, least: f64::NEG_INFINITY }
+    }
+
     /// Variance of a third derivative of g along an axis divided by 15 s², in units of the radius:
     /// −8φ‴(0)/ℓ⁶.
     ///

@@ -169,7 +169,7 @@ fn lanes_say_what_the_formulas_say() {
         let expected = written_out(&points);
         for n_empty in [0, 4] {
             let batch = points.batch(set.n_lanes(), n_empty);
-            let mut workspace = Workspace::new(3, N + n_empty);
+            let mut workspace = workspace(3, N + n_empty);
             let krige = Krige { batch: &batch, model: &model, workspace: &mut workspace, predicts: true };
             for found in set.dispatch(krige) {
                 assert!((found.log_likelihood - expected.log_likelihood).abs() < 1e-8, "{seed}");

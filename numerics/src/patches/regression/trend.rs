@@ -5,8 +5,8 @@ use smallvec::SmallVec;
 
 use super::doubt::Doubt;
 use super::model::prior_covariance;
-use super::{Factored, Kriged, LEAST_HEIGHT, MAX_LANES, extra_rows, triangle};
-use crate::machine::registers::Pack;
+use super::{Factored, Kriged, LEAST_HEIGHT};
+use crate::machine::lanes::{MAX_LANES, triangle};
 
 impl<S: Simd> Factored<'_, S> {
     /// Computes the results of all lanes from inner products of the rows below the factor.
@@ -14,49 +14,50 @@ impl<S: Simd> Factored<'_, S> {
     pub(super) fn solve(&mut self, predicts: bool) -> SmallVec<[Kriged; MAX_LANES]> {
         let (p, p_trend) = (self.p, self.p_trend);
         let n_kept = if predicts { 2 * p + 2 } else { p + 2 };
-        let start = self.matrix.len() - 2 * extra_rows(self.k + 1).pow(2);
+        let start = self.scratch;
         for i in 0..n_kept {
             for j in 0..=i {
-                let product = self.product(self.n + i, self.n + j);
-                product.write(self.matrix, start + i * n_kept + j);
+                let product = self.lower.product(self.lower.row(self.n + i), self.lower.row(self.n + j));
+                self.lower.set(start + i * n_kept + j, product);
             }
         }
         // A = FᵀK⁻¹F = RRᵀ, then R⁻¹(b, U) with b = FᵀK⁻¹z and U = I − FᵀK⁻¹C, row by row.
         let entry = |i: usize, j: usize| start + i.max(j) * n_kept + i.min(j);
         let small = start + n_kept * n_kept;
         let width = p_trend + 2 + p;
-        let one = Pack::<S, 1>::splat(self.simd, 1.0);
-        let zero = Pack::<S, 1>::splat(self.simd, 0.0);
+        let one = self.lower.splat(1.0);
+        let zero = self.lower.splat(0.0);
         let n_columns = if predicts { width } else { p_trend + 2 };
         for i in 0..p_trend {
             for j in 0..n_columns {
                 let mut value = if j < p_trend {
-                    self.at(entry(j, i))
+                    self.lower.at(entry(j, i))
                 } else if j < p_trend + 2 {
-                    self.at(entry(j - p_trend + p, i))
+                    self.lower.at(entry(j - p_trend + p, i))
                 } else {
                     let unit = if j - p_trend - 2 == i { one } else { zero };
-                    unit - self.at(entry(j - p_trend + p, i))
+                    unit - self.lower.at(entry(j - p_trend + p, i))
                 };
                 if j < i {
                     continue;
                 }
                 // By columns of R: entry (i, j) is that of Rᵀ for j < p_trend, of R⁻¹(b, U) beyond.
                 for l in 0..i {
-                    value = value - self.at(small + l * width + i) * self.at(small + l * width + j);
+                    value =
+                        value - self.lower.at(small + l * width + i) * self.lower.at(small + l * width + j);
                 }
-                let value = if i == j { value.sqrt() } else { value / self.at(small + i * width + i) };
-                value.write(self.matrix, small + i * width + j);
+                let value = if i == j { value.sqrt() } else { value / self.lower.at(small + i * width + i) };
+                self.lower.set(small + i * width + j, value);
             }
         }
         // Quadratic forms of heights and entailed heights, with the trend projected out of K⁻¹.
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
-            let mut quadratic = self.at(entry(p + i, p + j));
+            let mut quadratic = self.lower.at(entry(p + i, p + j));
             for l in 0..p_trend {
                 let row = small + l * width + p_trend;
-                quadratic = quadratic - self.at(row + i) * self.at(row + j);
+                quadratic = quadratic - self.lower.at(row + i) * self.lower.at(row + j);
             }
-            quadratic.write(self.matrix, entry(p + i, p + j));
+            self.lower.set(entry(p + i, p + j), quadratic);
         }
         if predicts {
             self.predict(start, n_kept, small, width);
@@ -73,20 +74,21 @@ impl<S: Simd> Factored<'_, S> {
             let row = start + (p + 2 + i) * n_kept;
             let u_i = small + p_trend + 2 + i;
             for data in 0..2 {
-                let mut mean = self.at(row + p + data);
+                let mut mean = self.lower.at(row + p + data);
                 for l in 0..p_trend {
-                    let b = self.at(small + l * width + p_trend + data);
-                    mean = self.at(u_i + l * width).mul_add(b, mean);
+                    let b = self.lower.at(small + l * width + p_trend + data);
+                    mean = self.lower.at(u_i + l * width).mul_add(b, mean);
                 }
-                mean.write(self.matrix, row + p + data);
+                self.lower.set(row + p + data, mean);
             }
             for j in 0..=i {
                 let u_j = small + p_trend + 2 + j;
-                let mut covariance = prior[i * p + j] - self.at(row + p + 2 + j);
+                let mut covariance = prior[i * p + j] - self.lower.at(row + p + 2 + j);
                 for l in 0..p_trend {
-                    covariance = self.at(u_i + l * width).mul_add(self.at(u_j + l * width), covariance);
+                    covariance =
+                        self.lower.at(u_i + l * width).mul_add(self.lower.at(u_j + l * width), covariance);
                 }
-                covariance.write(self.matrix, row + p + 2 + j);
+                self.lower.set(row + p + 2 + j, covariance);
             }
         }
     }
@@ -102,7 +104,7 @@ impl<S: Simd> Factored<'_, S> {
         predicts: bool,
     ) -> SmallVec<[Kriged; MAX_LANES]> {
         let (n, p, p_trend) = (self.n, self.p, self.p_trend);
-        let numbers: &[f64] = bytemuck::cast_slice(&*self.matrix);
+        let numbers: &[f64] = bytemuck::cast_slice(&*self.lower.registers);
         let lanes = S::F64_LANES;
         let at = |register: usize, lane: usize| numbers[register * lanes + lane];
         let mut found = SmallVec::new();

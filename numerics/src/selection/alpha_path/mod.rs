@@ -62,9 +62,10 @@ pub fn alpha_path(
         Regularization::uniform(alpha)?;
     }
     let subject = Subject::of(cloud, values, mean)?;
-    match is_decomposed(cloud.n_points(), alphas.len()) {
-        true => by_spectrum(&subject, at, alphas, criterion, observer),
-        false => by_factors(&subject, at, alphas, criterion, observer),
+    if is_decomposed(cloud.n_points(), alphas.len()) {
+        by_spectrum(&subject, at, alphas, criterion, observer)
+    } else {
+        by_factors(&subject, at, alphas, criterion, observer)
     }
 }
 

@@ -87,10 +87,8 @@ pub(in crate::selection) fn contract(
         Ok(nodes.dispatch(Columns { nodes: &nodes, cloud, kernel, weights, columns, per_axis }))
     };
     let tasks = 0..n.div_ceil(COLUMNS_PER_TASK);
-    let parts: Result<Vec<Vec<f64>>, NumericsError> = match is_alone {
-        false => tasks.into_par_iter().map(task).collect(),
-        true => tasks.map(task).collect(),
-    };
+    let parts: Result<Vec<Vec<f64>>, NumericsError> =
+        if is_alone { tasks.map(task).collect() } else { tasks.into_par_iter().map(task).collect() };
     // Adding in the order of the tasks makes the sum independent of the threads.
     let mut total = vec![0.0; FIXED + if per_axis { cloud.dimension() } else { 0 }];
     for part in parts? {

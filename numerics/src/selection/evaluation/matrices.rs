@@ -182,9 +182,10 @@ impl Matrices {
     /// Returns `W_ii = |L⁻¹e_i|²`, from L⁻¹.
     pub(in crate::selection) fn inverse_diagonal(&self) -> Vec<f64> {
         let entry = |(i, column): (usize, &[f64])| dot(&column[i..], &column[i..]);
-        match self.is_alone {
-            true => self.inverse_factor.chunks_exact(self.n).enumerate().map(entry).collect(),
-            false => self.inverse_factor.par_chunks_exact(self.n).enumerate().map(entry).collect(),
+        if self.is_alone {
+            self.inverse_factor.chunks_exact(self.n).enumerate().map(entry).collect()
+        } else {
+            self.inverse_factor.par_chunks_exact(self.n).enumerate().map(entry).collect()
         }
     }
 
@@ -238,9 +239,10 @@ impl Matrices {
             }
         };
         self.has_inverse_factor = false;
-        match self.is_alone {
-            true => self.inverse_factor.chunks_exact_mut(n).enumerate().for_each(fill),
-            false => self.inverse_factor.par_chunks_exact_mut(n).enumerate().for_each(fill),
+        if self.is_alone {
+            self.inverse_factor.chunks_exact_mut(n).enumerate().for_each(fill)
+        } else {
+            self.inverse_factor.par_chunks_exact_mut(n).enumerate().for_each(fill)
         }
         let scaled = MatRef::from_column_major_slice(&self.inverse_factor, n, n);
         let mut product = MatMut::from_column_major_slice_mut(&mut self.product, n, n);

@@ -182,9 +182,8 @@ impl<'a> Evidence<'a> {
         let p = self.n_functions();
         let column = |a: usize| &left.columns[a * left.n_rows..][..left.n_rows];
         let gram = Mat::from_fn(p, p, |a, b| dot(column(a), column(b)));
-        let right = Mat::from_fn(p, p + 1, |a, b| match b < p {
-            true => f64::from(u8::from(a == b)),
-            false => dot(column(a), column(p)),
+        let right = Mat::from_fn(p, p + 1, |a, b| {
+            if b < p { f64::from(u8::from(a == b)) } else { dot(column(a), column(p)) }
         });
         let solved = solve_gram(&gram, right).ok_or(NumericsError::MeanNotDetermined)?;
         let of_column = |b: usize| solved.col(b).iter().copied();

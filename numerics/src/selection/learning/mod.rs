@@ -66,9 +66,10 @@ impl Observed<'_> {
     /// [`NumericsError::LengthMismatch`] if there is no list, or an incomplete one.
     fn check(&self) -> Result<(), NumericsError> {
         let n = self.cloud.n_points();
-        match self.values.len() >= n && self.values.len().is_multiple_of(n) {
-            true => Ok(()),
-            false => self.cloud.check_one_per_point(self.values),
+        if self.values.len() >= n && self.values.len().is_multiple_of(n) {
+            Ok(())
+        } else {
+            self.cloud.check_one_per_point(self.values)
         }
     }
 }
@@ -135,9 +136,10 @@ pub fn learn(observed: Observed<'_>, observer: &dyn Observer) -> Result<Learned,
     let values = Values::of(observed);
     let order = Order::of(&observed, observer)?;
     let all = Evidence::of(&values, &order.searched);
-    let decided = match observed.cloud.n_points() < LEAST_VALUES || values.is_constant() {
-        true => None,
-        false => search(&all, &order, observer)?,
+    let decided = if observed.cloud.n_points() < LEAST_VALUES || values.is_constant() {
+        None
+    } else {
+        search(&all, &order, observer)?
     };
     let learned = decided.unwrap_or_else(|| Grid::of(&values).undecided(&values));
     let kernel = Kernel::new(learned.family, learned.length_scale, 1.0)?;

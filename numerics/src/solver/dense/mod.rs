@@ -25,6 +25,7 @@ pub(crate) use cholesky::factorize_in_place;
 use cholesky::{Cholesky, pieces};
 pub use factor::{Factor, FactorBuilder};
 use pivoted_cholesky::PivotedCholesky;
+pub(crate) use pivoting::PIVOT_TOLERANCE;
 
 /// Method by which `K + αI` was factorized.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

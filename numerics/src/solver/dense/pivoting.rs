@@ -15,7 +15,7 @@ use crate::sums::nodes::Nodes;
 use crate::sums::regularization::Regularization;
 
 /// Multiple of k₀ below which a pivot counts as rounding (numerics.md, Fit 2).
-const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;
+pub(crate) const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;
 
 /// Largest number of candidates of a block, wide enough for matrix products at full speed. Rough kernels
 /// accept nearly all candidates.

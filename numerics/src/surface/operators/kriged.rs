@@ -65,9 +65,12 @@ impl Kriged<'_> {
     ) -> Result<OfKriged, NumericsError> {
         let order = operator.order();
         let (d, count) = (queries.dimension(), operator.n_components(queries.dimension()));
-        let of_query = |query: usize| match geometry.is_null()[query] {
-            true => vec![JetFunctional::derivative(query, &vec![0.0; d]); count],
-            false => functionals(geometry, operator, query),
+        let of_query = |query: usize| {
+            if geometry.is_null()[query] {
+                vec![JetFunctional::derivative(query, &vec![0.0; d]); count]
+            } else {
+                functionals(geometry, operator, query)
+            }
         };
         let asked = FunctionalsRequest { order, functionals: &of_query, count, trend: self.trend };
         let coarse = self.moving.surest(queries, order, observer)?;

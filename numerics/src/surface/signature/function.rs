@@ -35,9 +35,10 @@ impl Signature {
     /// Returns the errors of `Solution::with_jets`.
     pub fn fit(solver: Arc<Solver>, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let ones = vec![1.0; solver.n_points()];
-        let (solution, jets) = match solver.kernel().has_kink() {
-            true => (Solution::of(&solver, &ones, observer)?, None),
-            false => Solution::with_jets(&solver, &ones, JetOrder::Hessian, observer)?,
+        let (solution, jets) = if solver.kernel().has_kink() {
+            (Solution::of(&solver, &ones, observer)?, None)
+        } else {
+            Solution::with_jets(&solver, &ones, JetOrder::Hessian, observer)?
         };
         Self::with(Interpolant { solver, solution: Arc::new(solution) }, jets, observer)
     }
@@ -48,9 +49,10 @@ impl Signature {
     /// Returns the errors of [`Interpolant::at`].
     pub fn of(function: Interpolant, observer: &dyn Observer) -> Result<Self, NumericsError> {
         let solver = &function.solver;
-        let jets = match solver.kernel().has_kink() {
-            true => None,
-            false => Some(function.at(solver.cloud(), JetOrder::Hessian, observer)?),
+        let jets = if solver.kernel().has_kink() {
+            None
+        } else {
+            Some(function.at(solver.cloud(), JetOrder::Hessian, observer)?)
         };
         Self::with(function, jets, observer)
     }

@@ -272,9 +272,10 @@ impl Service<'_> {
         slot: &mut Slot<'_>,
         found: &mut Vec<Neighbour>,
     ) -> Verdict {
-        match self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
-            true => self.by_signature(query, site, slot, found),
-            false => self.null(query, reason, slot),
+        if self.request.model == SurfaceModel::Auto && !self.vanishes(query, site) {
+            self.by_signature(query, site, slot, found)
+        } else {
+            self.null(query, reason, slot)
         }
     }
 

@@ -57,9 +57,10 @@ impl Assembly<'_> {
         let row = |found: &mut Vec<Neighbour>, query: usize| {
             observer.checkpoint()?;
             let row = self.row(query, found);
-            match row.weights.iter().all(|weight| weight.is_finite()) {
-                true => Ok(row),
-                false => Err(NumericsError::Overflow { query }),
+            if row.weights.iter().all(|weight| weight.is_finite()) {
+                Ok(row)
+            } else {
+                Err(NumericsError::Overflow { query })
             }
         };
         let rows = (0..self.queries.n_points()).into_par_iter().map_init(Vec::new, row);

@@ -9,6 +9,8 @@
 //! values. Otherwise they would not be compiled into the dispatched function itself. Code outside it falls
 //! back to one call per instruction, 50 times slower.
 
+pub(crate) mod exp;
+
 use std::any::{Any, TypeId};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -198,6 +200,12 @@ impl<S: Simd, const N: usize> Pack<S, N> {
 }
 
 impl<S: Simd> Pack<S, 1> {
+    /// Reads register number `at` of a list of numbers.
+    #[inline(always)]
+    pub(crate) fn of_numbers(simd: S, numbers: &[f64], at: usize) -> Self {
+        Self::read(simd, S::as_simd_f64s(numbers).0, at)
+    }
+
     /// Returns the sum of the lanes.
     #[inline(always)]
     pub(crate) fn sum_lanes(self) -> f64 {

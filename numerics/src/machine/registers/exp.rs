@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use super::registers::Pack;
+use super::Pack;
 
 /// Coefficients of degrees 11 … 0 of a polynomial for `e^{−u}`, |u| ≤ ½ ln 2.
 ///

@@ -1,0 +1,145 @@
+//! Covariances among the values, and of the values with what is asked for at the query.
+
+use pulp::Simd;
+
+use super::Factored;
+use crate::function::local_kriging::parts::{CROSS, QUANTITIES, VALUES};
+use crate::kernel::in_place::{Covariances, CovariancesAndSlopes};
+use crate::machine::lanes::triangle;
+use crate::machine::registers::BLOCK;
+
+impl<S: Simd> Factored<'_, S> {
+    /// Fills the triangle with `K + noise`. Rows of empty places are those of the identity.
+    #[inline(always)]
+    pub(super) fn fill_triangle(&mut self) {
+        let (n, count) = (self.n, self.batch.count);
+        for i in 0..count {
+            let row = triangle(i);
+            for axis in 0..self.batch.dimension {
+                let x = self.of(&self.batch.points, axis * n + i);
+                for j in 0..i {
+                    let step = x - self.of(&self.batch.points, axis * n + j);
+                    let before = if axis == 0 { self.lower.splat(0.0) } else { self.lower.at(row + j) };
+                    self.lower.set(row + j, step.mul_add(step, before));
+                }
+            }
+        }
+        let scaling = self.scaling();
+        for block in 0..triangle(count).div_ceil(Self::PER_BLOCK) {
+            let entries = &mut self.lower.registers[block * Self::PER_BLOCK..][..Self::PER_BLOCK];
+            self.kernel.profiles(Covariances { simd: self.lower.simd, entries, scaling });
+        }
+        for i in 0..count {
+            let diagonal = self.of(&self.batch.noise, i) + self.kernel.at_zero();
+            self.lower.set(triangle(i) + i, diagonal);
+        }
+        for i in count..n {
+            for j in 0..i {
+                self.lower.set(triangle(i) + j, self.lower.splat(0.0));
+            }
+            self.lower.set(triangle(i) + i, self.lower.splat(1.0));
+        }
+    }
+
+    /// Fills the rows of values, of covariances with the query and, for derivatives, of φ′ and φ″.
+    #[inline(always)]
+    pub(super) fn fill_rows(&mut self) {
+        let (values, cross) = (self.row(VALUES), self.row(CROSS));
+        for j in 0..self.n {
+            let mut square = self.lower.splat(0.0);
+            for axis in 0..self.batch.dimension {
+                let difference = self.difference(axis, j);
+                square = difference.mul_add(difference, square);
+            }
+            self.lower.set(cross + j, square);
+            self.lower.set(values + j, self.of(&self.batch.values, j));
+        }
+        let (length, slopes) = (self.n.next_multiple_of(BLOCK), self.row(self.parts.slopes()));
+        let (simd, scaling) = (self.lower.simd, self.scaling());
+        for block in 0..self.n.div_ceil(Self::PER_BLOCK) {
+            let at = block * Self::PER_BLOCK;
+            let (rows, rest) = self.lower.registers.split_at_mut(slopes);
+            let entries = &mut rows[cross + at..][..Self::PER_BLOCK];
+            if self.parts.order == 0 {
+                self.kernel.profiles(Covariances { simd, entries, scaling });
+                continue;
+            }
+            let (slopes, bends) = rest.split_at_mut(length);
+            let first = &mut slopes[at..][..Self::PER_BLOCK];
+            let second = &mut bends[at..][..Self::PER_BLOCK];
+            self.kernel.profiles(CovariancesAndSlopes { simd, entries, first, second, scaling });
+        }
+        for j in self.batch.count..self.n {
+            self.lower.set(cross + j, self.lower.splat(0.0));
+        }
+    }
+
+    /// Fills the rows of the derivatives with their covariances with the values, derivatives in units of ℓ.
+    ///
+    /// With s = D/ℓ they are `2vφ′s_a` and `4vφ″s_as_b + 2vφ′δ_ab`.
+    #[inline(always)]
+    pub(super) fn fill_derivatives(&mut self) {
+        let parts = self.parts;
+        let (d, v, inverse) =
+            (self.batch.dimension, self.kernel.variance(), 1.0 / self.kernel.length_scale());
+        if parts.n_derivatives == 0 {
+            return;
+        }
+        let (slopes, bends) = (self.row(parts.slopes()), self.row(parts.slopes() + 1));
+        for j in 0..self.batch.count {
+            let slope = self.lower.at(slopes + j) * (2.0 * v);
+            let bend = self.lower.at(bends + j) * (4.0 * v);
+            let mut second = parts.derivatives() + d;
+            for a in 0..d {
+                let step = self.difference(a, j) * inverse;
+                self.lower.set(self.row(parts.derivatives() + a) + j, slope * step);
+                if parts.order < 2 {
+                    continue;
+                }
+                // Multiplied in this order for the reason given in `sum_derivatives`.
+                let first = bend * step;
+                for b in a..d {
+                    let along = if a == b { slope } else { self.lower.splat(0.0) };
+                    let entry = first.mul_add(self.difference(b, j) * inverse, along);
+                    self.lower.set(self.row(second) + j, entry);
+                    second += 1;
+                }
+            }
+        }
+        for derivative in 0..parts.n_derivatives {
+            for j in self.batch.count..self.n {
+                self.lower.set(self.row(parts.derivatives() + derivative) + j, self.lower.splat(0.0));
+            }
+        }
+    }
+
+    /// Fills the rows of the functionals with their covariances with the values.
+    #[inline(always)]
+    pub(super) fn fill_functionals(&mut self) {
+        let parts = self.parts;
+        for functional in 0..parts.n_functionals {
+            let row = self.row(QUANTITIES + functional);
+            for j in 0..self.n {
+                let mut sum = self.lower.splat(0.0);
+                for derivative in 0..parts.n_derivatives {
+                    let factor =
+                        self.of(&self.batch.functionals, functional * parts.n_derivatives + derivative);
+                    sum = factor.mul_add(self.lower.at(self.row(parts.derivatives() + derivative) + j), sum);
+                }
+                self.lower.set(row + j, sum);
+            }
+        }
+    }
+
+    /// Fills the rows of the functions of the mean with their values at the points.
+    #[inline(always)]
+    pub(super) fn fill_functions(&mut self) {
+        let parts = self.parts;
+        for function in 0..parts.n_functions {
+            let row = self.row(parts.functions() + function);
+            for j in 0..self.n {
+                self.lower.set(row + j, self.of(&self.batch.functions, function * self.n + j));
+            }
+        }
+    }
+}
